@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from functools import cache
+import tokenize
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -16,15 +16,24 @@ Each module of `src/proofroll/` and the first line of its docstring. `docs/modul
 """
 
 
-@cache
 def modules(source: Path = SOURCE) -> dict[str, str]:
     """First docstring line of each module, by its path below ``source``; empty for a module without a docstring."""
     paths = sorted(source.rglob("*.py"), key=lambda path: (path.parent.parts, path.name))
     lines = {}
     for path in paths:
-        docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-        lines[path.relative_to(source).as_posix()] = docstring.partition("\n")[0]
+        lines[path.relative_to(source).as_posix()] = _docstring(path).partition("\n")[0]
     return lines
+
+
+def _docstring(path: Path) -> str:
+    """Docstring of a module, read without the rest of it."""
+    with path.open(encoding="utf-8") as file:
+        for token in tokenize.generate_tokens(file.readline):
+            if token.type == tokenize.STRING:
+                return str(ast.literal_eval(token.string))
+            if token.type not in {tokenize.COMMENT, tokenize.NL}:
+                break
+    return ""
 
 
 def document(source: Path = SOURCE) -> str:
