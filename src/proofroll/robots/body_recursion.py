@@ -15,11 +15,11 @@ def body_recursion(robot: Robot, states: RobotStates) -> Dynamics:
     """Terms of the equation of motion by recursive Newton-Euler in body axes (formulation B)."""
     count, n = states.count, robot.dofs
     v = states.stacked(states.velocity, robot)[:, None]
-    still = np.zeros((count, 1, n))
+    rest = np.zeros((count, 1, n))
     units = np.broadcast_to(np.eye(n), (count, n, n))
     M = newton_euler(robot, states, np.zeros((count, n, n)), units, np.zeros(3))
-    g = newton_euler(robot, states, still, still, robot.gravity)[:, 0]
-    h = newton_euler(robot, states, v, still, robot.gravity)[:, 0]
+    g = newton_euler(robot, states, rest, rest, robot.gravity)[:, 0]
+    h = newton_euler(robot, states, v, rest, robot.gravity)[:, 0]
     return Dynamics(M + np.diag(armature(robot)), g, h + turned_armature(robot, v[:, 0]))
 
 

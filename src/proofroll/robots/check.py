@@ -214,10 +214,8 @@ def robot_drawing(truth: RobotTruth) -> DrawnRobot:
     zero = {joint.name: np.zeros(1) for joint in robot.moving}
     upright = {joint.name: np.eye(3)[None] for joint in robot.moving}
     origin = {joint.name: np.zeros((1, 3)) for joint in robot.moving}
-    still = {joint.name: np.zeros((1, joint.dofs)) for joint in robot.moving}
-    frames = poses(
-        robot, RobotStates(angle=zero, rotation=upright, position=origin, velocity=still, acceleration=still)
-    )
+    rest = {joint.name: np.zeros((1, joint.dofs)) for joint in robot.moving}
+    frames = poses(robot, RobotStates(angle=zero, rotation=upright, position=origin, velocity=rest, acceleration=rest))
     placed = {name: (p[0], R[0]) for name, (p, R) in frames.items()}
 
     def drawn_joint(joint: RobotJoint) -> DrawnJoint:

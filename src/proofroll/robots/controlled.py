@@ -151,8 +151,8 @@ class ControlledScenes:
         if controller.start.base is not None and not any(joint.kind == JointKind.FREE for joint in robot.moving):
             advice = "this robot's root is fixed in its file; leave it out, or give the root a free joint"
             raise InputError(f"{self._path}: start.base", list(controller.start.base), advice)
-        own = {joint.name: controller.servo(joint.name) for joint in robot.moving if joint.dofs == 1}
-        armature = {name: gains.armature for name, gains in own.items() if gains and gains.armature is not None}
+        servos = {joint.name: controller.servo(joint.name) for joint in robot.moving if joint.dofs == 1}
+        armature = {name: gains.armature for name, gains in servos.items() if gains and gains.armature is not None}
         joints = (
             dataclasses.replace(joint, armature=armature.get(joint.name, joint.armature)) for joint in robot.joints
         )
@@ -204,8 +204,8 @@ def start_of(robot: Robot, controller: Controller) -> RobotStates:
         rotation[joint.name], velocity[joint.name] = R[None], rates[None]
         if joint.kind == JointKind.FREE:
             position[joint.name] = p[None]
-    still = {name: np.zeros_like(rates) for name, rates in velocity.items()}
-    return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=still)
+    rest = {name: np.zeros_like(rates) for name, rates in velocity.items()}
+    return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=rest)
 
 
 def _servos_of_file(file: RobotFile, robot: Robot) -> dict[str, dict[str, Any]]:

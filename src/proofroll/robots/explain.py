@@ -130,19 +130,19 @@ class Search:
     def _tried(self, step: _Step, hypothesis: RobotHypothesis, layer: str, most: float = math.inf) -> _Step | None:
         """Step after a hypothesis; None: it changes nothing, or leaves a difference above ``most`` at the layer."""
         truth, reading = step.truth, step.reading
-        changed = hypothesis.change(
+        result = hypothesis.change(
             RobotEvidence(
                 file=self.file, robot=truth.robot, reading=reading, recompiled=self.recompiled, reread=self.reread
             )
         )
-        if changed is None or changed is truth.robot:
+        if result is None or result is truth.robot:
             return None
-        if isinstance(changed, Reading):
-            reading = changed
-        elif reading.joints and not changed.moving:
+        if isinstance(result, Reading):
+            reading = result
+        elif reading.joints and not result.moving:
             return None
         else:
-            truth = RobotTruth.of(changed, truth.states, like=truth)
+            truth = RobotTruth.of(result, truth.states, like=truth)
         if not differences(truth, reading, layer).get(layer, math.inf) <= most:
             return None
         left = differences(truth, reading)

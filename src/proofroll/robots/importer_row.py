@@ -61,7 +61,7 @@ def importer_row(
     layers = {
         layer: HeldLayer(value, tolerances[layer], bool(value <= tolerances[layer])) for layer, value in off.items()
     }
-    recompiled = _of_changed(file, lambda changed, written: meaning(changed, written, TIME_LIMIT, workers)[0])
+    recompiled = _of_changed(file, lambda other_file, written: meaning(other_file, written, TIME_LIMIT, workers)[0])
     search = Search(
         file=file,
         reading=answer.reading,
@@ -112,9 +112,9 @@ def _of_changed(file: RobotFile, make: Callable[[RobotFile, Path], _Made | None]
 
     @cache
     def made(content: bytes) -> _Made | None:
-        changed = dataclasses.replace(file, root=fromstring(content))
+        other_file = dataclasses.replace(file, root=fromstring(content))
         with tempfile.TemporaryDirectory() as folder, contextlib.suppress(InputError, WorkerDied):
-            return make(changed, reading.write(changed, Path(folder)))
+            return make(other_file, reading.write(other_file, Path(folder)))
         return None
 
     return lambda root: made(tostring(root, "utf-8"))

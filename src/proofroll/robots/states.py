@@ -60,14 +60,14 @@ class RobotStates:
             return self
         count = self.count
         turning = [joint for joint in added if joint.dofs > 1]
-        still = {joint.name: np.zeros((count, joint.dofs)) for joint in added}
+        rest = {joint.name: np.zeros((count, joint.dofs)) for joint in added}
         return RobotStates(
             angle=self.angle | {joint.name: np.zeros(count) for joint in added if joint.dofs == 1},
             rotation=self.rotation | {joint.name: np.tile(np.eye(3), (count, 1, 1)) for joint in turning},
             position=self.position
             | {joint.name: np.zeros((count, 3)) for joint in turning if joint.kind == JointKind.FREE},
-            velocity=self.velocity | still,
-            acceleration=self.acceleration | still,
+            velocity=self.velocity | rest,
+            acceleration=self.acceleration | rest,
         )
 
 

@@ -38,25 +38,25 @@ def robot_versions(file: str, old: str, new: str) -> VersionsStudy:
         InputError, Missing: see :func:`proofroll.robots.check.check`.
     """
     rows = check(Path(file), [old, new]).engines
-    layers, changed = [], []
+    layers, changes = [], []
     for layer in dict.fromkeys(name for row in rows for name in row.layers):
         both_layers = [row.layers.get(layer) for row in rows]
         holds = [None if item is None else item.holds for item in both_layers]
         shown = [None if item is None else "holds" if item.holds else amount(item.difference) for item in both_layers]
         layers.append(LayerVersions(layer, shown[0], shown[1], holds[0] != holds[1]))
         if holds[0] != holds[1]:
-            changed.append(f"{layer}: {shown[0] or 'not offered'} → {shown[1] or 'not offered'}")
+            changes.append(f"{layer}: {shown[0] or 'not offered'} → {shown[1] or 'not offered'}")
     if rows[0].status != rows[1].status:
-        changed.insert(0, f"the robot: {_does(rows[0])} → {_does(rows[1])}")
+        changes.insert(0, f"the robot: {_does(rows[0])} → {_does(rows[1])}")
     elif _causes(rows[0]) != _causes(rows[1]):
-        changed.insert(0, f"causes: {_causes(rows[0]) or 'none'} → {_causes(rows[1]) or 'none'}")
+        changes.insert(0, f"causes: {_causes(rows[0]) or 'none'} → {_causes(rows[1]) or 'none'}")
     return VersionsStudy(
         engine=plain_name(old),
         old=_side(old, rows[0]),
         new=_side(new, rows[1]),
         comparisons=[Path(file).name],
         robot=RobotVersions(file, layers, *rows),
-        changed=changed,
+        changed=changes,
         lost=[f"{row.engine}: {row.message}" for row in rows if row.status == "missing"],
     )
 

@@ -127,13 +127,13 @@ def case_difference(outcome: Outcome, old_run: Run, new_run: Run) -> CaseDiffere
         for judged_new in new_run.judgements
         if judged.observable == judged_new.observable and judged.verdict != judged_new.verdict
     ]
-    changed = []
+    changes = []
     if old_run.result.status != new_run.result.status:
-        changed.append(f"{_ending(old_run)} → {_ending(new_run)}")
+        changes.append(f"{_ending(old_run)} → {_ending(new_run)}")
     elif old_run.verdict != new_run.verdict or verdicts:
         which = ", ".join(f"{name} {judged} → {judged_new}" for name, judged, judged_new in verdicts)
-        changed.append(which or f"{old_run.verdict} → {new_run.verdict}")
-    changed += _given_by_one(outcome, old_run, new_run)
+        changes.append(which or f"{old_run.verdict} → {new_run.verdict}")
+    changes += _given_by_one(outcome, old_run, new_run)
     orders = [
         OrderChange(judged.observable, judged.order, judged_new.order)
         for judged in old_run.judgements
@@ -150,7 +150,7 @@ def case_difference(outcome: Outcome, old_run: Run, new_run: Run) -> CaseDiffere
         new=RunInVersion.of(new_run),
         numbers=_numbers(outcome, old_run, new_run),
         orders=orders,
-        changed=changed,
+        changed=changes,
     )
 
 

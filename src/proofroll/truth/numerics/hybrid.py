@@ -195,7 +195,7 @@ def follow(
         Diverged: the route fails, or makes no progress, at the start.
         Refused: by the route, at the start.
     """
-    time, over, change, still = 0.0, 0.0, route.begin(), 0
+    time, over, change, standstills = 0.0, 0.0, route.begin(), 0
     short, longest, since = 0, 0.0, 0
     stretches: list[SpanT] = []
     happenings: list[Happening] = []
@@ -229,14 +229,14 @@ def follow(
         stretches.append(stretch)
         if stretch.guard is None and end == until:
             return path(known=True)
-        still = still + 1 if stretch.end <= stretch.start else 0
+        standstills = standstills + 1 if stretch.end <= stretch.start else 0
         length = stretch.end - stretch.start
         if length > 0.0:
             if length > _SHORT * stretch.end or length < _SHRUNK * longest:
                 short, longest = 0, length
             short += 1
         try:
-            if still > _STUCK or short > _MANY:
+            if standstills > _STUCK or short > _MANY:
                 raise Diverged(
                     f"the truth makes no progress at t = {stretch.end:g} s, where {_latest(happenings)} follow each "
                     "other without end; ask for an earlier end of the run"
@@ -368,7 +368,7 @@ def states_of(
     """States at rising times [s], each within the stretch of the given index or at an end, shape (times, state)."""
     indices, chosen = np.asarray(stretches), [path.stretches[number] for number in stretches]
     # beyond the end of a path that is not known further, rates may be of any size
-    within = np.clip(times, [each.start for each in chosen], [each.end for each in chosen])
+    within = np.clip(times, [stretch.start for stretch in chosen], [stretch.end for stretch in chosen])
     parts = [route.within(path.stretches[number], within[indices == number]) for number in sorted(set(stretches))]
     return np.concatenate(parts)
 

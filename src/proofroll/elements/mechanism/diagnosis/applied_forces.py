@@ -25,8 +25,8 @@ def of_applied_forces(evidence: Evidence) -> Iterator[Cause]:
     mechanism = evidence.element.mechanism
     for residuals in residuals_of(evidence):
         for number, force in enumerate(mechanism.forces):
-            for says, changed, remedy in _mistakes(mechanism, force, evidence.step):
-                model = Change(_with(mechanism, number, changed))
+            for says, other_force, remedy in _mistakes(mechanism, force, evidence.step):
+                model = Change(_with(mechanism, number, other_force))
                 yield residuals.cause(f"force {force.name}", f"{force.kind} {force.name} {says}", model, remedy, 0)
 
             def scaled(x: float, number: int = number, force: Force = force) -> Change:

@@ -29,8 +29,8 @@ def of_bushings(evidence: Evidence) -> Iterator[Cause]:
     mechanism = evidence.element.mechanism
     for residuals in residuals_of(evidence):
         for number, bushing in enumerate(mechanism.bushings):
-            for says, changed, remedy in _mistakes(bushing):
-                bushings = (*mechanism.bushings[:number], changed, *mechanism.bushings[number + 1 :])
+            for says, other_bushing, remedy in _mistakes(bushing):
+                bushings = (*mechanism.bushings[:number], other_bushing, *mechanism.bushings[number + 1 :])
                 model = Change(replace(mechanism, bushings=bushings))
                 yield residuals.cause(f"bushing {bushing.name}", f"bushing {bushing.name} {says}", model, remedy, 0)
 

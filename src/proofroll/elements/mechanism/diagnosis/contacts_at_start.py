@@ -112,12 +112,16 @@ def _other_pairs(accelerations: _FirstAccelerations) -> Iterator[Cause]:
             yield accelerations.cause(f"friction of {a.name} and {b.name} is swapped", remainder, _OWN)
 
 
-def _other_turning(first: _FirstAccelerations) -> Iterator[Cause]:
+def _other_turning(accelerations: _FirstAccelerations) -> Iterator[Cause]:
     """Causes: a pair slips with its static friction, or friction against rolling or spin is off or has a factor."""
-    for pair in first.pairs:
+    for pair in accelerations.pairs:
         if pair.static != pair.friction:
-            after = first.off([_with(each, pair, friction=pair.static, static_friction=None) for each in first.pairs])
-            yield first.cause(f"{pair.name} slips with its static friction", after, "take the kinetic one in a slip")
+            remainder = accelerations.off(
+                [_with(item, pair, friction=pair.static, static_friction=None) for item in accelerations.pairs]
+            )
+            yield accelerations.cause(
+                f"{pair.name} slips with its static friction", remainder, "take the kinetic one in a slip"
+            )
         for key, name in _TURNING.items():
             size = getattr(pair, key)
             if not size:
@@ -125,17 +129,17 @@ def _other_turning(first: _FirstAccelerations) -> Iterator[Cause]:
 
             def changed(factor: float, pair: Any = pair, key: str = key, size: float = size) -> FloatArray:
                 value = max(factor, 0.0) * size
-                return first.apart([_with(each, pair, **{key: value}) for each in first.pairs])
+                return accelerations.apart([_with(item, pair, **{key: value}) for item in accelerations.pairs])
 
-            yield first.cause(f"{name} of {pair.name} is off", _longest(changed(0.0)), _OWN)
+            yield accelerations.cause(f"{name} of {pair.name} is off", _longest(changed(0.0)), _OWN)
             factor = max(least_squares_parameter(changed, 1.0, 1.0), 0.0)
             says = f"{name} of {pair.name} is {factor_text(factor)}"
-            yield first.cause(says, _longest(changed(factor)), _OWN, 1, change_by(factor))
+            yield accelerations.cause(says, _longest(changed(factor)), _OWN, 1, change_by(factor))
 
 
-def _with(pair: Any, changed: Any, **laws: float | None) -> Any:
-    """The pair, or if it is the ``changed`` one, with other laws."""
-    return replace(pair, **laws) if pair is changed else pair
+def _with(pair: Any, chosen: Any, **laws: float | None) -> Any:
+    """The pair, or if it is the ``chosen`` one, with other laws."""
+    return replace(pair, **laws) if pair is chosen else pair
 
 
 def _other_friction(accelerations: _FirstAccelerations) -> Iterator[Cause]:

@@ -75,10 +75,10 @@ class MechanismStates:
         self.consistent = True
         for i in which.tolist():
             q = coordinates[i]
-            still = self.tree.at(q, np.zeros(mechanism.nv))
+            rest = self.tree.at(q, np.zeros(mechanism.nv))
             twists = np.concatenate([placed.v_WB[i], placed.w_WB[i]], axis=-1)
-            v = np.linalg.lstsq(still.J[:-1].reshape(-1, mechanism.nv), twists.ravel(), rcond=None)[0]
-            off = np.abs(still.J[:-1].reshape(-1, mechanism.nv) @ v - twists.ravel())
+            v = np.linalg.lstsq(rest.J[:-1].reshape(-1, mechanism.nv), twists.ravel(), rcond=None)[0]
+            off = np.abs(rest.J[:-1].reshape(-1, mechanism.nv) @ v - twists.ravel())
             self.consistent &= bool(np.max(off) <= _CONSISTENT * max(float(np.max(np.abs(twists))), 1e-300))
             self.each.append(
                 MechanismState(
@@ -321,11 +321,11 @@ def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:
     modes: list[tuple[object, ...]] = []
     joints = switched_joints(mechanism)
     q, v = placed.of_tree() if joints or mechanism.actuators else (np.zeros((len(placed.time), mechanism.nq)),) * 2
-    still = _AT_REST * np.max(np.abs(v), axis=0, initial=0.0)
+    least = _AT_REST * np.max(np.abs(v), axis=0, initial=0.0)
     for t, places, rates in zip(placed.time.tolist(), q, v, strict=True):
         rest = tuple(
             (
-                np.sign(rates[j.velocity]) if abs(rates[j.velocity]) > still[j.velocity] else 0.0,
+                np.sign(rates[j.velocity]) if abs(rates[j.velocity]) > least[j.velocity] else 0.0,
                 j.low < places[j.coordinate] < j.high,
             )
             for j in joints

@@ -177,7 +177,7 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
         if not max(_JUMP * evidence.element.speed, ABOVE * true_error) < difference < np.inf:
             continue
         residuals = Residuals(
-            functools.partial(_missed, struck=seen),
+            functools.partial(_missed, impacts=seen),
             *("velocities after impacts", "m/s", difference, CLOSES, COVERS, mechanism),
             functools.partial(_others, mechanism),
         )
@@ -250,7 +250,7 @@ def _extrapolated(
     return p[i] + v[i] * since + a * since**2 / 2, v[i] + a * since
 
 
-def _missed(model: Mechanism | None, struck: Sequence[_Struck], convex: bool = False) -> FloatArray:
+def _missed(model: Mechanism | None, impacts: Sequence[_Struck], convex: bool = False) -> FloatArray:
     """Velocities after impacts less those of a model, as of the whole mass with that kinetic energy [m/s].
 
     ``convex``: with a convex cone of friction, contacts part faster than by their restitution, by μ times their slip.
@@ -259,7 +259,7 @@ def _missed(model: Mechanism | None, struck: Sequence[_Struck], convex: bool = F
     if model is None:
         return np.full(1, np.inf)
     dynamics, parts = ContactDynamics(model), [np.zeros(0)]
-    for impact in struck:
+    for impact in impacts:
         contact, state = dynamics.contacts[impact.contact], dynamics.at(impact.q, impact.before)
         n, J = state.touching[impact.contact].normal, state.J[impact.contact]
         comes, slip = abs(float(n @ J @ impact.before)), 0.0

@@ -224,9 +224,9 @@ def _off_at_start(mechanism: Mechanism, number: int, ratio: float, rates: FloatA
     """Largest distance of accelerations (nv) from those of the mechanism with another ratio of a coupling."""
     couplings = list(mechanism.couplings)
     couplings[number] = replace(couplings[number], ratio=ratio)
-    changed = replace(mechanism, couplings=tuple(couplings))
+    other_model = replace(mechanism, couplings=tuple(couplings))
     q, v = mechanism.start()
-    return float(np.max(np.abs(JointCoordinates(changed).solve(q, v).acceleration - rates)))
+    return float(np.max(np.abs(JointCoordinates(other_model).solve(q, v).acceleration - rates)))
 
 
 @hypothesis(

@@ -44,10 +44,10 @@ def factor_of_all(
         mechanism = evidence.element.mechanism
         for residuals in residuals_of(evidence) if has(mechanism) and not evidence.read_back(line) else ():
             factor, fitted = best(residuals, lambda x: change(mechanism, x))
-            changed = change(mechanism, factor)
-            if possible(factor, signed) and not _by_scheme(evidence, changed):
+            other_model = change(mechanism, factor)
+            if possible(factor, signed) and not _by_scheme(evidence, other_model):
                 says = f"the engine moves it with {what} {factor_text(factor)}"
-                yield residuals.cause(name, says, changed, remedy, fitted, change_by(factor))
+                yield residuals.cause(name, says, other_model, remedy, fitted, change_by(factor))
 
     return test
 
@@ -175,10 +175,10 @@ def _reordered(residuals: Residuals[Change], mechanism: Mechanism, inertia: Floa
     """Hypotheses: moments of inertia along other axes, products of inertia with the wrong sign."""
     remedy = "look at the order of moments and products of inertia, and at the sign of the products"
     for order in list(itertools.permutations(range(3)))[1:]:
-        changed = inertia[:, order][:, :, order]
+        other_inertia = inertia[:, order][:, :, order]
         shown = ", ".join("xyz"[k] for k in order)
         says = f"the moments of inertia are in another order: those about x, y, z are the scene's about {shown}"
-        yield residuals.cause("order of inertia", says, Change(mechanism, inertia=changed), remedy, 0)
+        yield residuals.cause("order of inertia", says, Change(mechanism, inertia=other_inertia), remedy, 0)
     mirrored = inertia * (2 * np.eye(3) - 1)
     if not np.array_equal(mirrored, inertia):
         says = "the products of inertia have the wrong sign"

@@ -38,22 +38,22 @@ def start_not_taken(evidence: Evidence) -> Iterator[Cause]:
     if "p_WB" not in run or run.sizes["time"] < _FIRST:
         return
     times = true["time"].to_numpy()[:_FIRST]
-    found, expected = (_poses(data["p_WB"].to_numpy(), data["q_WB"].to_numpy()) for data in (run, true))
+    poses, expected = (_poses(data["p_WB"].to_numpy(), data["q_WB"].to_numpy()) for data in (run, true))
     # an engine may report at time 0 what it was given
-    before = largest_difference(found[1:_FIRST], expected[1:_FIRST])
-    if not above_round_off(before, longest(expected)):
+    distance = largest_difference(poses[1:_FIRST], expected[1:_FIRST])
+    if not above_round_off(distance, longest(expected)):
         return
-    for says, other in _other_starts(evidence.element.mechanism):
-        moved = _moved(evidence, other, times)
+    for says, other_model in _other_starts(evidence.element.mechanism):
+        moved = _moved(evidence, other_model, times)
         if moved is None:
             continue
-        remainder = largest_difference(found[1:_FIRST], moved[1:])
+        remainder = largest_difference(poses[1:_FIRST], moved[1:])
         yield Cause(
             id="start",
             says=says,
             quantity="first samples",
             unit="m",
-            before=before,
+            before=distance,
             after=remainder,
             remedy=_REMEDY,
             covers=_COVERS,
@@ -69,14 +69,14 @@ def _lost_in_a_step(evidence: Evidence) -> Iterator[Cause]:
         return
     lengths = np.array([1.0, element.length])
     velocity = np.stack([start.v_WB[0], start.w_WB[0]]) * lengths[:, None, None]
-    found, expected = (
+    poses, expected = (
         np.array([np.reshape(lines[name][key], start.v_WB[0].shape) for name in names]) * lengths[:, None, None]
         for key in ("found", "expected")
     )
     square = float(np.sum(velocity**2))
-    rate = float(np.sum((expected - found) * velocity)) / square if square else 0.0
+    rate = float(np.sum((expected - poses) * velocity)) / square if square else 0.0
     if rate * element.natural_time > _AT_ONCE:
-        before, after = longest(found - expected), longest(found - expected + rate * velocity)
+        distance, remainder = longest(poses - expected), longest(poses - expected + rate * velocity)
         says = "the start was not taken: the velocities of the start vanish in the first step"
         name = "acceleration of the first steps"
         yield Cause(
@@ -84,8 +84,8 @@ def _lost_in_a_step(evidence: Evidence) -> Iterator[Cause]:
             says=says,
             quantity=name,
             unit="m/s^2",
-            before=before,
-            after=after,
+            before=distance,
+            after=remainder,
             remedy=_REMEDY,
             covers=_COVERS,
         )
@@ -101,15 +101,15 @@ def _other_starts(mechanism: Mechanism) -> Iterator[tuple[str, Mechanism]]:
     """The mechanism from the starts that an engine has by itself, each with a clause."""
     if mechanism.prescribed:
         return
-    still = tuple(replace(joint, v0=(0.0,) * joint.nv) for joint in mechanism.joints)
+    resting = tuple(replace(joint, v0=(0.0,) * joint.nv) for joint in mechanism.joints)
     if any(np.any(joint.v0) for joint in mechanism.joints):
         says = "the start was not taken: it begins at rest, without the velocities of the scene"
-        yield says, replace(mechanism, joints=still)
+        yield says, replace(mechanism, joints=resting)
     if mechanism.loops or mechanism.couplings or not any(map(_away, mechanism.joints)):
         return
     home = tuple(replace(joint, q0=_home(joint)) for joint in mechanism.joints)
     yield "the start was not taken: all coordinates begin at zero", replace(mechanism, joints=home)
-    both = tuple(replace(joint, q0=_home(joint)) for joint in still)
+    both = tuple(replace(joint, q0=_home(joint)) for joint in resting)
     yield "the start was not taken: it begins at rest with all coordinates at zero", replace(mechanism, joints=both)
 
 

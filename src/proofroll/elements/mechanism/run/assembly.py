@@ -72,9 +72,9 @@ def _check_inertia(mechanism: Mechanism, M: Array, C: Array) -> None:
     values, vectors = np.linalg.eigh(allowed.T @ (M / np.outer(size, size)) @ allowed)
     if len(values) and values[0] < SINGULAR:
         way = allowed @ vectors[:, 0] / size
-        still = np.abs(way) > _PART * np.abs(way).max()
+        moving = np.abs(way) > _PART * np.abs(way).max()
         joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
-        names = ", ".join(joint.name for joint, columns in joints if still[columns].any())
+        names = ", ".join(joint.name for joint, columns in joints if moving[columns].any())
         advice = "can move so that nothing with inertia does; give a body that they move mass and moments, or fix one"
         raise InputError("joints", names, advice)
 

@@ -202,9 +202,9 @@ def _local(element: MechanismElement, placed: Placed, pressed: FloatArray) -> di
         return {}
     p, v, w, q = (values[:, body.index] for values in (placed.p_WB, placed.v_WB, placed.w_WB, placed.q_WB))
     force = body.sign * pressed[:, body.contact_index]
-    given = None if np.isnan(force[1:]).any() else force
+    forces = None if np.isnan(force[1:]).any() else force
     attitude = Variable(("time", "wxyz"), q, {"units": "1", "long_name": "quaternion of the ball"})
-    return {"attitude": attitude} | local_variables(body, placed.time, p, v, w, given, element.turn_interval)
+    return {"attitude": attitude} | local_variables(body, placed.time, p, v, w, forces, element.turn_interval)
 
 
 def _put_contacts(

@@ -307,11 +307,11 @@ class MechanismElement:
             table.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, **told))
         table += link_observables(self.mechanism, least)
         if self.conservative:
-            never: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy", "floor": least["J"]}
-            never |= {"symbol": "ΔE", "column": True, "role": Role.RESIDUAL}
-            table.append(Observable("energy_error", "J", "energy now minus energy at the start", **never))
-        never = {"hangs_on_events": False, "difference_of": "p_WB", "floor": a, "asked_for": False}
-        table.append(Observable("drift", "m", "how far joints and loops are open", Role.RESIDUAL, **never))
+            fields: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy", "floor": least["J"]}
+            fields |= {"symbol": "ΔE", "column": True, "role": Role.RESIDUAL}
+            table.append(Observable("energy_error", "J", "energy now minus energy at the start", **fields))
+        fields = {"hangs_on_events": False, "difference_of": "p_WB", "floor": a, "asked_for": False}
+        table.append(Observable("drift", "m", "how far joints and loops are open", Role.RESIDUAL, **fields))
         return tuple(table)
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:

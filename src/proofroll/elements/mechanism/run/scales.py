@@ -46,11 +46,11 @@ def scales(element: MechanismElement, truth: xr.Dataset, least: float) -> dict[s
         name, variable = item.name, variables.get(item.name)
         values = np.zeros(1) if variable is None else variable.values
         vectors = item.vectors or (_triples(values) if variable is not None and variable.dims[-1] == "xyz" else None)
-        known = np.nan_to_num(values)
-        own = 0.0 if item.role == Role.REACTION else largest_distance(known, vectors)
+        finite = np.nan_to_num(values)
+        size = 0.0 if item.role == Role.REACTION else largest_distance(finite, vectors)
         if item.role == Role.REACTION or item.unit.endswith("/s"):
-            own = max(own, largest_magnitude(known, vectors))
-        sizes[name] = sizes.get(name) or natural.get(name) or own
+            size = max(size, largest_magnitude(finite, vectors))
+        sizes[name] = sizes.get(name) or natural.get(name) or size
         if alone:
             sizes[name] = max(sizes[name], least * natural_sizes.get(item.unit, 0.0))
     return sizes
@@ -67,5 +67,5 @@ def _way(places: FloatArray) -> float:
 
 def _rate(rates: FloatArray) -> float:
     """Largest value or change of a rate: a steady one has its size, and one that swings has twice its amplitude."""
-    known = np.nan_to_num(rates)
-    return max(largest_magnitude(known, _triples(rates)), largest_distance(known, _triples(rates)))
+    finite = np.nan_to_num(rates)
+    return max(largest_magnitude(finite, _triples(rates)), largest_distance(finite, _triples(rates)))
