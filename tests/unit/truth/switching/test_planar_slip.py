@@ -57,7 +57,11 @@ def test_a_ball_slips_from_rest_and_sticks_when_its_own_truth_says() -> None:
 
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
-    ("seed", "sticks", "beyond"), [(38, 0.04395707855805324, 0.0), (43, 0.044611843815633004, 3e-13)]
+    ("seed", "sticks", "beyond"),
+    [
+        (38, 0.04395707855805324, 0.0),
+        pytest.param(43, 0.044611843815633004, 3e-13, marks=pytest.mark.drill),
+    ],
 )
 def test_the_end_of_a_slip_lies_within_its_bracket(seed: int, sticks: float, beyond: float) -> None:
     """A slip ends where the referee's long doubles say, by a speed known to the error of a step over its slowing.

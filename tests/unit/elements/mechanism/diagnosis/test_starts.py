@@ -75,7 +75,7 @@ def test_velocities_that_vanish_in_a_step_are_no_light_masses() -> None:
     assert [item.cause.id for item in causes] == ["start"]
 
 
-@pytest.mark.parametrize("given", [True, False])
+@pytest.mark.parametrize("given", [True, pytest.param(False, marks=pytest.mark.drill)])
 def test_no_cause_contradicts_what_is_read_back(given: bool) -> None:
     """Masses that a model has are no cause; a run alone, of which nothing is read back, may have others."""
     scene = arm((0.7, 0.4), (2.0, -3.0))
