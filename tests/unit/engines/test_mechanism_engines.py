@@ -239,3 +239,17 @@ def test_a_singular_pose_is_told_with_time_and_pose() -> None:
     assert found, run.attrs["message"]
     assert 0.70 < float(found[1]) < 0.72
     assert abs(float(found[2]) + np.pi / 2) < 0.01
+
+
+@pytest.mark.parametrize(("size", "said"), [(1.0, "at least 1e-15 kg m^2; carriage has 0"), (1e6, "")])
+def test_mujoco_names_its_least_inertia(size, said):
+    """A body without inertia is refused with MuJoCo's least, where that is not small beside others."""
+    carriage = Body("carriage", 0.0, (0.0, 0.0, 0.0), ((0.0,) * 3,) * 3)
+    nut = Body("nut", 1e-4 * size, (0.0, 0.0, 0.0), tuple(1.6e-8 * size * np.eye(3)))
+    joints = (Joint("slide", "prismatic", "world", "carriage"), Joint("turn", "revolute", "carriage", "nut"))
+    mechanism = Mechanism((carriage, nut), joints)
+    if said:
+        with pytest.raises(Refused, match=re.escape(said)):
+            runs.build("joints", mechanism)
+    else:
+        runs.build("joints", mechanism)

@@ -12,8 +12,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism, Tree
 from proofroll.elements.mechanism.dynamics.loop_points import held_points
+from proofroll.elements.mechanism.run.certificate import COMPOSED
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.rotations import to_quaternion
@@ -53,7 +55,12 @@ _SHORTEST = 1e-9
 
 
 def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
-    """MjSpec of a mechanism; joints are named by :func:`part_names`, joint k has a site ``k`` and two sensors."""
+    """MjSpec of a mechanism; joints are named by :func:`part_names`, joint k has a site ``k`` and two sensors.
+
+    Raises:
+        Refused: MuJoCo's least mass or inertia of a moving body is not small beside those of the mechanism.
+    """
+    _require_heavy(mechanism)
     spec = mujoco.MjSpec()
     spec.compiler.degree = False  # or springs of hinges would have their rest in degrees
     option = spec.option
@@ -129,6 +136,23 @@ def _add_coupling(spec: Any, coupling: Coupling) -> Any:
     added.name1 = name
     added.data[0] = coupling.place
     return added
+
+
+def _require_heavy(mechanism: Mechanism) -> None:
+    """Raises Refused, naming a body, if MuJoCo's least mass or inertia would change the mechanism."""
+    moving = {joint.child for joint in mechanism.joints if joint.nv}
+    largest_mass = max((body.mass for body in mechanism.bodies), default=0.0)
+    largest = max((float(np.abs(body.inertia).max()) for body in mechanism.bodies), default=0.0)
+    for body in mechanism.bodies if largest else ():
+        inertia = float(np.linalg.eigvalsh(body.inertia)[0])
+        for least, size, unit in ((body.mass, largest_mass, "kg"), (inertia, largest, "kg m^2")):
+            part = (mujoco.mjMINVAL - least) / size
+            if body.name in moving and part > COMPOSED:
+                raise Refused(
+                    f"MuJoCo gives a moving body at least {mujoco.mjMINVAL:g} {unit}; {body.name} has "
+                    f"{max(least, 0.0):.3g}, and the difference is {part:.1g} of the largest here; write the scene in "
+                    "smaller units (g, mm), which changes no motion"
+                )
 
 
 def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body, settings: MujocoSettings) -> Any:
