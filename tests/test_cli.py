@@ -612,9 +612,7 @@ def test_help_and_version(proofroll: Proofroll) -> None:
         assert command in out
     assert "..." not in out.partition("Ask:")[2]  # no summary is cut
     heads = [line for line in out.splitlines() if line.endswith(":") and not line.startswith(" ")]
-    assert [head.partition(" ")[0].strip(":") for head in heads[:6]] == [
-        "Options", "Ask", "Bring", "Robots", "Study", "Maintain",
-    ]  # fmt: skip
+    assert [head.partition(" ")[0].strip(":") for head in heads[:5]] == ["Options", "Ask", "Bring", "Study", "Maintain"]
     assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
     assert proofroll()[0] == 2
     code, out, err = proofroll("new")

@@ -36,8 +36,6 @@ from proofroll.robots.records import (
     DrawnBody,
     DrawnJoint,
     DrawnRobot,
-    GalleryReading,
-    GalleryRow,
     HeldLayer,
     ImporterRow,
     RobotCheck,
@@ -175,14 +173,14 @@ TRADEOFF = (
 @pytest.mark.parametrize(
     ("page", "title", "records"),
     [
-        ("json.md", "`check --json` of a robot file", (*ROBOT, GalleryRow, GalleryReading)),
+        ("json.md", "`check --json` of a robot file", ROBOT),
         ("json.md", "`check --against --json`", (UnlikeValue,)),
         ("json.md", "`compare --json`", COMPARISON),
         ("json.md", "`stability --json`", MAP),
         ("tradeoff.md", "JSON", (*TRADEOFF, Recommendation, Answer, CheckedOver)),
         ("json.md", "`ladder --json`", LADDER),
         ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
-        ("json.md", "The other commands", (Drilled, Mutated, GalleryRow)),
+        ("json.md", "The other commands", (Drilled, Mutated)),
     ],
     ids=["robots", "against", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
 )

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import pytest
+from robot_gallery import locate
 
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.run.reader import made_mechanism
-from proofroll.robots.gallery import locate, read_gallery
 from proofroll.robots.scene import RobotScenes
 
 # Part of a joint's name -> kp, kd and target; the first that fits counts.
@@ -33,9 +32,7 @@ def servo_tables(name: str, armature: float = 0.0, speed: float = 0.0) -> dict[s
 
     ``speed``: largest random velocity of a joint [rad/s].
     """
-    path = locate(next(entry for entry in read_gallery() if entry.name == name))
-    if path is None:
-        pytest.skip(f"the package of {name} is not installed")
+    path = locate(name)
     values = {key: item["value"] for key, item in RobotScenes.content(path)["parameters"].items()}
     laws = {law: 0.0 for law in ("damping", "friction", "armature") if law in values}
     tables = RobotScenes.tables(path, values | {"free_base": 1, "speed": speed} | laws)

@@ -2,48 +2,30 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from robot_gallery import locate, outcome, read_gallery
 
-from proofroll.core.errors import InputError
+from proofroll.core.plugins import parse_engine
 from proofroll.robots.check import check
 from proofroll.robots.explain import RobotCause
-from proofroll.robots.gallery import locate, outcome, read_gallery
+from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.meaning import CheckSettings
+from proofroll.robots.reading import reader_names
 from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.running.engine_questions import lent_workers
 
-Proofroll = Callable[..., tuple[int, str, str]]
-
 
 def test_the_file() -> None:
-    """The gallery has at least 25 robots of two formats, fixed and free, each with what is expected of the engines."""
-    entries = read_gallery()
-    assert len({entry.name for entry in entries}) == len(entries) >= 25
+    """The gallery has at least 25 robots of two formats, fixed and free, and names only causes that exist."""
+    entries = read_gallery().values()
+    assert len(entries) >= 25
     assert {entry.base for entry in entries} == {"fixed", "free"}
     assert {Path(entry.file).suffix for entry in entries} == {".urdf", ".xml"}
     assert all({"mujoco", "pinocchio", "exudyn", "drake"} <= entry.engines.keys() for entry in entries)
-
-
-def test_unknown_cause(tmp_path: Path) -> None:
-    """A cause that there is not, or a missing field, is refused in one line."""
-    path = tmp_path / "robots.toml"
-    path.write_text('[[robots]]\nname="r"\npackage="p"\nfile="f"\n[robots.engines]\nmujoco=["no_such_cause"]\n')
-    with pytest.raises(InputError, match="choose one of"):
-        read_gallery(path)
-    path.write_text('[[robots]]\nname="r"\n')
-    for text, said in (
-        ('[[robots]]\nname="r"\n', r"robots\.toml: robots\.0\.package = 'nothing': this key is required"),
-        ("robots = 3", "robots = 3: give a list"),
-        ('[[robots]]\nname="r"\npackage="p"\nfile="f"\nengines = { mujoco = 3 }', "engines.mujoco = 3: give a list"),
-        ('[[robots]]\nname="r"\npackage="p"\nfile="f"\nbase="x"\nengines = {}', "robots.0.base = 'x'"),
-    ):
-        path.write_text(text)
-        with pytest.raises(InputError, match=said):
-            read_gallery(path)
+    named = {cause for entry in entries for causes in entry.engines.values() for cause in causes}
+    assert named <= {"refuses", "crashed", "open", *(hypothesis.id for hypothesis in hypotheses())}
 
 
 def test_outcomes() -> None:
@@ -56,48 +38,49 @@ def test_outcomes() -> None:
     assert outcome(ImporterRow(engine="one", status="timeout")) == ["timeout"]
 
 
-def test_unknown_robot(proofroll: Proofroll) -> None:
-    """A robot that is not in the gallery gives one line."""
-    code, _, err = proofroll("robots", "no_such_robot")
-    assert code == 2
-    assert "choose one of panda" in err
-
-
 @pytest.mark.parametrize("name", ["z1", "allegro_right_hand", "half_cheetah", "pusher"])
-def test_as_expected(proofroll: Proofroll, name: str) -> None:
+def test_as_expected(name: str) -> None:
     """A robot does in our engines what the gallery expects."""
-    entry = next(entry for entry in read_gallery() if entry.name == name)
-    if locate(entry) is None:
-        pytest.skip(f"{entry.package} is not installed: pip install 'proofroll[robots]'")
-    code, out, _ = proofroll("robots", name, "--engine", "pinocchio", "--engine", "mujoco", "--json")
-    (row,) = json.loads(out)["robots"]
-    assert row["unexpected"] == []
-    assert code == 0
-    assert {"pinocchio", "mujoco"} <= {item["engine"] for item in row["engines"]}
+    entry = read_gallery()[name]
+    rows = check(locate(name), ["pinocchio", "mujoco"], CheckSettings(base=entry.base)).engines
+    assert {row.engine: set(outcome(row)) for row in rows} == {
+        engine: set(entry.engines[engine]) for engine in ("pinocchio", "mujoco")
+    }
+
+
+@pytest.mark.nightly
+@pytest.mark.drill
+def test_all_as_expected() -> None:
+    """Every robot of an installed package does in every installed engine what the gallery expects."""
+    unexpected = {}
+    with lent_workers(None) as workers:
+        for entry in read_gallery().values():
+            try:
+                path = locate(entry.name)
+            except pytest.skip.Exception:
+                continue
+            engines = [name for name in entry.engines if parse_engine(name).name in reader_names()]
+            for row in check(path, engines, CheckSettings(base=entry.base), workers=workers).engines:
+                if row.status != "missing" and set(outcome(row)) != set(entry.engines[row.engine]):
+                    unexpected[entry.name, row.engine] = outcome(row)
+    assert unexpected == {}
 
 
 @pytest.mark.drill
 @pytest.mark.own_workers
 def test_what_was_read_before_changes_nothing() -> None:
-    """A gallery reads all robots in one process of an engine: each is found alike, to the last digit, first or last."""
-    entries = [entry for entry in read_gallery() if entry.name in {"half_cheetah", "swimmer"}]
-    assert len(entries) == 2
-    files = {entry.name: locate(entry) for entry in entries}
-    for entry in entries:
-        if files[entry.name] is None:
-            pytest.skip(f"{entry.package} is not installed: pip install 'proofroll[robots]'")
-    found: list[dict[str, list[ImporterRow]]] = []
-    for order in (entries, entries[::-1]):
+    """Robots that one process of an engine reads: each is found alike, to the last digit, first or last."""
+    names = ["half_cheetah", "swimmer"]
+    entries, files = read_gallery(), {name: locate(name) for name in names}
+    rows_of: list[dict[str, list[ImporterRow]]] = []
+    for order in (names, names[::-1]):
         with lent_workers(None) as workers:
-            asked = {entry.name: (files[entry.name], entry.base) for entry in order}
-            found.append(
-                {
-                    name: check(path, ["mujoco", "pinocchio", "exudyn"], CheckSettings(base), workers=workers).engines
-                    for name, (path, base) in asked.items()
-                    if path is not None
-                }
-            )
-    assert list(found[0]) == list(found[1])[::-1]
-    for name, rows in found[0].items():
+            rows = {}
+            for name in order:
+                how = CheckSettings(entries[name].base)
+                rows[name] = check(files[name], ["mujoco", "pinocchio", "exudyn"], how, workers=workers).engines
+            rows_of.append(rows)
+    assert list(rows_of[0]) == list(rows_of[1])[::-1]
+    for name, rows in rows_of[0].items():
         assert {row.status for row in rows} <= {"holds", "explained"}
-        assert rows == found[1][name]
+        assert rows == rows_of[1][name]

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from robot_gallery import locate
 
 from proofroll import load_scene, simulate
 from proofroll.core.scene import Scene
 from proofroll.files.scene_sources import with_control
-from proofroll.robots.gallery import locate, read_gallery
 
 FREE = """
 [start]
@@ -34,11 +34,7 @@ SET = {"anymal_b": {"possible": 0}, "go1": {"possible": 0, "friction": 0}}
 
 
 def _scene(name: str, folder: Path) -> Scene:
-    entry = next((entry for entry in read_gallery() if entry.name == name), None)
-    assert entry is not None, f"the gallery has no {name}"
-    path = locate(entry)
-    if path is None:
-        pytest.skip(f"the package of {entry.name} is not installed")
+    path = locate(name)
     gains, pose, start = ROBOTS[name]
     control = folder / "control.toml"
     control.write_text(f'rate = 50\n{pose}\n[[gains]]\njoints = "*"\n{gains}\n{POLICY}{start}', encoding="utf-8")
@@ -72,10 +68,7 @@ def test_the_truth_of_a_robot_is_exact(name: str, tmp_path: Path) -> None:
 @pytest.mark.drill
 def test_targets_at_50_hz_cost_no_order(tmp_path: Path) -> None:
     """A quadruped whose targets jump 50 times a second: RK4 engines keep order 3.5 and 1e-8 m at 1 ms."""
-    entry = next(entry for entry in read_gallery() if entry.name == "solo12")
-    path = locate(entry)
-    if path is None:
-        pytest.skip(f"the package of {entry.name} is not installed")
+    path = locate("solo12")
     legs = [f"{end}{side}" for end in "FH" for side in "LR"]
     signs = {leg: 1 if leg.startswith("F") else -1 for leg in legs}
     pose = ", ".join(f"{leg}_HFE = {0.7 * sign}, {leg}_KFE = {-1.4 * sign}" for leg, sign in signs.items())

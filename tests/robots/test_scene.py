@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from robot_gallery import locate
 from robot_templates import inertial, mjcf, spherical, urdf
 from typer.testing import CliRunner
 
@@ -19,7 +20,6 @@ from proofroll.core.events import events_of
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
-from proofroll.robots.gallery import locate, read_gallery
 from proofroll.robots.meaning import meaning
 from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import write
@@ -208,10 +208,7 @@ def test_an_element_outside_ascii(robot):
 def test_a_robot_of_the_gallery():
     """The whole ur5 of a package falls in Pinocchio as the truth says."""
     pytest.importorskip("heyoka")
-    path = next(locate(entry) for entry in read_gallery() if entry.name == "ur5")
-    if path is None:
-        pytest.skip("its package is not installed")
-    scene = load_scene(str(path))
+    scene = load_scene(str(locate("ur5")))
     assert len(scene.elements[0].bodies) == 6
     times = np.array([0.0, 0.1])
     run = simulate(scene, "pinocchio", until=0.1, every=0.1)

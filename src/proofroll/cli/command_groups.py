@@ -10,7 +10,6 @@ from typer.core import TyperGroup
 GROUPS = {
     "Ask": ("scenes", "run", "plot", "replay", "compare", "recommend", "report"),
     "Bring your own scene, engine or trajectory": ("new", "vocabulary", "check", "judge", "export"),
-    "Robots": ("robots",),
     "Study": ("tradeoff", "stability", "ladder", "balance", "onset", "regimes", "figures"),
     "Maintain": ("engines", "versions", "findings", "cite", "bench", "drill"),
 }

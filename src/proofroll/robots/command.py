@@ -1,4 +1,4 @@
-"""Commands `check` and `robots`; checks of scenes and studies are in the harness."""
+"""Command `check`; checks of scenes and studies are in the harness."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -105,21 +105,3 @@ def _require_none_for_robots(context: typer.Context) -> None:
             value = context.params[str(parameter.name)]
             shown = ", ".join(value) if isinstance(value, list) else value
             raise InputError(parameter.opts[0], shown, advice)
-
-
-def robots(
-    name: Annotated[list[str] | None, typer.Argument(help="Robots of the gallery; by default all.")] = None,
-    engine: options.Engines = None,
-    scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-) -> None:
-    """Check the robots of comparisons/robots.toml; exit 1 if an engine contradicts what the file expects."""
-    from proofroll.robots.gallery import gallery
-    from proofroll.robots.terminal import gallery_lines
-
-    with options.progress_bar("robots") as advance:
-        content = gallery(name or (), engine or (), progress=advance, cluster=options.new_cluster(scheduler))
-    options.show(content, as_json, lambda: gallery_lines(content))
-    if any(row.unexpected for row in content.robots):
-        raise typer.Exit(options.CONTRADICTED)
-    raise typer.Exit(options.OK if any(row.engines for row in content.robots) else options.ENGINE)

@@ -1,4 +1,4 @@
-"""Records of a check of a robot file, and of the gallery's robots."""
+"""Records of a check of a robot file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -159,39 +159,3 @@ class AgainstCheck(RobotCheck):
     rounded: list[UnlikeValue]
     proposed: str
     proposed_partners: Mapping[str, str]
-
-
-@dataclass(frozen=True)
-class GalleryReading:
-    """Reading of a robot by an engine.
-
-    Attributes:
-        engine, version, status, causes, message: as of :class:`ImporterRow`.
-        outcome: causes, "open", "refuses" or a status, as in the gallery's file; empty: the engine holds the file.
-    """
-
-    engine: str
-    version: str | None
-    status: str
-    causes: Sequence[RobotCause]
-    message: str | None
-    outcome: list[str]
-
-
-@dataclass(frozen=True)
-class GalleryRow:
-    """A robot of the gallery; ``file`` is None where its package is not installed."""
-
-    name: str
-    package: str
-    file: str | None
-    engines: list[GalleryReading] = field(default_factory=list)
-    unexpected: list[str] = field(default_factory=list)
-    ran_on: str = ""
-
-
-@dataclass(frozen=True)
-class GalleryContent:
-    """All robots that were checked."""
-
-    robots: list[GalleryRow]

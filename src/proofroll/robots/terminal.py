@@ -12,7 +12,7 @@ from proofroll.report.labels import SYMBOLS, engine_title
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.report.terminal.tables import STYLES
 from proofroll.robots.layers import SHORT
-from proofroll.robots.records import AgainstCheck, GalleryContent, HeldLayer, ImporterRow, RobotCheck
+from proofroll.robots.records import AgainstCheck, HeldLayer, ImporterRow, RobotCheck
 from proofroll.robots.robot_file import LintRemark
 
 WIDTH = 80
@@ -160,25 +160,3 @@ def wrapped(text: str) -> list[str]:
 def one_line(text: str) -> str:
     """Text from a file without control characters."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
-
-
-def gallery_lines(content: GalleryContent) -> Iterator[str]:
-    """Lines for each robot of the gallery: outcome of every engine, and unexpected outcomes; then a summary."""
-    for row in content.robots:
-        if row.file is None:
-            yield from wrapped(f"{row.name}: not here: pip install {row.package}")
-            continue
-        outcomes = (f"{engine_title(item.engine)}: {', '.join(item.outcome) or 'holds'}" for item in row.engines)
-        yield from wrapped(f"{row.name}: {'; '.join(outcomes)}")
-        for sentence in row.unexpected:
-            yield from wrapped(f"!! {row.name}: {sentence}")
-    unexpected = sum(len(row.unexpected) for row in content.robots)
-    checked = [item for row in content.robots for item in row.engines]
-    named = sum(bool(item.causes) for item in checked)
-    unnamed = sum("open" in item.outcome for item in checked)
-    refused = sum(item.status == "refused" for item in checked)
-    sizes = f"{counted(len(content.robots), 'robots')}, {counted(len(checked), 'readings')}"
-    yield from wrapped(
-        f"{sizes}: {named} differ for named causes, {unnamed} have an open one, {refused} refused; "
-        f"{unexpected} otherwise than expected."
-    )

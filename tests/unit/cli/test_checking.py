@@ -223,7 +223,6 @@ def broken(tmp_path: Path, name: str, old: str, new: str) -> str:
         ("tradeoff.toml", "until = ", "until = -1 #", ["tradeoff.toml: until = -1", "above 0"]),
         ("regimes.toml", "count = ", "count = 100000", ["speed = 'from 1 to 7", "count of 1 to 1000"]),
         ("stick_slip.toml", "[0.39, 0.40]", "[0.40, 0.39]", ["points.", "lower value first"]),
-        ("robots.toml", "mujoco = []", "mujoco = 3", ["robots.0.engines.mujoco = 3", "give a list"]),
         ("stability_plane.toml", "values = [0.05,", "value = [0.05,", ["axes.0"]),
         ("regimes.toml", "low = 1.0", "low = 9.0", ["speed", "low <= high"]),
         ("regimes.toml", 'study = "regimes"', 'study = "regime"', ["study = 'regime'", "regimes"]),
