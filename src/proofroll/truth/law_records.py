@@ -209,10 +209,10 @@ class LawRecorder:
         """Pieces of a stretch; ``most``: see :meth:`pieces`."""
         if isinstance(stretch, BegunSlip):
             edges = np.linspace(stretch.start, stretch.end, _PARTS + 1)
-            compiled = self._route.by_symbols(stretch.last, stretch.mode)
-            recorded = None if compiled is None else compiled.record_of(stretch.mode, stretch.start)
-            for k, (start, end) in enumerate(pairwise(edges)):  # at rest a slip has no direction in compiled modes
-                yield from self._parts(start, end, lambda x: stretch.at(x).T, recorded if 0 < k < _PARTS - 1 else None)
+            for start, end in pairwise(edges):
+                yield from self._parts(
+                    start, end, lambda times: stretch.at(times).T, stretch.recorded if stretch.compiled else None
+                )
         elif isinstance(stretch, StoppingSlip):
             return  # where a slip fades away its force has a direction by round-off alone
         elif isinstance(stretch, CompiledStretch) and stretch.by is not None:

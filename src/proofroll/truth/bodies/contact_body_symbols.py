@@ -95,7 +95,7 @@ class BodySymbols:
         mass = self._mass(now.drives)
         lines = [
             start
-            if start is None or self._touchings <= k < self._alone
+            if start is None or self._touchings <= k < self._alone or mode[k].leads
             else self._line(k, touching[k], start, at, (mass, held), functions)
             for k, start in enumerate(began)
         ]

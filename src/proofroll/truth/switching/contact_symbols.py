@@ -187,6 +187,15 @@ def slip_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: Solve
     return found
 
 
+def led_symbols(mode: ContactMode, solved: SolvedSymbols) -> list[Scalar]:
+    """Normal, slide and its rate of each contact that leads, which slips against a given direction."""
+    found: list[Scalar] = []
+    for own, touch, rate in zip(mode, solved.touching, solved.slide_rates, strict=True):
+        if own.leads:
+            found += [*touch.normal, *touch.slide, *rate]
+    return found
+
+
 def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
     """Record of the law check at a state: poses, then forces of all contacts with places and normals, efforts, drives.
 
@@ -208,8 +217,8 @@ def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: Sol
 
 
 def turning_slip(own: Acting, contact: Touchable) -> bool:
-    """True for a slip in the plane with friction, whose direction may turn."""
-    return bool(own.kind == "slip" and own.along is None and contact.friction)
+    """True for a slip in the plane with friction along its own direction, which may turn."""
+    return bool(own.kind == "slip" and own.along is None and contact.friction and not own.leads)
 
 
 def eliminated(rows: list[Row], rights: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:

@@ -33,10 +33,12 @@ from proofroll.truth.switching.contact_symbols import (
     SolvedSymbols,
     Vector,
     guard_symbols,
+    led_symbols,
     slip_symbols,
     stated_symbols,
     turning_slip,
 )
+from proofroll.truth.switching.planar_slip import Led, LedValues
 from proofroll.truth.switching.turning_symbols import follows
 
 _BACK = np.append(2.0 ** -np.arange(50.0), 0.0)  # places before the rise of a guard, in parts of the last step
@@ -123,7 +125,7 @@ class CompiledModes:
         self._symbols, self._contacts, self._length = symbols, contacts, length
         self._by_collocation = by_collocation
         self._covers = heyoka is not None and symbols.covers
-        self._modes: dict[tuple[tuple[str, bool, int], ...], CompiledMode] = {}
+        self._modes: dict[tuple[tuple[str, bool, bool, int], ...], CompiledMode] = {}
 
     def of(self, mode: ContactMode, clamped: tuple[int, ...]) -> CompiledMode | None:
         """Compiled mode with these signs of efforts at their limits, 0 of one within.
@@ -132,7 +134,7 @@ class CompiledModes:
         """
         if not self._covers or not follows(mode, self._contacts):
             return None
-        key = tuple((own.kind, own.along is not None, own.feature) for own in mode)
+        key = tuple((own.kind, own.along is not None, own.leads, own.feature) for own in mode)
         if key not in self._modes:
             self._modes[key] = CompiledMode(
                 self._symbols, self._contacts, mode, len(clamped), self._length, self._by_collocation
@@ -152,7 +154,7 @@ class CompiledMode:
         length: int,
         by_collocation: bool,
     ) -> None:
-        lined = [k for k, own in enumerate(mode) if own.along is not None]
+        lined = [k for k, own in enumerate(mode) if own.along is not None or own.leads]
         constants = Constants(lambda index: heyoka.par[index], 3 * len(lined) + limits, heyoka.expression)
         clamped = [Symbol(heyoka.par[3 * len(lined) + number], constants) for number in range(limits)]
         self._clamped: tuple[int, ...] = (0,) * limits
@@ -164,9 +166,9 @@ class CompiledMode:
         solved = symbols.solved([Symbol(each, constants) for each in state], mode, clamped, began, functions)
         slips = slip_symbols(mode, contacts, solved)
         guards = [*guard_symbols(guards_of(contacts, mode), contacts, solved, began, functions), *solved.within_limits]
-        stated = stated_symbols(mode, contacts, solved)
-        values = [*guards, *slips, *stated, *solved.rates, 1.0]
-        self._stated, self._first_rate = len(stated), len(guards) + len(slips) + len(stated)
+        stated, led = stated_symbols(mode, contacts, solved), led_symbols(mode, solved)
+        values = [*guards, *slips, *led, *stated, *solved.rates, 1.0]
+        self._stated, self._first_rate = len(stated), len(guards) + len(slips) + len(led) + len(stated)
         self._by_collocation = by_collocation
         self._turning = [k for k, pair in enumerate(zip(mode, contacts, strict=True)) if turning_slip(*pair)]
         self._count, self._slips, self._lined = len(guards), len(slips), lined
@@ -177,7 +179,8 @@ class CompiledMode:
             inverse = [1.0 / square for square in squares]
             pace = heyoka.sqrt(squares[0]) if len(squares) == 1 else 1.0 / heyoka.sqrt(heyoka.sum(inverse))
             expressions += [pace * rate for rate in expressions[-len(state) :]]
-        self._values, self._integrator = compiled_once(expressions, state, by_collocation)
+        # what leads is integrated by its nodes
+        self._values, self._integrator = compiled_once(expressions, state, by_collocation or bool(led))
 
     def at_limits(self, clamped: tuple[int, ...]) -> Self:
         """The same mode with these signs of efforts at their limits."""
@@ -198,7 +201,7 @@ class CompiledMode:
 
     def _parameters(self, mode: ContactMode, time: float) -> Array:
         """Run-time parameters of a stretch: lines of contacts, signs of efforts, numbers, lines of signals."""
-        own = [x for k in self._lined for x in mode[k].along or ()]
+        own = [x for k in self._lined for x in mode[k].along or mode[k].heading or ()]
         return np.concatenate([own, self._clamped, self._constants.values(time)])[: self._values.nparams]
 
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
@@ -209,11 +212,37 @@ class CompiledMode:
         return found[: self._count].T, slips, found[first : first + states.shape[1]].T
 
     def _called(self, states: Array, pars: Array) -> Array:
-        """Guards, numbers of slips, rates and, last, rates in the variable of integration, of states (state, times)."""
+        """Guards, numbers of slips, rates and, last, rates in the variable of integration, of states (state, times).
+
+        ``pars``: parameters of all states, or of each, (parameters, times).
+        """
         inputs = np.ascontiguousarray(states)
         if not len(pars):
             return np.asarray(self._values(inputs))
-        return np.asarray(self._values(inputs, pars=np.repeat(pars[:, None], inputs.shape[1], axis=1)))
+        columns = pars if pars.ndim > 1 else np.repeat(pars[:, None], inputs.shape[1], axis=1)
+        return np.asarray(self._values(inputs, pars=columns))
+
+    def led(self, mode: ContactMode, time: float) -> Led:
+        """Values at states in this mode, in which a slip leads, from a time [s] on."""
+        pars, first = self._parameters(mode, time), self._count + self._slips
+        places = [3 * place for place, k in enumerate(self._lined) if mode[k].leads]
+
+        def led(states: Array, directions: Array) -> LedValues:
+            columns = np.repeat(pars[:, None], len(states), axis=1)
+            for place in places:
+                columns[place : place + 3] = directions.T
+            values = self._called(states.T, columns)
+            normals, slides, slide_rates = (values[first + 3 * part : first + 3 * part + 3].T for part in range(3))
+            return LedValues(
+                rates=values[self._first_rate : self._first_rate + states.shape[1]].T,
+                normals=normals,
+                slides=slides,
+                slide_rates=slide_rates,
+                guards=values[: self._count].T,
+                record=values[self._first_rate - self._stated : self._first_rate],
+            )
+
+        return led
 
     def walk(self, law: StretchLaw, mode: ContactMode, time: float, state: Array, until: float) -> Stretch[ContactMode]:
         """Stretch from a time and state to the first rise of a guard, or to ``until`` [s].

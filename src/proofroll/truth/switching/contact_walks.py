@@ -46,7 +46,7 @@ from proofroll.truth.switching.contact_guards import (
 from proofroll.truth.switching.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
 from proofroll.truth.switching.held_route import BodyStates
 from proofroll.truth.switching.kink_sides import noise_at_start, refuse_jolts, sides_ahead
-from proofroll.truth.switching.planar_slip import SHORTEST, BegunSlip, begun_slip, held_or_stopped
+from proofroll.truth.switching.planar_slip import SHORTEST, BegunSlip, begun_slip, held_or_stopped, led_by
 from proofroll.truth.switching.stopping_slip import NOTHING, StoppingSlip, stopping_slip
 
 _T = TypeVar("_T")
@@ -215,10 +215,15 @@ class ContactWalks(ABC):
     def _begun(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """First instants of a slip from rest in the plane, which end before another contact changes."""
         name = next(contact.name for contact, own in zip(self.contacts, mode, strict=True) if own.leads)
-        begun = begun_slip(time, state, mode, until, self._equations.rate, self._solved, self._begins_by, name)
+        compiled = self.by_symbols(state, mode)
+        led = led_by(mode, self._equations.rate, self._solved) if compiled is None else compiled.led(mode, time)
+        begun = begun_slip(time, state, mode, until, led, self._begins_by, name)
+        begun = begun if compiled is None else replace(begun, compiled=led)
         law, guards, signs = self._law(state, mode, self._signs), guards_of(self.contacts, mode), self._signs
 
         def values(times: FloatArray) -> FloatArray:
+            if compiled is not None:
+                return led(begun.at(times), begun.directions_at(times)).guards
             pairs = zip(times.tolist(), begun.at(times), strict=True)
             return np.array([self._guards_and_limits(y, begun.mode_at(t), guards, signs) for t, y in pairs])
 

@@ -11,14 +11,15 @@ Nodes of a polynomial in time carry the angle of t, as friction acts against t, 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from proofroll.core.arrays import cross as cross_of_rows
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contact.acting import Acting, ContactMode, slip_velocity
-from proofroll.elements.mechanism.scene.rotations import Array, cross
+from proofroll.elements.mechanism.contact.acting import Acting, ContactMode, direction_of
+from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import Stretch
 from proofroll.truth.switching.contact_guards import SolvedContacts
 
@@ -34,8 +35,34 @@ _STALLED = 1e-13  # change below which a round that changes no less than the one
 _TURN = 1e-4  # rad: by which the response to the direction of friction is measured
 _FREE = 1e-6  # response to that direction, relative to the friction's own, below which other contacts fix the direction
 
+_EMPTY = np.zeros((0, 0))
+
 Rate = Callable[[Array, ContactMode], Array]
 Solve = Callable[[Array, ContactMode], SolvedContacts]
+
+
+class LedValues(NamedTuple):
+    """Values at states of a mode in which a slip leads.
+
+    Attributes:
+        rates: of the states, (states, state).
+        normals: of the surface at the first contact that leads, (states, 3).
+        slides: its velocities, (states, 3).
+        slide_rates: rates of these, (states, 3).
+        guards: (states, guards); empty: not compiled.
+        record: of the law check, (values, states); empty: not compiled.
+    """
+
+    rates: Array
+    normals: Array
+    slides: Array
+    slide_rates: Array
+    guards: Array = _EMPTY
+    record: Array = _EMPTY
+
+
+# Values at states (states, state) with directions (states, 3) against which friction of all that leads acts.
+Led = Callable[[Array, Array], LedValues]
 
 
 @dataclass(frozen=True)
@@ -46,11 +73,13 @@ class BegunSlip(Stretch[ContactMode]):
         length: of the polynomials [s].
         nodes: coefficients of states.
         ways: coefficients of the direction against which friction acts.
+        compiled: values at states and directions; None: the mode is not compiled.
     """
 
     length: float = 0.0
     nodes: Any = None
     ways: Any = None
+    compiled: Led | None = None
 
     def _of(self, series: Any, times: Array) -> Array:
         return np.asarray(chebyshev.chebval(2 * (times - self.start) / self.length - 1, series).T)
@@ -61,8 +90,16 @@ class BegunSlip(Stretch[ContactMode]):
 
     def mode_at(self, time: float) -> ContactMode:
         """Mode with the direction against which friction acts at a time [s]."""
-        x, y, z = self._of(self.ways, np.array(time)).tolist()
-        return tuple(own._replace(heading=(x, y, z)) if own.leads else own for own in self.mode)
+        return with_heading(self.mode, self._of(self.ways, np.array(time)))
+
+    def directions_at(self, times: Array) -> Array:
+        """Directions against which friction acts at times [s], (times, 3)."""
+        return self._of(self.ways, times)
+
+    def recorded(self, states: Array) -> tuple[Array, Array]:
+        """Record of the law check at states (state, places) of a compiled mode, and the rate of time, which is 1."""
+        assert self.compiled is not None  # else nothing is recorded
+        return self.compiled(states.T, self.directions_at(states[-1])).record, np.ones(states.shape[1])
 
 
 class _Nodes:
@@ -105,8 +142,26 @@ def leaving_slips(mode: ContactMode, solved: SolvedContacts, held: Mapping[int, 
     return found
 
 
+def with_heading(mode: ContactMode, way: Array) -> ContactMode:
+    """The mode in which what leads slips in a direction, shape (3,)."""
+    heading = direction_of(way)
+    return tuple(own._replace(heading=heading) if own.leads else own for own in mode)
+
+
+def led_by(mode: ContactMode, rate: Rate, solve: Solve) -> Led:
+    """Values in a mode in which a slip leads, in numbers; ``rate``, ``solve``: of a state in a mode."""
+    k = next(number for number, own in enumerate(mode) if own.leads)
+
+    def value(state: Array, direction: Array) -> tuple[Array, Array, Array, Array]:
+        led = with_heading(mode, direction)
+        solved = solve(state, led)
+        return rate(state, led), solved.touching[k].normal, solved.touching[k].slide, solved.slide_rate[k]
+
+    return lambda *at: LedValues(*map(np.array, zip(*map(value, *at), strict=True)))
+
+
 def begun_slip(
-    time: float, state: Array, mode: ContactMode, until: float, rate: Rate, solve: Solve, count: int, name: str
+    time: float, state: Array, mode: ContactMode, until: float, led: Led, count: int, name: str
 ) -> BegunSlip:
     """First instants of the slip that leads in a mode, from a time [s] on, at most to ``until`` [s].
 
@@ -118,18 +173,17 @@ def begun_slip(
         state: at the start.
         mode: in which one or more contacts lead.
         until: at most.
-        rate: of a state in a mode.
-        solve: motion and forces of a state in a mode.
+        led: values in that mode at states and directions.
         count: of nodes.
         name: of the contact, for messages.
 
     Raises:
         Refused: other contacts fix its direction, or it does not grow.
     """
-    k = next(number for number, own in enumerate(mode) if own.leads)
+    heading = next(own.heading for own in mode if own.leads)
     length, nodes = min(_FIRST, until - time), _Nodes(count)
     for _ in range(_HALVINGS):
-        settled = _settled(state, mode, k, length, nodes, rate, solve)
+        settled = _settled(state, np.array(heading), length, nodes, led)
         if settled is not None:
             states, ways = settled
             return BegunSlip(
@@ -155,48 +209,38 @@ def held_or_stopped(name: str, time: float) -> Refused:
     )
 
 
-def _settled(
-    state: Array, mode: ContactMode, k: int, length: float, nodes: _Nodes, rate: Rate, solve: Solve
-) -> tuple[Array, Array] | None:
-    """States and directions at the nodes of a beginning of a ``length``.
+def _settled(state: Array, start: Array, length: float, nodes: _Nodes, led: Led) -> tuple[Array, Array] | None:
+    """States and directions at the nodes of a beginning of a ``length``; ``start``: the first direction.
 
     None: the iteration does not settle, or nothing slips.
     """
-    count = len(nodes.places)
-    start = np.array(mode[k].heading)
 
-    def led(angle: float, y: Array) -> tuple[Acting, Array, Array, SolvedContacts, Array]:
-        """Mode, direction and its normal in the surface, solution and rate at an angle from the first direction."""
-        for_normal = solve(y, mode).touching[k].normal
-        ahead = start - for_normal * (for_normal @ start)
-        ahead = ahead / np.linalg.norm(ahead)
-        aside = cross(for_normal, ahead)
-        c, s = np.cos(angle), np.sin(angle)
-        x, y_, z = (c * ahead + s * aside).tolist()
-        own = mode[k]._replace(heading=(x, y_, z))
-        now = tuple(each._replace(heading=(x, y_, z)) if each.leads else each for each in mode)
-        return own, np.array([x, y_, z]), c * aside - s * ahead, solve(y, now), rate(y, now)
+    def directed(angles: Array, normals: Array) -> tuple[Array, Array]:
+        """Directions at angles from the first one, and their normals in the surface."""
+        ahead = start - normals * (normals @ start)[:, None]
+        ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+        aside, c, s = cross_of_rows(normals, ahead), np.cos(angles)[:, None], np.sin(angles)[:, None]
+        return c * ahead + s * aside, c * aside - s * ahead
 
+    normal, count = led(state[None], start[None]).normals, len(nodes.places)
     # response of the slide across to the angle of friction
-    sides = [led(angle, state) for angle in (-_TURN, _TURN)]
-    across = sides[0][2] + sides[1][2]
-    across = across / np.linalg.norm(across)
-    rates = [side[3].slide_rate[k] for side in sides]
-    answer = float(across @ (rates[1] - rates[0])) / (2 * _TURN)
+    ways, across = directed(np.array([-_TURN, _TURN]), np.repeat(normal, 2, axis=0))
+    rates, middle = led(np.repeat(state[None], 2, axis=0), ways).slide_rates, across.sum(axis=0)
+    answer = float(middle / np.linalg.norm(middle) @ (rates[1] - rates[0])) / (2 * _TURN)
     if not abs(answer) > _FREE * float(np.abs(rates).max()) / _TURN:
         return None
     states, angles, before = np.repeat(state[None], count, axis=0), np.zeros(count), np.inf
+    normals = np.repeat(normal, count, axis=0)
     for number in range(_ROUNDS):
-        points = [led(angle, y) for angle, y in zip(angles, states, strict=True)]
-        speeds = np.array([slip_velocity(point[3].touching[k]) @ point[1] for point in points])
-        turning = nodes.derivative @ np.array([point[2] for point in points]) / length
-        left = [
-            point[3].slide_rate[k] @ point[2] + speed * (point[1] @ turn)
-            for point, speed, turn in zip(points, speeds, turning, strict=True)
-        ]
-        turns = -np.array(left) / answer
+        ways, across = directed(angles, normals)
+        found = led(states, ways)
+        normals = found.normals
+        speeds = np.sum(found.slides * ways, axis=1)
+        turning = nodes.derivative @ across / length
+        left = np.sum(found.slide_rates * across, axis=1) + speeds * np.sum(ways * turning, axis=1)
+        turns = -left / answer
         turns[0] = 0.0
-        new = state + length * nodes.integral @ np.array([point[4] for point in points])
+        new = state + length * nodes.integral @ found.rates
         change = max(float(np.abs(turns).max()), float(np.abs(new - states).max()))
         states, angles = new, angles + turns
         # the first round moves states alone, and the second one is the first to turn the slip
@@ -205,6 +249,6 @@ def _settled(
         if change <= _SETTLED or (change <= _STALLED and change >= before / 2):
             tail = np.abs((nodes.to_series @ states)[-2:]).max()
             resolved = tail <= _RESOLVED * max(1.0, float(np.abs(states).max()))
-            return (states, np.array([point[1] for point in points])) if resolved else None
+            return (states, ways) if resolved else None
         before = change
     return None

@@ -101,7 +101,7 @@ class TreeSymbols:
             if start is not None and mode[k].kind == "slip" and bound:  # dry friction, which is as large as it can be
                 for n, value in _along(slides[k][0], scaled(-bound, start)).items():
                     load[n] = add(load[n], value)
-        free, lines = self._lines(began, mass, load, touching, slides, functions)
+        free, lines = self._lines(mode, began, mass, load, touching, slides, functions)
         rows: list[Row] = []
         aims: list[Scalar] = []
         pushes: list[Row] = []
@@ -194,6 +194,7 @@ class TreeSymbols:
 
     def _lines(
         self,
+        mode: ContactMode,
         began: Sequence[Vector | None],
         mass: list[Row],
         load: list[Scalar],
@@ -203,10 +204,11 @@ class TreeSymbols:
     ) -> tuple[list[Scalar], list[Vector | None]]:
         """Accelerations without contact forces, and present directions of lines: where a force across would move.
 
-        Those of joints never turn.
+        Those of joints never turn, and those of contacts that lead are given.
         """
         lines, bodies = list(began), len(self._mechanism.contacts)
-        turning = {k: start for k, start in enumerate(began[:bodies]) if start is not None}
+        starts = enumerate(zip(began[:bodies], mode, strict=False))
+        turning = {k: start for k, (start, own) in starts if start is not None and not own.leads}
         pushes = [self._free(_along(slides[k][0], touching[k].across(start))) for k, start in turning.items()]
         (free, *answers), _ = eliminated(mass, [load, *pushes])
         for k, answer in zip(turning, answers, strict=True):

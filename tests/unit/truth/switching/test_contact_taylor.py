@@ -23,6 +23,7 @@ from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.switching import contact_taylor
 from proofroll.truth.switching.contact_guards import guards_of
 from proofroll.truth.switching.contact_stretches import ContactStretches
+from proofroll.truth.switching.planar_slip import leading, led_by, with_heading
 from proofroll.truth.tree.contact_tree import ContactTree
 
 SCENES = ("sled", "eccentric_sphere", "falling_rod", "rattleback", "tilted_disc", "free_turntable", "ladder",
@@ -58,6 +59,30 @@ def test_compiled_equations_are_those_of_the_route(scene: str) -> None:
         values, _, rates = compiled.values(state[None], begun.mode)
         assert values[0] == pytest.approx(route._guards(state, begun.mode, guards), abs=1e-12)
         assert rates[0] == pytest.approx(law.rates(state), abs=1e-12)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_compiled_values_of_a_slip_that_leads_are_those_of_the_route(number: int) -> None:
+    """Rates, the contact's motion and guards are those that a route solves for, whatever friction acts against."""
+    pytest.importorskip("heyoka")
+    route = routes("eccentric_sphere")[number]
+    begun = route.begin()
+    assert begun.mode is not None
+    touch = route._solved(begun.state, begun.mode).touching[0]
+    mode = leading(begun.mode[0], touch.normal, np.cross(touch.normal, [0.3, -0.5, 0.8])), *begun.mode[1:]
+    compiled = route.by_symbols(begun.state, mode)
+    assert compiled is not None
+    start = np.array(mode[0].heading)
+    directions = np.array([start, 0.6 * start + 0.8 * np.cross(touch.normal, start)])
+    law = route._law(begun.state, mode)
+    states = np.array([begun.state, law.corrected(begun.state + 0.01 * law.rates(begun.state))])
+    values = compiled.led(mode, 0.0)(states, directions)
+    solved = led_by(mode, route._equations.rate, route._solved)(states, directions)
+    for name in ("rates", "normals", "slides", "slide_rates"):
+        assert getattr(values, name) == pytest.approx(getattr(solved, name), abs=1e-12), name
+    guards = guards_of(route.contacts, mode)
+    for row, state, direction in zip(values.guards, states, directions, strict=True):
+        assert row == pytest.approx(route._guards(state, with_heading(mode, direction), guards), abs=1e-12)
 
 
 def test_a_falling_rod_slips_when_it_does_without_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
