@@ -24,7 +24,7 @@ APART = 3.0  # factor between bars, whose round-off depends on the axes
 LEAST = 1e-12  # bars of SI units below which they are round-off alone
 SCENES = {
     "sled": 0.65, "eccentric_sphere": 0.6, "rolling_coin": 0.2, "rattleback": 0.1, "free_turntable": 0.3,
-    "spinning_bounce": 0.5, "two_spheres": 0.3, "ladder": 0.3, "falling_rod": 0.6, "slide_to_roll": 0.4,
+    "spinning_bounce": 0.5, "two_spheres": 0.3, "ladder": 0.3, "falling_rod": 0.6,
     "sled_on_slope": 0.3, "tilted_disc": 0.2, "rocking_block": 0.3,
 }  # fmt: skip
 

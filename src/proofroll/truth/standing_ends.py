@@ -14,7 +14,7 @@ import numpy as np
 from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism import Mechanism, Tree
 from proofroll.elements.mechanism.contact.acting import ContactMode, closed_in, slip_velocity
-from proofroll.elements.mechanism.contact.start import STILL, natural_scale, touches
+from proofroll.elements.mechanism.contact.start import TOUCHING, natural_scale, touches
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, cross, to_rpy
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair, shared_pairs
@@ -104,7 +104,7 @@ def standing_ends(mechanism: Mechanism) -> StandingEnds | None:
     touching, index, least_speed = (
         touches(mechanism, motion),
         mechanism.body_index,
-        STILL * natural_scale(mechanism).rate,
+        TOUCHING * natural_scale(mechanism).rate,
     )
     added, pairs, cornered = list[Geometry](), list[Pair](), set[str]()
     for pair, kind in zip(mechanism.pairs, kinds, strict=True):
@@ -202,7 +202,7 @@ def check_spin(
     for face in faces:
         contact = face.contacts[0]
         slips = np.array([slip_velocity(touching[k]) for k in face.contacts])
-        if closed[contact] and friction[contact] and np.ptp(slips, axis=0).max() > STILL:
+        if closed[contact] and friction[contact] and np.ptp(slips, axis=0).max() > TOUCHING:
             raise NotUnique(
                 f"a cylinder of {face.pair} spins on its end at t = {time:.6g} s: the moment of its friction depends "
                 "on where along the end the load acts, which is not determinate; end before"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from turned_scenes import turned_mechanism
 
 import proofroll
 from proofroll.core.errors import InputError, Refused
@@ -16,6 +17,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.truth.switched_truth import truth_of
 
 RADIUS, MASS, MOMENT, G = 0.05, 0.7, 0.0009, 9.81
 
@@ -86,6 +88,46 @@ def test_both_routes_agree_on_a_ball_of_unequal_moments() -> None:
     found = truth(scene, np.linspace(0.0, 0.8, 5))
     assert bar(found, "p_WB") <= 1e-12
     assert np.isfinite(at(found, "p_WB")).all()
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (-1.9, 0.8, 0.6)])
+def test_an_impact_with_friction_against_turning_happens_once(rpy: tuple[float, float, float]) -> None:
+    """A spinning ball that lands has one impact, whatever the axes are."""
+    pair = law(0.3, restitution=0.5, rolling_resistance=1e-3, spinning_friction=2e-3)
+    (element,) = ball(pair, (0.8, 0.3, 0, 4.0, -20.0, 9.0), 0.1).elements
+    assert isinstance(element, MechanismElement)
+    found = truth_of(turned_mechanism(element.mechanism, rpy, (0.0, 0.0, 0.0)), np.array([0.0, 0.15]))
+    assert [event.kind for event in found.events] == ["impact"]
+
+
+def test_friction_against_spin_turns_with_the_normal_of_a_bore() -> None:
+    """A ball that spins as it slides round a bore keeps the law of the moment against its spin in both routes."""
+    bore, out = 0.2, 0.2 - RADIUS
+    shapes = (Geometry("s", "ball", "sphere", radius=RADIUS), Geometry("wall", "world", "bore", radius=bore))
+    pair = replace(law(0.1, spinning_friction=2e-3), geometries=("s", "wall"))
+    joint = Joint("j", "free", "world", "ball", q0=(out, 0, 0, 1, 0, 0, 0), v0=(0.0, 2.0, 0.0, 30.0, 0.0, 2.0 / out))
+    parts = Mechanism((Body("ball", MASS, inertia=(MOMENT,) * 3),), (joint,), geometries=shapes, pairs=(pair,))
+    found = truth_of(parts, np.array([0.0, 0.05]))
+    assert not found.ended
+    assert found.laws
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (0.7, -1.1, 2.3)])
+def test_a_planar_joint_bears_what_friction_against_spin_would(rpy: tuple[float, float, float]) -> None:
+    """A ball on a planar joint, which cannot spin about the floor's normal, rolls as one without that friction."""
+    shapes = (Geometry("s", "ball", "sphere", radius=RADIUS), Geometry("floor", "world", "plane"))
+    axes = {"axis": (0.0, 1.0, 0.0), "second_axis": (1.0, 0.0, 0.0)}
+    joint = Joint("j", "planar", "world", "ball", q0=(0.0, -RADIUS, 0.0), v0=(0.5, 0.0, 0.0), **axes)
+    body, times = Body("ball", MASS, inertia=(MOMENT,) * 3), np.array([0.0, 0.1])
+    moves = []
+    for spinning in (0.0, 2e-3):
+        pair = law(0.1, rolling_resistance=1e-3, spinning_friction=spinning)
+        planar = Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,))
+        moves.append(truth_of(turned_mechanism(planar, rpy, (0.0, 0.0, 0.0)), times).record.v_WB[-1])
+    assert np.abs(moves[0] - moves[1]).max() <= 1e-13  # 1e-14 is seen
+    assert np.linalg.norm(moves[0]) == pytest.approx(0.5 - 0.1 * G * 0.1, abs=1e-12)
 
 
 def test_a_bounce_has_a_bar_for_its_last_instants() -> None:

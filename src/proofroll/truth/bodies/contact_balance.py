@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.acting import REST, ContactMode
 from proofroll.elements.mechanism.contact.distributions import best_distribution, cones_of
 from proofroll.truth.bodies.contact_equations import BodiesState, ContactEquations
-from proofroll.truth.switching.contact_guards import AT_REST
 
 SLACK = 1e-9  # violation of an inequality, relative to the forces involved, up to which it counts as kept
 
@@ -16,11 +15,11 @@ def all_held(equations: ContactEquations, bodies: BodiesState, mode: ContactMode
     ``free``: largest rate of a slide without forces of contacts.
     """
     solution = equations.accelerated(bodies, mode)
-    if not solution.loose and np.abs(bodies.u).max() > AT_REST:
+    if not solution.loose and np.abs(bodies.u).max() > REST:
         return False  # forces are determinate, and a trial among others
     for acting, slide, parting in zip(mode, solution.slide, solution.parting, strict=True):
         left = float(np.abs(slide).max()) if acting.kind == "stick" else abs(parting) if acting.kind == "slip" else 0.0
-        if left > SLACK * max(free, AT_REST):
+        if left > SLACK * max(free, REST):
             return False
     cones = cones_of(
         kinds=[acting.kind for acting in mode],

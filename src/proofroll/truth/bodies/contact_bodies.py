@@ -7,6 +7,7 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contact.acting import (
     OPEN,
+    REST,
     Acting,
     ContactMode,
     Features,
@@ -18,7 +19,7 @@ from proofroll.elements.mechanism.contact.acting import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.free_slides import FreeSlides
+from proofroll.elements.mechanism.contact.free_slides import FreeSlides, acting_ones
 from proofroll.elements.mechanism.contact.joint_laws import off_stops
 from proofroll.elements.mechanism.contact.sequences import groups_of
 from proofroll.elements.mechanism.contact.start import closed_and_still, start_digits
@@ -33,7 +34,7 @@ from proofroll.truth.bodies.contact_body_symbols import BodySymbols
 from proofroll.truth.bodies.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.bodies.contact_trials import consistent, follow, next_trial, provisional
 from proofroll.truth.numerics.hybrid import Transition
-from proofroll.truth.switching.contact_guards import SLIP_ENDED, SolvedContacts, pressing, sharing
+from proofroll.truth.switching.contact_guards import SolvedContacts, pressing, sharing
 from proofroll.truth.switching.contact_stretches import ContactStretches
 from proofroll.truth.switching.contact_taylor import ModeSymbols
 from proofroll.truth.switching.held_route import BodyStates
@@ -85,11 +86,12 @@ class ContactBodies(ContactStretches):
 
     def _by_trial(self, state: Array, rough: ContactMode, leaving: Sequence[int]) -> tuple[ContactMode, float]:
         """See :meth:`_decided`; the features of the mode are still to be set."""
-        closed = closed_in(rough)
-        if not any(closed):
+        if not any(closed_in(rough)):
             return rough, np.inf
-        bodies, ways = self.equations.at(state, features_of(rough)), off_stops(self.contacts, closed)
-        still = [own.kind == "stick" and k not in ways for k, own in enumerate(rough)]
+        bodies = self.equations.at(state, features_of(rough))
+        closed = acting_ones(self.contacts, rough, slides_of(bodies))
+        ways = off_stops(self.contacts, closed)
+        still = [own.kind == "stick" and closed[k] and k not in ways for k, own in enumerate(rough)]
         ways = {k: np.array(own.heading) for k, own in enumerate(rough) if own.heading} | ways
 
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
@@ -172,7 +174,7 @@ class ContactBodies(ContactStretches):
         state[e.nx : e.nx + e.nu] += ways @ impulses
         parting, stays = (slides + G @ impulses)[::3], [False] * len(self.contacts)
         for k, away in zip(which, parting, strict=True):
-            stays[k] = bool(away <= SLIP_ENDED)
+            stays[k] = bool(away <= REST)
         return state, stays, np.inf
 
     def _tried(

@@ -157,20 +157,22 @@ class ContactEquations:
             touching += (contact.touching(float(q), float(v)),)
             J[k][:, list(row.coefficients)] = np.outer(contact.direction, list(row.coefficients.values()))
             rates[k] = contact.direction * float(row.bias)
+        speeds = (float(np.linalg.norm(np.array(view.w, dtype=float))) for view in constrained.views)
+        fastest = max(speeds) if self._turning else 0.0
         for friction in self._turning:
             k, there = len(touching), touching[friction.pressed_by]
-            turns, relative = np.zeros((3, e.nu)), np.zeros(3)
+            rows, relative = np.zeros((3, e.nu)), np.zeros(3)
             for body, sign in zip(self.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
                 if body < 0:
                     continue
                 view = constrained.views[body]
                 relative += sign * np.array(view.w, dtype=float)
-                for row, axis in zip(turns, _AXES, strict=True):
+                for row, axis in zip(rows, _AXES, strict=True):
                     entries = e.bodies[body].projected(view, [0.0, 0.0, 0.0], axis.tolist())
                     row[e.u_slices[body]] += sign * np.array(entries, dtype=float)
             touching += (friction.touching(there, relative),)
-            J[k] = friction.part(there.normal) @ turns
-            rates[k] = friction.part_rate(there) @ relative
+            J[k] = friction.resisted(there.normal, rows)
+            rates[k] = friction.resisted_rate(there, relative, np.zeros(3), fastest)
         mass = np.asarray(np.linalg.inv(half @ half.T), dtype=np.float64)
         C, bias = independent(C, bias, self.equations.rank)
         centres = np.array([view.r for view in constrained.views], dtype=float)
@@ -192,7 +194,9 @@ class ContactEquations:
     def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
         """Accelerations and forces while each contact keeps its mode."""
         if any(own.along for own in mode):
-            mode = tuple(map(turned, mode, state.touching, map(line_response, self.contacts, self.responses(state))))
+            pairs = zip(self.contacts, self.responses(state), strict=True)
+            lines = [line_response(contact, G, state.touching) for contact, G in pairs]
+            mode = tuple(map(turned, mode, state.touching, lines))
         wanted = [
             -held @ bias - (each.normal_rate @ each.slide if own.kind == "slip" else 0.0)
             for held, own, each, bias in zip(self._held(state, mode), mode, state.touching, state.bias, strict=True)

@@ -17,7 +17,7 @@ def provisional(equations: ContactEquations, bodies: BodiesState, closed: Sequen
     modes, responses = list[Acting](), equations.responses(bodies)
     for contact, each, G, shut in zip(equations.contacts, bodies.touching, responses, closed, strict=True):
         frame = frame_of_axis(each.normal)[:, [2, 0, 1]]
-        response = frame.T @ line_response(contact, G) @ frame
+        response = frame.T @ line_response(contact, G, bodies.touching) @ frame
         modes.append(first_mode("stick", frame, np.zeros(2), response) if shut else OPEN)
     return modes
 

@@ -173,7 +173,7 @@ class NumericEquations:
 
     def poses(self, state: Array) -> tuple[Array, Array, Array, Array]:
         """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
-        views = self.equations.at(self.normalised(state).tolist()).views[:-1]
+        views = self.equations.views(self.normalised(state).tolist())[:-1]
         R, r, v, w = (np.array([getattr(view, name) for view in views], float) for name in "Rrvw")
         arm = np.einsum("nij,nj->ni", R, np.array([body.com for body in self.equations.mechanism.bodies]))
         return r - arm, v - np.cross(w, arm), Rotation.from_matrix(R).as_quat(scalar_first=True), w
@@ -361,7 +361,7 @@ class MaximalCoordinates:
         self, time: float, state: Array, switched: Switched | None = None, applied: Array | None = None
     ) -> dict[str, Any]:
         lean = self.lean.equations
-        views = lean.at(state.tolist()).views
+        views = lean.views(state.tolist())
         whole = self._complete(views, state[lean.nx + lean.nu :])
         equations = self._whole if switched is None else self._whole.switched(whole, switched)
         solved = equations.solve(whole, time, applied)

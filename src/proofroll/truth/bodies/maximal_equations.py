@@ -177,7 +177,7 @@ class MaximalEquations:
         """
         switched = switched or Switched()
         x, u, angles = state[: self.nx], state[self.nx : self.nx + self.nu], state[self.nx + self.nu :]
-        views = self._views(state, functions)
+        views = self.views(state, functions)
         force: list[Scalar] = []
         rate: list[Scalar] = []
         for body, at_x, at_u, view in zip(self.bodies, self.x_slices, self.u_slices, views, strict=False):
@@ -248,7 +248,7 @@ class MaximalEquations:
         self, state: Sequence[Scalar], joints: Sequence[int], functions: Mapping[str, Any] = FUNCTIONS
     ) -> list[ConstraintRow]:
         """Rates of revolute and prismatic joints as rows; the residual of a prismatic one is the coordinate."""
-        made = self._rows(self._views(state, functions))
+        made = self._rows(self.views(state, functions))
         return [made.of_rate(number, self.mechanism.joints[number].kind) for number in joints]
 
     def _rows(self, views: Sequence[BodyInScalars]) -> ConstraintRows:
@@ -270,8 +270,8 @@ class MaximalEquations:
         row = made.of_rate(self.mechanism.joint_index[joint.name], joint.kind)
         return replace(row, residual=0.0, bias=sub(row.bias, moved(joint.motion, time, functions).acceleration))
 
-    def _views(self, state: Sequence[Scalar], functions: Mapping[str, Any]) -> list[BodyInScalars]:
-        """Poses and velocities of all bodies, the ground last."""
+    def views(self, state: Sequence[Scalar], functions: Mapping[str, Any] = FUNCTIONS) -> list[BodyInScalars]:
+        """Poses and velocities of all bodies at a state laid out as by :meth:`start`, the ground last."""
         x, u = state[: self.nx], state[self.nx : self.nx + self.nu]
         views = [
             body.view(x[at_x], u[at_u], functions)

@@ -196,8 +196,9 @@ def _turning(
         pressed = size * np.maximum(touch.normal_force, 0)
         loads.between(a, b, pieces.place[..., k, :], 0 * moment, moment)
         loads.works(dot(moment, relative), norm(moment) * scene.rate)
-        if modes[k] == "stick":
-            residuals.note("turning", contact.name, np.maximum(norm(moment) - pressed, 0), bound, time)
+        if modes[k] != "slip":  # open: joints exclude the turn
+            most = pressed if modes[k] == "stick" else 0 * pressed
+            residuals.note("turning", contact.name, np.maximum(norm(moment) - most, 0), bound, time)
             residuals.note("stick", contact.name, rate, quick, time)
             continue
         noise = ROUND * residuals.coarse * quick

@@ -9,6 +9,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.contact.acting import (
     FAINT,
+    REST,
     Acting,
     ContactMode,
     Features,
@@ -25,10 +26,9 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.truth.followed_paths import time_accuracy
 
-# In natural units (natural_units.py): speeds that count as rest, and accelerations too small to start a motion. Both
-# routes stop there, so that they do not integrate the round-off of a state at rest.
-AT_REST, STANDS = 1e-13, 1e-9
-SLIP_ENDED = 1e-11  # slip speed that remains when a slip below FAINT is extrapolated to rest
+# Acceleration, in natural units (natural_units.py), too small to start a motion: both routes stop there, so that they
+# do not integrate the round-off of a state at rest.
+STANDS = 1e-9
 _UNLOADED = 1e-11  # normal force, in natural units, that is round-off where a contact leaves
 # Value of Painlevé's measure (1 without friction) that counts as zero.
 LEAST_RESPONSE = 1e-3
@@ -38,8 +38,6 @@ _MOVES = 1e-6
 _NO_LOAD = 1e-9  # normal force, relative to the largest, that counts as none where contacts share a load
 _FEW = 6  # contacts that share a load, up to which all groups of them are tried
 TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
-# Speed, in natural units, by which slips may differ that share a load: round-off leaves 4e-15 of parallel ones.
-SHARED = 1e-11
 _TOGETHER = 1e-13  # relative to the mechanism's size: gaps of contacts of a face that bounces, by round-off
 # Borders between features of solids that are passed at one instant at most, and length, relative to the mechanism's
 # size, by which features are left and still the nearest: round-off.
@@ -299,7 +297,7 @@ def _undecided(contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
     load = float(np.abs(solved.force[sharing(solved.splits)]).max(initial=0.0))
     rubbing = zip(solved.mode, contacts, solved.touching, strict=True)
     speeds = (slip_velocity(each) for own, contact, each in rubbing if own.kind == "slip" and contact.friction)
-    return load * solved.spread * max(float(np.linalg.norm(speed)) for speed in speeds) - SHARED
+    return load * solved.spread * max(float(np.linalg.norm(speed)) for speed in speeds) - REST
 
 
 def leaves(contact: Touchable, k: int, solved: SolvedContacts) -> bool:
@@ -383,7 +381,9 @@ def _stopping(own: Acting, touch: Touching) -> float:
     return -float(heading_of(own, touch) @ touch.slide)
 
 
-def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: float, size: float) -> list[int]:
+def striking(
+    contacts: Sequence[Touchable], mode: ContactMode, touching: Sequence[Touching], hit: int, time: float, size: float
+) -> list[int]:
     """Contacts that close at the same time [s] as the contact ``hit``, and ``hit``.
 
     Within the accuracy of times, or with gaps that are round-off in a mechanism of this size.
@@ -395,8 +395,8 @@ def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: fl
 
     return [
         k
-        for k, (own, touch) in enumerate(zip(mode, touching, strict=True))
-        if k == hit or (own.kind == "open" and closes(touch))
+        for k, (contact, own, touch) in enumerate(zip(contacts, mode, touching, strict=True))
+        if k == hit or (contact.presses and own.kind == "open" and closes(touch))
     ]
 
 
@@ -405,7 +405,7 @@ def lies_against(own: Acting, touch: Touching, size: float) -> bool:
     if touch.absent:
         return False
     parting = float(touch.normal @ touch.slide)
-    return own.kind != "open" or (abs(touch.gap) <= size * _TOGETHER and abs(parting) <= AT_REST)
+    return own.kind != "open" or (abs(touch.gap) <= size * _TOGETHER and abs(parting) <= REST)
 
 
 def noise_of(guards: Sequence[ContactGuard], size: float) -> FloatArray:

@@ -17,6 +17,7 @@ from proofroll.core.events import EventKind
 from proofroll.elements.mechanism.contact.acting import (
     FAINT,
     OPEN,
+    REST,
     ContactMode,
     Features,
     changes,
@@ -38,7 +39,6 @@ from proofroll.truth.numerics.hybrid import Stretch, Transition
 from proofroll.truth.standing_ends import Face, check_faces, check_spin
 from proofroll.truth.switching.box_passing import beside_border, passed_boxes
 from proofroll.truth.switching.contact_guards import (
-    SLIP_ENDED,
     features_beyond,
     guards_of,
     leaves,
@@ -107,7 +107,7 @@ class ContactStretches(ContactWalks):
         touching, found = self._touching(ahead, features_of(rough)), list(rough)
         for k in rests:
             slip = slip_velocity(touching[k])
-            if (speed := float(np.linalg.norm(slip))) > SLIP_ENDED:
+            if (speed := float(np.linalg.norm(slip))) > REST:
                 found[k] = rough[k]._replace(kind="slip", heading=direction_of(slip / speed))
         return tuple(found)
 
@@ -266,7 +266,7 @@ class ContactStretches(ContactWalks):
         """Transition at an impact."""
         contacts, law, features = self.contacts, self.contacts[hit].restitution, features_of(stretch.mode)
         touching = self._touching(stretch.last, features)
-        hits = striking(stretch.mode, touching, hit, stretch.end, self._size)
+        hits = striking(contacts, stretch.mode, touching, hit, stretch.end, self._size)
         self._check_spin([k in hits for k in range(len(contacts))], touching, stretch.end)
         # dry friction of joints and of turning gives no impulse
         closed = [
@@ -310,7 +310,7 @@ class ContactStretches(ContactWalks):
         ]
         happened = tuple((EventKind.SETTLE, self.contacts[k].name) for k in sorted(shuts))
         after = self._after(
-            stretch, state, closed, happened, delay=series.remaining, stopped=max(speed, SLIP_ENDED), features=features
+            stretch, state, closed, happened, delay=series.remaining, stopped=max(speed, REST), features=features
         )
         return replace(after, blur=speed * series.remaining)
 
@@ -339,7 +339,7 @@ class ContactStretches(ContactWalks):
         happened: tuple[tuple[str, str], ...],
         margin: float = np.inf,
         delay: float = 0.0,
-        stopped: float = SLIP_ENDED,
+        stopped: float = REST,
         leaving: Sequence[int] = (),
         features: Features | None = None,
     ) -> Transition[ContactMode]:

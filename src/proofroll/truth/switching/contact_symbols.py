@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.contact.acting import FAINT, Acting, ContactMode
+from proofroll.elements.mechanism.contact.acting import FAINT, REST, Acting, ContactMode
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.touching import FLAT
 from proofroll.elements.mechanism.scene.kinks import Sides
@@ -17,7 +17,6 @@ from proofroll.truth.numerics.scalars import Scalar, add, dot, is_zero, minus, m
 from proofroll.truth.switching.contact_guards import (
     LEAST_RESPONSE,
     NOT_SHARED,
-    SHARED,
     TURNED,
     ContactGuard,
     Touchable,
@@ -169,7 +168,7 @@ def guard_symbols(
             "close": sub(0.0, touch.gap),
             "flat": sub(FLAT, touch.tilt),
             "tear": sub(LEAST_RESPONSE, solved.response),
-            "share": -SHARED,
+            "share": -REST,
             "grip": NOT_SHARED,
         }
         return plain[guard.kind]

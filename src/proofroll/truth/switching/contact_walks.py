@@ -18,6 +18,7 @@ from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.acting import (
     FAINT,
+    ROUND_OFF,
     ContactMode,
     Features,
     features_of,
@@ -32,7 +33,6 @@ from proofroll.elements.mechanism.scene.signal import varies
 from proofroll.truth.followed_paths import CLOSE, TOLERANCES
 from proofroll.truth.numerics.hybrid import Stretch, StretchLaw, integrate_to_guard, states_at
 from proofroll.truth.switching.contact_guards import (
-    AT_REST,
     STANDS,
     ContactGuard,
     SolvedContacts,
@@ -47,7 +47,7 @@ from proofroll.truth.switching.contact_taylor import CompiledMode, CompiledModes
 from proofroll.truth.switching.held_route import BodyStates
 from proofroll.truth.switching.kink_sides import noise_at_start, refuse_jolts, sides_ahead
 from proofroll.truth.switching.planar_slip import SHORTEST, BegunSlip, begun_slip, held_or_stopped, led_by
-from proofroll.truth.switching.stopping_slip import NOTHING, StoppingSlip, stopping_slip
+from proofroll.truth.switching.stopping_slip import StoppingSlip, stopping_slip
 
 _T = TypeVar("_T")
 _KEPT = 4  # solutions that are kept
@@ -335,7 +335,7 @@ class ContactWalks(ABC):
         guard = guards_of(self.contacts, mode).index(ContactGuard(k, "still"))
         slip = stopping_slip(time, state, mode, guard, decay)
         slows = self._solved(slip.line, self._as_it_goes(slip.line, mode)).slide_rate[k]
-        return replace(slip, blur=(NOTHING + TOLERANCES[1]) / float(np.linalg.norm(slows)))
+        return replace(slip, blur=(ROUND_OFF + TOLERANCES[1]) / float(np.linalg.norm(slows)))
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""
@@ -351,4 +351,4 @@ class ContactWalks(ABC):
         if self._timed or any(own.kind == "slip" for own in mode):
             return False
         solved = self._solved(state, mode)
-        return float(np.abs(solved.velocity).max()) <= AT_REST and float(np.abs(solved.acceleration).max()) <= STANDS
+        return float(np.abs(solved.velocity).max()) <= ROUND_OFF and float(np.abs(solved.acceleration).max()) <= STANDS

@@ -9,14 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.acting import ROUND_OFF, ContactMode
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import Stretch
 from proofroll.truth.numerics.picard import PicardSteps, StatesInside
 
-# Decrease of the logarithm in a step, and slip speed from which on the slip is a straight line, in natural units: a
-# hundred times the round-off of velocities.
-_DECAY, NOTHING = 2.0, 1e-14
+_DECAY = 2.0  # decrease of the logarithm in a step; down to round-off, from where on the slip is a straight line
 
 # Slip speeds at states (state, places), and changes of the states until the slip would stop at its present rate.
 Decay = Callable[[Array], tuple[Array, Array]]
@@ -66,7 +64,7 @@ class StoppingSlip(Stretch[ContactMode]):
 def stopping_slip(time: float, state: Array, mode: ContactMode, guard: int, decay: Decay) -> StoppingSlip:
     """Last instants of a slip from a time [s] and state on; ``guard``: that it stops."""
     first, steps, integrator, place = state, list[_Step](), PicardSteps(lambda states: decay(states)[1]), 0.0
-    last = float(np.log(np.maximum(decay(state[:, None])[0], NOTHING) / NOTHING)[0])
+    last = float(np.log(np.maximum(decay(state[:, None])[0], ROUND_OFF) / ROUND_OFF)[0])
     while place < last:
         end, state, inside = integrator.step(place, state, min(last, place + _DECAY))
         steps.append(_Step(place, end, float(state[-1]), inside))

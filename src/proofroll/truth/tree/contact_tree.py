@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.mechanism.contact.acting import ContactMode, Features, closed_in, features_of
+from proofroll.elements.mechanism.contact.acting import REST, ContactMode, Features, closed_in, features_of
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.free_slides import FreeSlides
 from proofroll.elements.mechanism.contact.states import ContactSolution
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import StretchLaw, Transition
-from proofroll.truth.switching.contact_guards import SLIP_ENDED, SolvedContacts
+from proofroll.truth.switching.contact_guards import SolvedContacts
 from proofroll.truth.switching.contact_stretches import ContactStretches
 from proofroll.truth.switching.contact_taylor import ModeSymbols
 from proofroll.truth.switching.held_route import BodyStates
@@ -65,7 +65,7 @@ class ContactTree(ContactStretches):
         velocity, impulse, margin = self.dynamics.struck(q, v, which, normal, time, tangential, features)
         stays, touching = list(closed), self.dynamics.at(q, velocity, time, features).touching
         for pressed, k in zip(impulse[:, 0] > 0, which, strict=True):
-            leaves = float(touching[k].normal @ touching[k].slide) > SLIP_ENDED
+            leaves = float(touching[k].normal @ touching[k].slide) > REST
             stays[k] = not laws[k] if pressed else not leaves
         return np.concatenate([q, velocity, [time]]), stays, margin
 

@@ -206,9 +206,12 @@ class TreeSymbols:
 
         Those of joints never turn, and those of contacts that lead are given.
         """
-        lines, bodies = list(began), len(self._mechanism.contacts)
-        starts = enumerate(zip(began[:bodies], mode, strict=False))
-        turning = {k: start for k, (start, own) in starts if start is not None and not own.leads}
+        lines, starts = list(began), enumerate(zip(self._dynamics.contacts, began, mode, strict=True))
+        turning = {
+            k: start
+            for k, (contact, start, acting) in starts
+            if start is not None and not acting.leads and not isinstance(contact, JointContact)
+        }
         pushes = [self._free(_along(slides[k][0], touching[k].across(start))) for k, start in turning.items()]
         (free, *answers), _ = eliminated(mass, [load, *pushes])
         for k, answer in zip(turning, answers, strict=True):

@@ -11,9 +11,12 @@ from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 
 Direction = tuple[float, float, float]
-# Slip speed in the plane below which the direction of slip is not well known; the rest of the slip is followed as a
-# straight line [m/s; in the truth in natural units].
-FAINT = 1e-8
+# The one rule for slips, spins, rolling and parting, of speeds in natural units (in m/s or rad/s outside the truth):
+# ROUND_OFF of a velocity, a hundred times that of a number near 1; a speed up to REST counts as none, for an event that
+# ends it leaves the error of its time times a rate; below FAINT round-off turns the direction of a slip by more than
+# 1e-6, and the rest of the slip is followed by its logarithm.
+ROUND_OFF = 1e-14
+REST, FAINT = 1e3 * ROUND_OFF, 1e6 * ROUND_OFF
 _LINE = 1e-9  # response across over response along, below which a contact can slide along a line only
 EXACT = 1e-16  # violation of what holds, in natural units, that is only round-off
 _TURNED = 0.5  # least length of the first direction of a slip after projection on a surface that has turned since

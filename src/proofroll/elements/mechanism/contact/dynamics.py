@@ -15,7 +15,6 @@ from proofroll.elements.mechanism.contact.acting import (
     Acting,
     ContactMode,
     Features,
-    closed_in,
     features_of,
     first_mode,
     forbidding_rows,
@@ -32,7 +31,7 @@ from proofroll.elements.mechanism.contact.coulomb import (
     returning,
     robust_forces,
 )
-from proofroll.elements.mechanism.contact.free_slides import passing
+from proofroll.elements.mechanism.contact.free_slides import acting_ones, passing
 from proofroll.elements.mechanism.contact.joint_laws import (
     JointContact,
     joint_contacts,
@@ -43,7 +42,7 @@ from proofroll.elements.mechanism.contact.joint_laws import (
 )
 from proofroll.elements.mechanism.contact.sequences import groups_of, left_by, ordered, refuse_spread, sequences
 from proofroll.elements.mechanism.contact.slide_rows import slide_row, turning_row
-from proofroll.elements.mechanism.contact.start import STILL, at_start, touches
+from proofroll.elements.mechanism.contact.start import TOUCHING, at_start, touches
 from proofroll.elements.mechanism.contact.states import ContactsNow, ContactSolution
 from proofroll.elements.mechanism.contact.touching import Touching, lying
 from proofroll.elements.mechanism.contact.turning import (
@@ -111,12 +110,12 @@ class ContactDynamics:
             at = contact.joint.velocity
             touching += (contact.touching(float(q[contact.joint.coordinate]), float(v[at])),)
             parts.append((np.outer(contact.direction, np.eye(len(v))[at]), np.zeros(3)))
+        fastest = float(np.linalg.norm(found.motion.w_WB, axis=1).max()) if self._turning else 0.0
         for friction in self._turning:
             there = touching[friction.pressed_by]
             turning, J, rate = turning_row(found.motion, self._bodies[friction.pressed_by])
             touching += (friction.touching(there, turning),)
-            part = friction.part(there.normal)
-            parts.append((part @ J, part @ rate + friction.part_rate(there) @ turning))
+            parts.append((friction.resisted(there.normal, J), friction.resisted_rate(there, turning, rate, fastest)))
         J = np.array([row for row, _ in parts]).reshape(-1, 3, len(v))
         bias = np.array([rate for _, rate in parts]).reshape(-1, 3)
         return ContactsNow(solution=found, mass=mass, W=W, loose=loose, touching=touching, J=J, bias=bias)
@@ -132,7 +131,7 @@ class ContactDynamics:
     def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
         """Accelerations and forces at a state while each contact keeps the given mode; see :meth:`solve`."""
         mode = tuple(
-            turned(own, found, line_response(contact, J @ state.W @ J.T)) if own.along else own
+            turned(own, found, line_response(contact, J @ state.W @ J.T, state.touching)) if own.along else own
             for contact, own, found, J in zip(self.contacts, mode, state.touching, state.J, strict=True)
         )
         rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
@@ -273,7 +272,8 @@ class ContactDynamics:
         Raises:
             NotUnique: a disc lies flat, or capsules touch along a line.
         """
-        state, closed = self.at(q, v, time, features_of(rough)), closed_in(rough)
+        state = self.at(q, v, time, features_of(rough))
+        closed = acting_ones(self.contacts, rough, state.free_slides)
         which = [k for k, shut in enumerate(closed) if shut]
         self._refuse_flat(state, which, time)
         if not which:
@@ -312,8 +312,8 @@ class ContactDynamics:
             slides = sliding[place]
             if slides is None:  # friction acts against the slide, and one that carries nothing has none
                 slides = -force[place, 1:] if force[place, 1:].any() else moves[place, 1:]
-            response = frames[k].T @ line_response(self.contacts[k], frames[k] @ G[own, own] @ frames[k].T) @ frames[k]
-            mode[k] = first_mode(done[place], frames[k], slides, response)
+            by_force = line_response(self.contacts[k], frames[k] @ G[own, own] @ frames[k].T, state.touching)
+            mode[k] = first_mode(done[place], frames[k], slides, frames[k].T @ by_force @ frames[k])
         return with_features(tuple(mode), features_of(rough)), np.inf if same else 0.0
 
     def struck(
@@ -355,7 +355,7 @@ class ContactDynamics:
             G, c, self.friction[list(closed)], sliding, names, None, time, _NO_IMPULSE, self._static[list(closed)]
         )
         speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
-        hit = (speeds < -STILL * scale) | (impulse[:, 0] > STILL * impulse[:, 0].max())
+        hit = (speeds < -TOUCHING * scale) | (impulse[:, 0] > TOUCHING * impulse[:, 0].max())
         lossy = np.array([bool(self.contacts[k].friction or self.contacts[k].restitution) for k in closed])
         if not self.mechanism.together and ordered(G, lossy, hit):
             groups = groups_of([self.contacts[k].pair for k in closed], J @ v, together=False)
@@ -373,7 +373,7 @@ class ContactDynamics:
             jumps = state.W @ J.T
             told = [names[k] for k in np.flatnonzero(hit)]
             once, *turns = (
-                left_by(J @ v + G @ given, STILL * scale) for given in (impulse.ravel(), *outcomes.impulses)
+                left_by(J @ v + G @ given, TOUCHING * scale) for given in (impulse.ravel(), *outcomes.impulses)
             )
             alike = all(turn == once for turn in turns)
             refuse_spread(jumps @ outcomes.impulses.T, outcomes, told, time, jumps @ impulse.ravel(), alike=alike)

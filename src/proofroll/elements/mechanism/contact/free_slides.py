@@ -1,7 +1,7 @@
 """Slides of contacts without forces of contacts, and contacts that loops or motions alone move."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,19 @@ def free_slides(
     strength = np.sqrt(acceleration @ np.linalg.solve(loose, acceleration)) + np.sqrt(held @ loose @ held)
     sizes = np.sqrt(most) * strength + np.linalg.norm(bias, axis=1)
     return FreeSlides(J @ acceleration + bias, _RESTS * sizes, response <= NO_RESPONSE * most)
+
+
+class _Contact(Protocol):
+    @property
+    def pressed_by(self) -> int | None: ...
+
+
+def acting_ones(contacts: Sequence[_Contact], rough: ContactMode, slides: FreeSlides) -> list[bool]:
+    """True for closed contacts but for friction against turning that rests as joints hold it, which bears nothing."""
+    return [
+        acting.kind == "slip" or (acting.kind == "stick" and not (contact.pressed_by is not None and moved))
+        for contact, acting, moved in zip(contacts, rough, slides.moved.tolist(), strict=True)
+    ]
 
 
 def passing(rough: ContactMode, slides: FreeSlides) -> ContactMode:

@@ -13,6 +13,7 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contact.acting import Acting, ContactMode, direction_of
 from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.dynamics.switches import STOPPED, Mode, SwitchedJoint
 from proofroll.elements.mechanism.scene.rotations import Array
 
@@ -91,12 +92,17 @@ def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
     return tuple(found)
 
 
-def line_response(contact: object, G: Array) -> Array:
+def line_response(contact: object, G: Array, touching: Sequence[Touching]) -> Array:
     """Response (3, 3) by whose singularity the line of a contact is found, from that of its slide by unit forces.
 
-    A joint has one coordinate, and so one line, also where loops or motions leave no response.
+    A joint has one coordinate, and a spin one axis, and so one line, also where loops or motions leave no response.
     """
-    return np.outer(contact.direction, contact.direction) if isinstance(contact, JointContact) else G
+    if isinstance(contact, JointContact):
+        return np.outer(contact.direction, contact.direction)
+    if isinstance(contact, TurningFriction) and contact.spins:
+        axis = touching[contact.pressed_by].normal
+        return np.outer(axis, axis)
+    return G
 
 
 def on_stops(closed: Sequence[object], q: Array) -> Array:

@@ -21,10 +21,9 @@ from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.rotations import skew
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 
-# Gap or overlap of shapes that counts as touching, relative to a natural length, or in rad: digits of a file.
+# Digits of a file: gap or overlap of shapes that counts as touching, relative to a natural length, or in rad, and speed
+# between shapes that touch at the start that counts as none, relative to a natural speed.
 TOUCHING = 1e-9
-# Speed that counts as none between touching shapes, relative to a natural speed: digits of a file.
-STILL = 1e-9
 # Speed of a followed place per unit of a joint's, relative to the length, up to which it stands: round-off is 1e-16.
 _STANDS = 1e-12
 
@@ -75,7 +74,7 @@ class Scale(NamedTuple):
     @property
     def speed(self) -> float:
         """Largest speed that counts as rest [m/s]."""
-        return STILL * self.length * self.rate
+        return TOUCHING * self.length * self.rate
 
 
 def natural_length(mechanism: Mechanism, solution: Solution) -> float:
@@ -172,7 +171,7 @@ def check_contacts(mechanism: Mechanism) -> None:
         (low, high), (q,), (v,) = joint.limits, joint.q0, joint.v0
         digits, least_speed = (
             joint.stop_digits,
-            scale.speed if joint.kind == JointKind.PRISMATIC else STILL * scale.rate,
+            scale.speed if joint.kind == JointKind.PRISMATIC else TOUCHING * scale.rate,
         )
         if (q <= low + digits and v < -least_speed) or (q >= high - digits and v > least_speed):
             advice = "the joint starts on its stop and moves into it, an impact at time 0; correct v0 or start it apart"

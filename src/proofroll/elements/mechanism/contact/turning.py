@@ -6,11 +6,11 @@ its force is a moment, and its bound is a coefficient [m] times the normal force
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from proofroll.elements.mechanism.contact.acting import OPEN, ContactMode
+from proofroll.elements.mechanism.contact.acting import OPEN, ROUND_OFF, ContactMode
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
@@ -48,23 +48,38 @@ class TurningFriction:
 
         The normal of a spin is one across it, so that the spin is a slide along a line.
         """
-        slide = self.part(touch.normal) @ turning
+        slide = self.resisted(touch.normal, turning)
         if not self.spins:
             return touch._replace(slide=slide, tilt=1.0, feature=0, borders=())
         across = frame_of_axis(touch.normal)[:, 0]
         touch = touch._replace(normal=across, normal_rate=np.zeros(3), tilt=1.0)
         return touch._replace(slide=slide, feature=0, borders=())
 
-    def part(self, normal: Array) -> Array:
-        """Matrix that leaves the resisted part of an angular velocity."""
+    def resisted(self, normal: Array, turning: Array) -> Array:
+        """Resisted part of angular velocities, (3,) or (3, velocities); 0 where it is round-off of the whole."""
         along = np.outer(normal, normal)
-        return along if self.spins else np.eye(3) - along
+        part = (along if self.spins else np.eye(3) - along) @ turning
+        return _without_round_off(part, np.linalg.norm(turning, axis=0))
 
-    def part_rate(self, touch: Touching) -> Array:
+    def resisted_rate(self, touch: Touching, turning: Array, rate: Array, fastest: float) -> Array:
+        """Rate of the resisted part of an angular velocity with its ``rate``; 0 where it is round-off.
+
+        ``fastest``: largest angular velocity of a body [rad/s], of whose products rates are the sums.
+        """
+        by_normal = self._part_rate(touch) @ turning
+        size = np.linalg.norm(rate) + fastest * (fastest + np.linalg.norm(touch.normal_rate))
+        return _without_round_off(self.resisted(touch.normal, rate) + by_normal, size)
+
+    def _part_rate(self, touch: Touching) -> Array:
         """Rate of that matrix as the normal turns [1/s]."""
         turning = np.outer(touch.normal_rate, touch.normal)
         turning = turning + turning.T
         return turning if self.spins else -turning
+
+
+def _without_round_off(part: Array, size: Any) -> Array:
+    """A part of vectors of a size, (3,) or (3, vectors), without vectors that are round-off."""
+    return np.where(np.linalg.norm(part, axis=0) > ROUND_OFF * size, part, 0.0)
 
 
 def turning_frictions(contacts: Sequence[BodyContact]) -> tuple[TurningFriction, ...]:
