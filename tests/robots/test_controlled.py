@@ -12,7 +12,7 @@ from robot_templates import inertial, mjcf, urdf
 from typer.testing import CliRunner
 
 from proofroll import load_scene, simulate
-from proofroll.cli import app
+from proofroll.cli import app, options
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.policy import Observation
@@ -256,3 +256,11 @@ def test_the_probe_needs_every_part_of_an_observation() -> None:
     for name, value in values.items():
         other = Observation(**{**vars(seen), name: -value})
         assert np.abs(make(["a", "b"])(other) - usual).max() > 1e-3, name
+
+
+def test_degrees_in_a_controller_are_doubted(written: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    """A pose that is probably in degrees is one warning, and one in radians is none."""
+    for pose, said in (("40.0", "joint j1: an angle of 40 rad is 6.4 turns"), ("0.4", "")):
+        robot, control = written(f'pose = {{j1 = {pose}}}\n[[gains]]\njoints = "*"\nkp = 5\n')
+        options.doubt_numbers(with_control(robot, Path(control)), None)
+        assert said in capsys.readouterr().err

@@ -76,6 +76,8 @@ def compare(
             comparison, options.assignments(settings), workers, budget, scheduler, engine or [], until, every
         )
     mention_absent(loaded.absent)
+    if control is not None:
+        options.doubt_numbers(comparison, settings)
 
     def interrupted(outcome: Outcome) -> None:
         content = outcome_content(outcome)

@@ -99,6 +99,16 @@ def controlled(scene: str, control: Path | None) -> str:
     return with_control(scene, control)
 
 
+def doubt_numbers(scene: str, settings: list[str] | None) -> None:
+    """Prints on standard error which numbers of a robot's controller are probably in another unit."""
+    from proofroll.core.element_abilities import DoubtsNumbers
+    from proofroll.studies.cases import scene_of_run
+
+    for element in scene_of_run(scene, assignments(settings), ()).elements:
+        for line in element.implausible if isinstance(element, DoubtsNumbers) else ():
+            complain(f"warning: {line}")
+
+
 def new_runner(
     out: Path, fresh: bool, jobs: int | None, scheduler: str | None = None, workers: Workers | None = None
 ) -> Runner:
