@@ -11,6 +11,7 @@ from turned_scenes import turned_mechanism
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.elements.mechanism.scene.rotations import from_rpy
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
@@ -91,6 +92,13 @@ def _cases() -> list[Any]:
 def test_a_ball_with_resistance_rolls_alike_in_a_turned_world(slides: float, spins: float, seed: int) -> None:
     """A ball that rolls, spins or slides against resistance has the same truth whatever the axes are."""
     assert_the_same_elsewhere(ball(slides, spins), 0.3, seed)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_natural_sizes_are_those_in_a_turned_world(seed: int) -> None:
+    """Natural length and rate of random bodies that touch are the same whatever the axes are."""
+    mechanism, rpy = random_contacts(seed)[1], tuple(np.random.default_rng(seed).uniform(-3, 3, 3))
+    assert natural_scale(mechanism) == natural_scale(turned_mechanism(mechanism, rpy, (0.0, 0.0, 0.0)))
 
 
 @pytest.mark.arithmetic

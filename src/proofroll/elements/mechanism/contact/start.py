@@ -112,7 +112,8 @@ def _rates(solution: Solution) -> FloatArray:
 
 
 def _largest(values: ArrayLike) -> float:
-    return float(np.max(np.abs(values), initial=0.0))
+    """Largest length of vectors, whatever the axes are."""
+    return float(np.linalg.norm(np.atleast_2d(values), axis=-1).max(initial=0.0))
 
 
 def start_digits(contacts: Sequence[object]) -> FloatArray:
