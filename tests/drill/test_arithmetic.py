@@ -216,10 +216,11 @@ def test_what_a_map_of_stability_decides_is_recorded(tmp_path: Path) -> None:
     assert found["decisions"]["claims"]["contradicted"] == 0
 
 
-def test_a_study_that_nothing_compares_is_told_in_a_line() -> None:
+def test_a_study_that_nothing_compares_is_told_in_a_line(tmp_path: Path) -> None:
     """A study of another kind is refused before any process starts."""
+    (tmp_path / "drawn.toml").write_text('study = "figures"\n', encoding="utf-8")
     with pytest.raises(InputError, match="compared are"):
-        CliRunner().invoke(app, ["drill", "arithmetic", "regimes"], catch_exceptions=False)
+        CliRunner().invoke(app, ["drill", "arithmetic", str(tmp_path / "drawn.toml")], catch_exceptions=False)
 
 
 def test_a_run_that_is_lacking_is_told(tmp_path: Path) -> None:
