@@ -37,10 +37,9 @@ def locate(name: str) -> Path:
     try:
         inside = files(entry.package) or []
     except PackageNotFoundError:
-        inside = []
-    found = next((item for item in inside if f"/{item}".endswith(f"/{entry.file}")), None)
-    if found is None:
         pytest.skip(f"{entry.package} is not installed: pip install 'proofroll[robots]'")
+    found = next((item for item in inside if f"/{item}".endswith(f"/{entry.file}")), None)
+    assert found is not None, f"{entry.package} has no {entry.file}"
     return Path(str(found.locate()))
 
 

@@ -28,5 +28,5 @@ def cite(
     for item in cited:
         fresh = [entry for entry in item.references if entry not in shown]
         shown.update(fresh)
-        known = fresh if item.references or item.source else ["% no reference is known; see its own documentation"]
-        sys.stdout.write("\n".join([f"% {item.heading}{': ' + item.source if item.source else ''}", *known, "\n"]))
+        lines = fresh if item.references or item.source else ["% no reference is known; see its own documentation"]
+        sys.stdout.write("\n".join([f"% {item.heading}{': ' + item.source if item.source else ''}", *lines, "\n"]))

@@ -191,5 +191,5 @@ def _trajectory(digest: str, times: tuple[float, ...]) -> xr.Dataset:
     """Truth of the scene with this digest at these times, cached for all engines and presets."""
     from proofroll.core.truth import truth
 
-    known = [*truth_scenes().values(), *itertools.chain.from_iterable(contrasts().values())]
-    return truth(next(scene for scene in known if scene.digest == digest), np.array(times))
+    scenes = [*truth_scenes().values(), *itertools.chain.from_iterable(contrasts().values())]
+    return truth(next(scene for scene in scenes if scene.digest == digest), np.array(times))

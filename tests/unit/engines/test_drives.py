@@ -39,7 +39,8 @@ ACTUATORS = [
 
 def built(mechanism: Mechanism, engine: str, formulation: str, preset: str, **settings: Any) -> Any:
     """The mechanism in an engine, at time 0; the test is skipped where the engine is not installed."""
-    pytest.importorskip(engine if engine != "projection" else "scipy")
+    if engine != "projection":
+        pytest.importorskip(engine)
     kind = load_engine(engine)
     return kind.build(mechanism, resolve_settings(kind, {"formulation": formulation, "preset": preset, **settings}))
 

@@ -91,7 +91,7 @@ class ContactBodies(ContactStretches):
         bodies = self.equations.at(state, features_of(rough))
         closed = acting_ones(self.contacts, rough, slides_of(bodies))
         ways = off_stops(self.contacts, closed)
-        still = [own.kind == "stick" and closed[k] and k not in ways for k, own in enumerate(rough)]
+        sticks = [acting.kind == "stick" and closed[k] and k not in ways for k, acting in enumerate(rough)]
         ways = {k: np.array(own.heading) for k, own in enumerate(rough) if own.heading} | ways
 
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
@@ -102,7 +102,7 @@ class ContactBodies(ContactStretches):
             return self.equations.accelerated(bodies, tuple(directed))
 
         free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
-        if list(still) == list(closed) and not leaving:
+        if sticks == list(closed) and not leaving:
             own = zip(
                 provisional(self.equations, bodies, closed),
                 self._rubs,
@@ -111,8 +111,8 @@ class ContactBodies(ContactStretches):
             resting = tuple(each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own)
             if all_held(self.equations, bodies, resting, free):
                 return resting, np.inf
-        best = self._tried(bodies, closed, still, ways, trial, free, leaving)[0]
-        return self._completed(bodies, closed, still, best, free)
+        best = self._tried(bodies, closed, sticks, ways, trial, free, leaving)[0]
+        return self._completed(bodies, closed, sticks, best, free)
 
     def _completed(
         self,

@@ -201,8 +201,8 @@ class CompiledMode:
 
     def _parameters(self, mode: ContactMode, time: float) -> Array:
         """Run-time parameters of a stretch: lines of contacts, signs of efforts, numbers, lines of signals."""
-        own = [x for k in self._lined for x in mode[k].along or mode[k].heading or ()]
-        return np.concatenate([own, self._clamped, self._constants.values(time)])[: self._values.nparams]
+        lines = [x for k in self._lined for x in mode[k].along or mode[k].heading or ()]
+        return np.concatenate([lines, self._clamped, self._constants.values(time)])[: self._values.nparams]
 
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
         """Guards, numbers of slips and rates of states (times, state) of one stretch, each (times, …)."""

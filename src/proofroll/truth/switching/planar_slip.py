@@ -233,14 +233,14 @@ def _settled(state: Array, start: Array, length: float, nodes: _Nodes, led: Led)
     normals = np.repeat(normal, count, axis=0)
     for number in range(_ROUNDS):
         ways, across = directed(angles, normals)
-        found = led(states, ways)
-        normals = found.normals
-        speeds = np.sum(found.slides * ways, axis=1)
+        solutions = led(states, ways)
+        normals = solutions.normals
+        speeds = np.sum(solutions.slides * ways, axis=1)
         turning = nodes.derivative @ across / length
-        left = np.sum(found.slide_rates * across, axis=1) + speeds * np.sum(ways * turning, axis=1)
+        left = np.sum(solutions.slide_rates * across, axis=1) + speeds * np.sum(ways * turning, axis=1)
         turns = -left / answer
         turns[0] = 0.0
-        new = state + length * nodes.integral @ found.rates
+        new = state + length * nodes.integral @ solutions.rates
         change = max(float(np.abs(turns).max()), float(np.abs(new - states).max()))
         states, angles = new, angles + turns
         # the first round moves states alone, and the second one is the first to turn the slip

@@ -158,9 +158,9 @@ class Spheres(Redundant):
         """Adds the markers of a hollow sphere that stands for a wall, where it is at the start."""
         mechanism = self._mechanism
         motion = Tree(mechanism).at(*mechanism.start())
-        own, other = mechanism.body_index[wall_body], mechanism.body_index[body]
-        centre = motion.p_WB[other] + motion.R_WB[other] @ sphere.centre
-        centre = motion.R_WB[own].T @ (centre - motion.p_WB[own])
+        carrier, ball = mechanism.body_index[wall_body], mechanism.body_index[body]
+        centre = motion.p_WB[ball] + motion.R_WB[ball] @ sphere.centre
+        centre = motion.R_WB[carrier].T @ (centre - motion.p_WB[carrier])
         turn, com, radius = self._turns[wall_body], self._com[wall_body], hollow_radius(wall, centre, sphere.radius)
         place = turn @ (hollow_centre(wall, centre, sphere.radius, radius) - com)
         marker = items.MarkerBodyRigid(bodyNumber=self.bodies[wall_body], localPosition=place)

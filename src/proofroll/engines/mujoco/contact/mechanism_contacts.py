@@ -350,13 +350,13 @@ class Contacts:
         names = contact_of_scene.body_a, contact_of_scene.body_b
         bodies = [self._model.body(name).id for name in names]
         movings = [self._moving(data, body) for body in bodies]
-        found, missing = touch(contact_of_scene, movings[0], movings[1]), np.zeros(3)
+        touching, missing = touch(contact_of_scene, movings[0], movings[1]), np.zeros(3)
         for body, moving, side in zip(bodies, movings, (1.0, -1.0), strict=True):
-            mujoco.mj_jacDot(self._model, data, rate, None, found.place, body)
-            along_body = found.place_rate - moving.velocity(found.place)
+            mujoco.mj_jacDot(self._model, data, rate, None, touching.place, body)
+            along_body = touching.place_rate - moving.velocity(touching.place)
             missing += side * (rate @ data.qvel + cross(moving.w, along_body))
         shift: Array = sign * contact.frame.reshape(3, 3) @ missing
-        shift[0] += float(found.normal_rate @ found.slide)
+        shift[0] += float(touching.normal_rate @ touching.slide)
         return shift
 
     def _moving(self, data: Any, body: int) -> Moving:

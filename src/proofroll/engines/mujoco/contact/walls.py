@@ -47,10 +47,10 @@ class _Plane(NamedTuple):
 
     def pose(self, model: Any, data: Any, above: float) -> None:
         """Poses the plane where the sphere of ``data`` is nearest to the wall, and ``above`` it [m]."""
-        (own, other), wall = self.bodies, self.wall
-        R = data.xmat[own].reshape(3, 3)
-        centre = data.xpos[other] + data.xmat[other].reshape(3, 3) @ self.sphere.centre
-        plane = tangent(wall, R.T @ (centre - data.xpos[own]))
+        (carrier, ball), wall = self.bodies, self.wall
+        R = data.xmat[carrier].reshape(3, 3)
+        centre = data.xpos[ball] + data.xmat[ball].reshape(3, 3) @ self.sphere.centre
+        plane = tangent(wall, R.T @ (centre - data.xpos[carrier]))
         model.geom_quat[self.geom] = to_quaternion(frame_of_axis(plane.normal))
         model.geom_pos[self.geom] = plane.point + (above - self.under) * plane.normal
 
@@ -72,10 +72,10 @@ def shapes_at_start(mechanism: Mechanism) -> Sequence[tuple[Shape, Shape]]:
         shapes, end = [contact.shape_a, contact.shape_b], curved_end(contact)
         if end is not None:
             motion = motion or Tree(mechanism).at(*mechanism.start())
-            own, other = (mechanism.body_index[(contact.body_a, contact.body_b)[k]] for k in (end, 1 - end))
+            carrier, ball = (mechanism.body_index[(contact.body_a, contact.body_b)[k]] for k in (end, 1 - end))
             wall, sphere = _wall_and_sphere(contact, end)
-            centre = motion.p_WB[other] + motion.R_WB[other] @ sphere.centre
-            shapes[end] = tangent(wall, motion.R_WB[own].T @ (centre - motion.p_WB[own]))
+            centre = motion.p_WB[ball] + motion.R_WB[ball] @ sphere.centre
+            shapes[end] = tangent(wall, motion.R_WB[carrier].T @ (centre - motion.p_WB[carrier]))
         found.append((shapes[0], shapes[1]))
     return found
 
