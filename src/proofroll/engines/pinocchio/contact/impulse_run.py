@@ -22,10 +22,8 @@ from proofroll.engines.pinocchio.smooth.null_space import LoopRows, NullSpace
 # Fraction of a step over which the initial accelerations are evaluated, and factor on their errors.
 _PART, _MARGIN = 1 / 16, 4.0
 _PARTS = "in the convex problem a slipping contact separates"
-_FOUND = (
-    "an impulse opposes the slip at its end, which turns, is found to solver_tolerance, and follows the turning of its "
-    "contact (J̇v) one step later"
-)
+_FOUND = "an impulse opposes the slip at its end, which turns, is found to solver_tolerance"
+_LATER = f"{_FOUND}, and follows the turning of its contact (J̇v) one step later"
 
 
 class ImpulseRun(MechanismRun):
@@ -54,7 +52,7 @@ class ImpulseRun(MechanismRun):
     def _kick(self) -> tuple[Array, Array, Array, Array]:
         """Joint accelerations v̇, forces on body a of each contact [N], of joint rows and of motions, in the next step.
 
-        At time 0 they belong to a fraction of that step, and include effects that later steps see one step late.
+        At time 0 they belong to a fraction of that step, and include effects that later steps may see one step late.
         """
         steps = self.steps
         if steps.t:
@@ -99,6 +97,7 @@ class ImpulseRun(MechanismRun):
     @override
     def built(self) -> MechanismBuilt:
         plain, span = super().built(), _PART * self._dt
+        reason = _FOUND if self._settings.integrator == "midpoint" else _LATER
         hard, twice = (
             self._accelerations(self.steps.beginning(length, convex=False), length) for length in (span, 2 * span)
         )
@@ -113,7 +112,7 @@ class ImpulseRun(MechanismRun):
             apart = sum(longest(value - rival) for rival in others)
             unsure = max((longest(shifted[name] - still[name]) for shifted in off), default=0.0)
             tolerance = _MARGIN * (unsure + apart) / size
-            softened[name] = Regularised(tolerance, _PARTS if self._settings.convex else _FOUND)
+            softened[name] = Regularised(tolerance, _PARTS if self._settings.convex else reason)
         return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
 
     def _accelerations(self, kick: Impulses, span: float) -> dict[str, Array]:

@@ -16,9 +16,7 @@ from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
-from proofroll.engines.pinocchio.ball.contact import LARGEST_FRICTION
-from proofroll.engines.pinocchio.ball.plane_contact import solver_of
+from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
@@ -42,11 +40,9 @@ LACKING: Mapping[str, str] = {
 }
 # Approach speed, in steps of gravity, below which nothing rebounds.
 _SOFT = 5.0
-# Fraction c of a gap that a step h by the midpoint rule closes; closing all of it would eject what has penetrated. The
-# turning of a contact's rows (J̇v) leaves gaps of h² J̇v / 2c.
+# Fraction of a gap that a step by the midpoint rule closes; closing all of it would eject what has penetrated.
 _CLOSED = 0.5
-# Largest gap that counts as closed, in falls by gravity of one step: contacts may turn that many times faster than
-# gravity pulls before steps leave them open.
+# Largest gap that counts as closed, in falls by gravity of one step.
 _NEAR = 2.0
 # Part of the largest speed of a row that a speed along a normal has to be, to count.
 _SMALL = 1e-9
@@ -78,6 +74,13 @@ class Impulses(NamedTuple):
     driving: Array
 
 
+def _carried(vector: Array, start: Array, end: Array) -> Array:
+    """A vector turned by the smallest rotation that takes a unit vector to another one less than a half turn away."""
+    axis = cross(start, end)
+    across = cross(axis, vector)
+    return np.asarray(vector + across + cross(axis, across) / (1.0 + start @ end))
+
+
 class _Solver(NamedTuple):
     """Pinocchio's objects for a subset of contacts and joint rows: constraints, solver, its options and result."""
 
@@ -106,6 +109,7 @@ class ImpulseSteps:
             Refused: Pinocchio's solver returns wrong impulses for such contacts.
         """
         self._tree, self._model, self._data = tree, tree.model, tree.model.createData()
+        self._ahead = tree.model.createData()  # later in a step
         self._settings, self._dt = settings, float(settings.dt or 0.0)
         self._midpoint = settings.integrator == "midpoint"
         mechanism = tree.mechanism
@@ -160,18 +164,15 @@ class ImpulseSteps:
         if self._midpoint:
             q = pin.integrate(self._model, q, 0.5 * self._dt * v)
         J, free, inverse, touching = self.terms(q, v, self._dt)
-        shifts = self._shifts(J, q, v, touching)
+        turning = self._turning(q, v, touching, 0.5 * self._dt) if self._midpoint else np.zeros((len(touching), 3))
+        shifts = self._shifts(J, q, v, touching, turning)
         return self._solved(J, free, inverse, touching, shifts, self._dt, convex=self._settings.convex)
 
     def beginning(self, span: float, *, convex: bool) -> Impulses:
-        """Impulses of a short time from now on, with the turning of the contacts (J̇v), which steps see one step late.
-
-        Open gaps stay open.
-        """
-        ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
+        """Impulses of a short time from now on, with the turning of the contacts (J̇v); open gaps stay open."""
         J, free, inverse, touching = self.terms(self.q, self.v, span)
         shifts = np.zeros((len(self._returned), 3))
-        shifts[: len(touching)] = (ahead - J) @ self.v
+        shifts[: len(touching)] = self._turning(self.q, self.v, touching, span)
         apart = [touch.absent or touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
         shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
         return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
@@ -202,14 +203,10 @@ class ImpulseSteps:
         The rows are slip velocities along the normal's :func:`frame_of_axis`, the normal last.
         """
         tree, model, data = self._tree, self._model, self._data
-        pin.forwardKinematics(model, data, q, v)
-        pin.updateFramePlacements(model, data)
+        touching = self._touched(data, q, v, [None] * len(self.contacts))
         tree.now = self.t + 0.5 * span * self._midpoint
         pulls = tree.pulls(data) if tree.pushed else None
         tau = tree.drives(q, v)
-        touching = [
-            touch(contact, self._moving(contact.body_a), self._moving(contact.body_b)) for contact in self.contacts
-        ]
         rate = pin.aba(model, data, q, v, tau, pulls) if pulls else pin.aba(model, data, q, v, tau)
         free = v + span * rate
         inverse = np.triu(pin.computeMinverse(model, data, q))
@@ -249,8 +246,27 @@ class ImpulseSteps:
         changes: Array = speed * ways[ease > 0] / ease[ease > 0, None]
         return changes
 
-    def _moving(self, body: str) -> Moving:
-        k, data = self._index[body], self._data
+    def _touched(self, data: Any, q: Array, v: Array, features: Sequence[int | None]) -> list[Touching]:
+        """Geometry of the contacts in a state, each with the features that touch; None: the nearest."""
+        pin.forwardKinematics(self._model, data, q, v)
+        pin.updateFramePlacements(self._model, data)
+        return [
+            touch(contact, self._moving(data, contact.body_a), self._moving(data, contact.body_b), feature)
+            for contact, feature in zip(self.contacts, features, strict=True)
+        ]
+
+    def _turning(self, q: Array, v: Array, touching: Sequence[Touching], span: float) -> Array:
+        """Changes of slip and gap velocities within a ``span`` [s] in which joint velocities are constant (J̇v)."""
+        later = pin.integrate(self._model, q, span * v)
+        there = self._touched(self._ahead, later, v, [contact.feature for contact in touching])
+        changes = [
+            frame_of_axis(now.normal).T @ (_carried(then.slide, then.normal, now.normal) - now.slide)
+            for now, then in zip(touching, there, strict=True)
+        ]
+        return np.reshape(changes, (len(touching), 3))
+
+    def _moving(self, data: Any, body: str) -> Moving:
+        k = self._index[body]
         if k < 0:
             return Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
         frame = self._tree.body[k]
@@ -298,8 +314,11 @@ class ImpulseSteps:
         k = self._index[body]
         return 0 if k < 0 else int(self._model.frames[self._tree.body[k]].parentJoint)
 
-    def _shifts(self, J: Array, q: Array, v: Array, touching: Sequence[Touching]) -> Array:
-        """Terms added to slip and gap velocities [m/s], shape (contacts + joint rows, 3); inf: the gap cannot close."""
+    def _shifts(self, J: Array, q: Array, v: Array, touching: Sequence[Touching], turning: Array) -> Array:
+        """Terms added to slip and gap velocities [m/s], shape (contacts + joint rows, 3); inf: the gap cannot close.
+
+        ``turning``: changes of these velocities within the step, which do not matter in an impact.
+        """
         begin, dt = len(touching) + len(self.joints.friction), self._dt
         shifts = np.zeros((len(self._returned), 3))
         gaps = [(k, touch.gap, float(J[k, 2] @ v)) for k, touch in enumerate(touching) if not touch.absent]
@@ -314,6 +333,8 @@ class ImpulseSteps:
                 if gap <= max(self._touching, _NEAR * self._gravity * dt**2):
                     back = max(_CLOSED * gap / dt, -_SOFT * self._gravity * dt) if k >= begin else _CLOSED * gap / dt
                     shifts[k, 2] = e * approach if hits else back
+                    if k < len(touching) and not hits:
+                        shifts[k] += turning[k]
             else:
                 hits = hits and gap + dt * (approach - dt * self._gravity) <= 0
                 shifts[k, 2] = e * approach if hits else gap / dt
