@@ -144,7 +144,6 @@ def test_a_bounce_has_a_bar_for_its_last_instants() -> None:
         ("mujoco[formulation=geoms]", r"in MuJoCo \(condim 6\) it shares one cone with sliding and spin"),
         ("pinocchio[formulation=impulses]", "rolling and spinning, and this formulation gives a contact no moment"),
         ("exudyn[formulation=spheres]", "rolling and spinning, and this formulation gives a contact no moment"),
-        ("projection[formulation=dependent]", "rolling and spinning, and this formulation gives a contact no moment"),
     ],
 )
 def test_a_formulation_without_moments_of_contacts_says_so(engine: str, why: str) -> None:
@@ -157,3 +156,30 @@ def test_a_coefficient_below_zero_is_refused_by_its_name() -> None:
     """The line names field, value and bound."""
     with pytest.raises(InputError, match=r"pairs\.contact\.spinning_friction = -1\.0: must be at least 0"):
         law(spinning_friction=-1.0)
+
+
+@pytest.mark.parametrize(
+    ("laws", "velocity", "height", "slope"),
+    [
+        pytest.param({"rolling_resistance": 0.02}, (0.3, 0.2, 0, -4.0, 6.0, 5.0), RADIUS, 0.0, marks=pytest.mark.drill),
+        ({"rolling_resistance": 0.02}, (0.0,) * 6, RADIUS, 0.2),
+        ({"friction": 0.2, "rolling_resistance": 0.003}, (1.0, 0, 0, 0, -60.0, 0), RADIUS, 0.0),
+        pytest.param(
+            {"friction": 0.3, "rolling_resistance": 1e-3, "spinning_friction": 5e-3},
+            (0.4, 0, 0, 4, -8, 9),
+            0.06,
+            0.0,
+            marks=pytest.mark.drill,
+        ),
+    ],
+)
+def test_the_projection_solver_follows_friction_against_turning(
+    laws: dict[str, float], velocity: tuple[float, ...], height: float, slope: float
+) -> None:
+    """A ball that rolls until it stops, stays on a slope, slips, or lands, moves as its truth says to round-off."""
+    scene = ball(law(**laws), velocity, height, slope=slope)
+    found = proofroll.judge(proofroll.simulate(scene, "projection", until=0.2, every=0.1), scene)
+    assert found.agrees, str(found)
+    moved = [item.judgement for item in found.compared if item.judgement.observable in {"p_WB", "w_WB", "positions"}]
+    assert moved
+    assert max(item.error for item in moved) < 1e-11  # 1e-13 is seen

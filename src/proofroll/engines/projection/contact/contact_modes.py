@@ -27,10 +27,22 @@ from proofroll.elements.mechanism.contact.acting import (
     held_directions,
     slip_velocity,
 )
-from proofroll.elements.mechanism.contact.coulomb import contact_forces, largest_friction
-from proofroll.elements.mechanism.contact.joint_laws import JointContact, joint_contacts, refuse_rubbing_stops
+from proofroll.elements.mechanism.contact.coulomb import contact_forces
+from proofroll.elements.mechanism.contact.joint_laws import (
+    JointContact,
+    joint_contacts,
+    line_response,
+    refuse_rubbing_stops,
+)
 from proofroll.elements.mechanism.contact.start import closed_and_still, natural_scale, start_digits
 from proofroll.elements.mechanism.contact.touching import Moving, Touching, torn, touch
+from proofroll.elements.mechanism.contact.turning import (
+    TurningFriction,
+    moments_by_pressing,
+    pressed_by,
+    shut_by_pressing,
+    turning_frictions,
+)
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
@@ -75,20 +87,27 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         """Takes the size of a fixed ``step`` [s]; 0: the step adapts."""
         super().__init__(equations, stepper, accept, breaks(mechanism.signals))
         self._bodies, self._joints = mechanism.contacts, joint_contacts(switched_joints(mechanism))
-        self.contacts: tuple[BodyContact | JointContact, ...] = (*self._bodies, *self._joints)
+        self._turning = turning_frictions(self._bodies)
+        self.contacts: tuple[BodyContact | JointContact | TurningFriction, ...] = (
+            *self._bodies,
+            *self._joints,
+            *self._turning,
+        )
         self._index = mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
         self._static = np.array([contact.static for contact in self.contacts])
         self._bounds = np.array([contact.bound for contact in self.contacts])
+        self._presses = [contact.presses for contact in self.contacts]
         self._rubs = self.friction + self._bounds > 0
         scale = natural_scale(mechanism)
         self._unit = math.prod(scale)  # natural speed
         self._still, self._rate, self._length = scale.speed, scale.rate, scale.length
         # overlap of each contact when it opened, an error of the method: it is no impact
         self._overlap = np.zeros(len(self.contacts))
-        turns = [mechanism.joints[switch.joint.number].kind != JointKind.PRISMATIC for switch in self._joints]
+        slides = [mechanism.joints[switch.joint.number].kind == JointKind.PRISMATIC for switch in self._joints]
+        slides = [True] * len(self._bodies) + slides + [False] * len(self._turning)
         # length of each contact's motion by 1 m, or by 1 rad
-        self._arms = np.array([1.0] * len(self._bodies) + [scale.length if turn else 1.0 for turn in turns])
+        self._arms = np.array([1.0 if slide else scale.length for slide in slides])
         self._slipping = SlipDirections(step, self._still / self._arms)
         self._timed = any(map(varies, mechanism.signals))
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
@@ -130,14 +149,33 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         for k, switch in enumerate(self._joints, len(self._bodies)):
             J[k, :, switch.joint.velocity] = switch.direction
             rate[k] = switch.direction * free.rates[switch.joint.velocity]
+        fastest = max((float(np.linalg.norm(body.w)) for body in moving.values()), default=0.0)
+        for k, friction in enumerate(self._turning, len(self._bodies) + len(self._joints)):
+            contact, there = self._bodies[friction.pressed_by], touching[friction.pressed_by]
+            spin, spin_rate = np.zeros((3, len(S))), np.zeros(3)
+            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
+                i = self._index[body]
+                if i >= 0:
+                    axes = S[:, [2, 0, 1], [1, 2, 0]]  # of the velocities, from their matrices
+                    spin += sign * (equations.tree.moves[i][:, None] * axes).T
+                    spin_rate += sign * moving[body].R @ free.angular[i]
+            J[k] = friction.resisted(there.normal, spin)
+            relative = moving[contact.body_a].w - moving[contact.body_b].w
+            rate[k] = friction.resisted_rate(there, relative, spin_rate, fastest)
         flat = J.reshape(-1, J.shape[2]).T
         return ContactsThere(touching, J, divided(spaces[0].H, flat).reshape(-1, *J.shape[:2]), rate)
 
     def _touching(self, x: Array) -> tuple[Touching, ...]:
         """Gap, normal and sliding velocity of each contact."""
         moving, joints = self._moving(x), self._equations.watched(x) if self._joints else {}
-        bodies = (touch(contact, moving[contact.body_a], moving[contact.body_b]) for contact in self._bodies)
-        return (*bodies, *(contact.touching(*joints[contact.joint.number]) for contact in self._joints))
+        pairs = [(moving[contact.body_a], moving[contact.body_b]) for contact in self._bodies]
+        bodies = [touch(contact, a, b) for contact, (a, b) in zip(self._bodies, pairs, strict=True)]
+        turns = [(friction, friction.pressed_by) for friction in self._turning]
+        return (
+            *bodies,
+            *(contact.touching(*joints[contact.joint.number]) for contact in self._joints),
+            *(friction.touching(bodies[k], pairs[k][0].w - pairs[k][1].w) for friction, k in turns),
+        )
 
     def _moving(self, x: Array) -> dict[str, Moving]:
         """Motion of the frames of all bodies, and of the world."""
@@ -163,19 +201,23 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return [
             (k, direction)
             for k, (acting, touching) in enumerate(zip(mode, now.touching, strict=True))
-            for direction in held_directions(acting, touching, presses=not self._bounds[k])
+            for direction in held_directions(acting, touching, presses=self._presses[k])
         ]
 
     def forces(self, now: ContactsThere, mode: ContactMode) -> Array:
-        """Forces on body a of each contact in a mode [N], (contacts, 3).
+        """Forces on body a of each contact in a mode [N], (contacts, 3); of friction against turning moments [N m].
 
         Raises:
             Diverged: friction makes a normal force negative (Painlevé).
         """
         rows, force = self._rows(now, mode), np.zeros((len(mode), 3))
-        for k in np.flatnonzero(self._bounds).tolist():
-            if mode[k].kind == "slip":
-                force[k] = -self._bounds[k] * self._slipping.heading(k, now.touching[k])
+        turning = list[tuple[int, int, Array]]()
+        for k, contact in enumerate(self.contacts):
+            if mode[k].kind == "slip" and not contact.presses:
+                heading = self._slipping.heading(k, now.touching[k])
+                force[k] = -self._bounds[k] * heading
+                if contact.pressed_by is not None:
+                    turning.append((k, contact.pressed_by, -self.friction[k] * heading))
         if not rows:
             return force
         directions = [
@@ -185,6 +227,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         rate = now.rate + now.J @ np.einsum("nki,ki->n", now.response, force)
         K = np.array([row @ now.J[k] for k, row in rows])
         D = np.array([now.response[:, k] @ direction for (k, _), direction in zip(rows, directions, strict=True)])
+        owned = [(k, direction) for (k, _), direction in zip(rows, directions, strict=True)]
+        moments = moments_by_pressing(turning, owned, [touching.normal for touching in now.touching])
+        for k, place, moment in moments:
+            D[place] += now.response[:, k] @ moment
         targets = [-row @ rate[k] for k, row in rows]
         for i, (k, row) in enumerate(rows):
             if mode[k].kind == "slip":
@@ -192,8 +238,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                 if row @ now.J[k] @ D[i] <= 0:
                     raise Diverged(str(torn(self.contacts[k].name, self.t)))
         sizes = np.linalg.lstsq(K @ D.T, np.array(targets), rcond=_RANK)[0]
-        for size, (k, _), direction in zip(sizes, rows, directions, strict=True):
+        for size, (k, direction) in zip(sizes, owned, strict=True):
             force[k] += size * direction
+        for k, place, moment in moments:
+            force[k] += sizes[place] * moment
         return force
 
     def _settled(self, y: Array, mode: ContactMode) -> Array:
@@ -222,7 +270,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         force, forces = self.solve()[1], np.full((2, joints), np.nan)
         for contact in self._joints:
             forces[:, contact.joint.number] = 0.0
-        for contact, push in zip(self._joints, force[len(self._bodies) :], strict=True):
+        for contact, push in zip(self._joints, force[len(self._bodies) :], strict=False):
             forces[int(contact.side != 0), contact.joint.number] += contact.direction @ push
         return {"contact_force": force[: len(self._bodies)], "friction": forces[0], "stop": forces[1]}
 
@@ -262,22 +310,25 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         now = self.at(x)
         force, ends = self.forces(now, self.mode), list[Excess]()
         held: ContactMode = ()
-        stops = [isinstance(item, JointContact) and not item.bound for item in self.contacts]
+        stops = [isinstance(item, JointContact) and item.presses for item in self.contacts]
         shared = sum(
             acting.kind == "stick" or (acting.kind == "slip" and s) for acting, s in zip(self.mode, stops, strict=True)
         )
         for k, (acting, item) in enumerate(zip(self.mode, now.touching, strict=True)):
+            by = self.contacts[k].pressed_by
             if acting.kind == "open":
-                ends.append(Excess(k, EventKind.IMPACT, -item.gap - self._overlap[k], -float(item.normal @ item.slide)))
+                if by is None:
+                    size = -item.gap - self._overlap[k]
+                    ends.append(Excess(k, EventKind.IMPACT, size, -float(item.normal @ item.slide)))
                 continue
-            N = float(item.normal @ force[k])
-            if not self._bounds[k]:
+            N = float((item if by is None else now.touching[by]).normal @ force[k if by is None else by])
+            if self._presses[k]:
                 ends.append(Excess(k, EventKind.LIFT_OFF, -N))
             if acting.kind == "slip" and self._rubs[k]:
                 ends.append(Excess(k, "still", self._slipping.passed(k, item)))
-            elif acting.kind == "stick":
-                bound = float(self._bounds[k] or largest_friction(self._static[k], N))
-                beyond = float(np.linalg.norm(force[k] - N * item.normal)) - bound if np.isfinite(bound) else -1.0
+            elif acting.kind == "stick" and np.isfinite(self._static[k]):  # what never slips opens, and does not slip
+                bound = float(self._bounds[k] or self._static[k] * N)
+                beyond = float(np.linalg.norm(force[k] - item.normal * (item.normal @ force[k]))) - bound
                 if beyond > 0 and shared > 1:
                     # forces shared by several contacts are not unique: others may hold what this one cannot
                     held = held or self._decided(
@@ -342,7 +393,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _struck(self, x: Array, now: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
         """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
-        which = [k for k, acting in enumerate(self.mode) if (acting.kind != "open" or k == hit) and not self._bounds[k]]
+        which = [k for k, acting in enumerate(self.mode) if (acting.kind != "open" or k == hit) and self._presses[k]]
         frames, J, response = self._framed(now, which)
         c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
         place, law = 3 * which.index(hit), self.contacts[hit]
@@ -358,6 +409,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             bool(self._bounds[k]) or (k in which and parts[k] <= self._still and not (k == hit and e))
             for k in range(len(self.mode))
         ]
+        closed = shut_by_pressing(self.contacts, closed)
         try:
             refuse_rubbing_stops(self.contacts, closed, self.t)
         except Refused as error:
@@ -376,13 +428,22 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         try:
             numbers, names = list(which), [self.contacts[k].name for k in which]
             return contact_forces(
-                G, c, self.friction[numbers], sliding, names, self._bounds[numbers], time, 0, self._static[numbers]
+                G,
+                c,
+                self.friction[numbers],
+                sliding,
+                names,
+                self._bounds[numbers],
+                time,
+                static=self._static[numbers],
+                pressed_by=pressed_by(self.contacts, numbers),
             )
         except Refused as error:
             raise Diverged(str(error)) from None
 
     def _decided(self, now: ContactsThere, closed: Sequence[bool], resting: Sequence[bool]) -> ContactMode:
         """Mode that follows from the forces, for contacts that are closed, and at rest where ``resting``."""
+        closed = shut_by_pressing(self.contacts, closed)
         which, mode = [k for k, shut in enumerate(closed) if shut], [OPEN for _ in closed]
         if not which:
             return tuple(mode)
@@ -391,12 +452,15 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
             there = now.touching[k]
             c[3 * place : 3 * place + 3] = frame.T @ now.rate[k]
-            c[3 * place] += there.normal_rate @ there.slide
+            if self._presses[k]:
+                c[3 * place] += there.normal_rate @ there.slide
             slip = frame[:, 1:].T @ there.slide
             sliding.append(slip / np.linalg.norm(slip) if self._rubs[k] and not resting[k] else None)
         G = J @ response
         force, done = self._law(G, c, which, sliding)
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
             part, slides = slice(3 * place, 3 * place + 3), sliding[place]
-            mode[k] = first_mode(done[place], frame, -force[place, 1:] if slides is None else slides, G[part, part])
+            response = line_response(self.contacts[k], frame @ G[part, part] @ frame.T, now.touching)
+            along = -force[place, 1:] if slides is None else slides
+            mode[k] = first_mode(done[place], frame, along, frame.T @ response @ frame)
         return tuple(mode)

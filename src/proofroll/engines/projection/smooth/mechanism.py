@@ -1,6 +1,6 @@
 """Formulation ``dependent``: run of a mechanism by the projection method, and its samples."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -54,9 +54,9 @@ PROVIDES = frozenset(
         MechanismCapability.STATIC_FRICTION,
         MechanismCapability.SLIP_REBOUNDS,
         MechanismCapability.CONTACT_REBOUNDS,
+        MechanismCapability.TURNING_FRICTION,
     }
 )
-LACKING: Mapping[str, str] = {MechanismCapability.TURNING_FRICTION: "this formulation gives a contact no moment"}
 # Regularity of the loops' rows, relative to the largest so far, that counts as singular: accelerations lose as many
 # digits as it has zeros. It is about a hundredth for loops that miss a singular pose by a hundredth of a radian.
 SINGULAR = 1e-6
@@ -67,7 +67,7 @@ class ProjectionMechanism:
 
     def __init__(self, scene: Any, settings: ProjectionSettings) -> None:
         mechanism = mechanism_of(scene)
-        require(mechanism, PROVIDES, LACKING)
+        require(mechanism, PROVIDES, {})
         self._timed = any(map(varies, mechanism.signals))
         limited = any(actuator.limit is not None for actuator in mechanism.actuators)
         switched = bool(switched_joints(mechanism)) or limited or bool(breaks(mechanism.signals))
