@@ -142,7 +142,6 @@ def test_a_bounce_has_a_bar_for_its_last_instants() -> None:
     ("engine", "why"),
     [
         ("mujoco[formulation=geoms]", r"in MuJoCo \(condim 6\) it shares one cone with sliding and spin"),
-        ("pinocchio[formulation=impulses]", "rolling and spinning, and this formulation gives a contact no moment"),
         ("exudyn[formulation=spheres]", "rolling and spinning, and this formulation gives a contact no moment"),
     ],
 )
@@ -183,3 +182,24 @@ def test_the_projection_solver_follows_friction_against_turning(
     moved = [item.judgement for item in found.compared if item.judgement.observable in {"p_WB", "w_WB", "positions"}]
     assert moved
     assert max(item.error for item in moved) < 1e-11  # 1e-13 is seen
+
+
+@pytest.mark.parametrize("preset", ["matched", "tuned"])
+@pytest.mark.parametrize(
+    ("laws", "velocity", "slope"),
+    [
+        ({"rolling_resistance": 0.02}, (0.3, 0.2, 0, -4.0, 6.0, 5.0), 0.0),
+        ({"rolling_resistance": 0.02}, (0.0,) * 6, 0.2),
+        ({"friction": 0.2, "rolling_resistance": 0.003}, (1.0, 0, 0, 0, -60.0, 0), 0.0),
+        ({"spinning_friction": 0.03}, (0, 0, 0, 0, 0, 30.0), 0.0),
+    ],
+)
+def test_pinocchios_impulses_follow_friction_against_turning(
+    preset: str, laws: dict[str, float], velocity: tuple[float, ...], slope: float
+) -> None:
+    """A ball that rolls until it stops, stays on a slope, slips, or spins until it stops, ends as its truth says."""
+    scene = ball(law(**laws), velocity, slope=slope)
+    run = proofroll.simulate(scene, f"pinocchio[formulation=impulses,preset={preset}]", until=0.2, every=0.1)
+    right = proofroll.simulate(scene, "truth", until=0.2, every=0.1)
+    for field, error in (("p_WB", 2e-4 if preset == "matched" else 1e-6), ("v_WB", 1e-8), ("w_WB", 1e-6)):
+        assert np.abs(at(run, field) - at(right, field)).max() < error

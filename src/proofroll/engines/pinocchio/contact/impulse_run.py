@@ -49,8 +49,8 @@ class ImpulseRun(MechanismRun):
     def _renew(self) -> None:
         """Keeps the stepper, which evaluates all forces anew in each step."""
 
-    def _kick(self) -> tuple[Array, Array, Array, Array]:
-        """Joint accelerations v̇, forces on body a of each contact [N], of joint rows and of motions, in the next step.
+    def _kick(self) -> Impulses:
+        """Joint accelerations v̇, forces and moments of contacts [N, N m], of joint rows and motions, in the next step.
 
         At time 0 they belong to a fraction of that step, and include effects that later steps may see one step late.
         """
@@ -60,21 +60,22 @@ class ImpulseRun(MechanismRun):
         else:
             span = _PART * self._dt
             kick = steps.beginning(span, convex=self._settings.convex)
-        return (kick.v - steps.v) / span, kick.impulse / span, kick.along / span, kick.driving / span
+        return Impulses(*((part / span) for part in kick._replace(v=kick.v - steps.v)))
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, accelerations, joint forces in the next step, and empty loop forces."""
-        q, v, (acceleration, pressing, *_) = self.steps.q, self.steps.v, self._kick()
+        q, v, kick = self.steps.q, self.steps.v, self._kick()
         touching = self.steps.terms(q, v, self._dt)[-1]
         self.tree.now = self.steps.t
-        data = self._placed(acceleration)
+        data = self._placed(kick.v)
         forces = self.tree.pulls(data)
-        for contact, touch, force in zip(self.steps.contacts, touching, pressing, strict=True):
+        parts = zip(self.steps.contacts, touching, kick.impulse, kick.moment, strict=True)
+        for contact, touch, force, moment in parts:
             for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
                 if body != WORLD:
                     frame = self.tree.body[self._mechanism.body_index[body]]
-                    self.tree.put(forces, data, frame, touch.place, sign * force)
-        return data, q, v, acceleration, forces, np.zeros((2, 0, 3))
+                    self.tree.put(forces, data, frame, touch.place, sign * force, sign * moment)
+        return data, q, v, kick.v, forces, np.zeros((2, 0, 3))
 
     def _placed(self, acceleration: Array) -> Any:
         """Data of the present state with an acceleration."""
@@ -85,13 +86,13 @@ class ImpulseRun(MechanismRun):
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`; the forces are those of the next step."""
-        _, pressing, joint_forces, _ = self._kick()
-        forces = self.steps.joints.along_joints(self.steps.q, joint_forces) if joint_forces.size else {}
-        return replace(super().sample(), contact_force=pressing if self.steps.contacts else None, **forces)
+        kick = self._kick()
+        forces = self.steps.joints.along_joints(self.steps.q, kick.along) if kick.along.size else {}
+        return replace(super().sample(), contact_force=kick.impulse if self.steps.contacts else None, **forces)
 
     @override
     def _drives(self) -> Array:
-        self.dynamics.on_motions = self._kick()[-1]
+        self.dynamics.on_motions = self._kick().driving
         return super()._drives()
 
     @override
@@ -103,7 +104,7 @@ class ImpulseRun(MechanismRun):
         )
         step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
         softened = dict[str, Regularised]()
-        now = Impulses(self.steps.v, *np.zeros((3, 0)))
+        now = Impulses(self.steps.v, *np.zeros((4, 0)))
         still, errors = self._accelerations(now, span), self.steps.unsure(span)
         off = [self._accelerations(now._replace(v=now.v + error), span) for error in errors]
         for name, value in hard.items():

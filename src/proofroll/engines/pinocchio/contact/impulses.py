@@ -18,6 +18,8 @@ from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS,
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
+from proofroll.engines.pinocchio.contact.solvers import LARGEST_FRICTION, solver_of
+from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningMoments
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
@@ -26,7 +28,7 @@ PROVIDES: frozenset[str] = (
     ALL_JOINTS
     | FORCES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-    | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS}
+    | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION}
     | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
     | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS, _CAPABILITY.MOTIONS}
 )
@@ -36,7 +38,6 @@ LACKING: Mapping[str, str] = {
         ALL_LOOPS | {_CAPABILITY.COUPLINGS, _CAPABILITY.COUPLINGS_OF_MANY, _CAPABILITY.MASSLESS}, _OF_A_TREE
     ),
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
-    _CAPABILITY.TURNING_FRICTION: "this formulation gives a contact no moment",
 }
 # Approach speed, in steps of gravity, below which nothing rebounds.
 _SOFT = 5.0
@@ -46,6 +47,8 @@ _CLOSED = 0.5
 _NEAR = 2.0
 # Part of the largest speed of a row that a speed along a normal has to be, to count.
 _SMALL = 1e-9
+# Ratio of friction to its bound above which an impulse lies on the cone.
+_INSIDE = 1 - 1e-6
 # Ratio of the contact's mobility in two directions of the surface above which PGS returns a wrong impulse.
 _UNEQUAL = 2.0
 # Largest coefficient of the first cone, and factor on it while an impulse lies on it. Narrower cones than needed cost
@@ -64,12 +67,14 @@ class Impulses(NamedTuple):
     Attributes:
         v: velocity after it, shape (nv,).
         impulse: on body a of each contact, world axes [N s], shape (contacts, 3).
+        moment: of friction against turning on body a of each contact, world axes [N m s], shape (contacts, 3).
         along: impulses of joint rows [N s, N m s], shape (rows,).
         driving: impulses that impose motions [N s, N m s], shape (motions,).
     """
 
     v: Array
     impulse: Array
+    moment: Array
     along: Array
     driving: Array
 
@@ -122,6 +127,8 @@ class ImpulseSteps:
         self.joints = JointRows(tree)
         stops = [item.joint.restitution for item in self.joints.stops]
         self._returned = np.concatenate([self.restitution, np.zeros(len(self.joints.friction)), stops])
+        self._moments = TurningMoments(tree, float(settings.solver_tolerance or 0.0))
+        self._pressed_by = [friction.pressed_by for friction in self._moments.frictions]
         self._solvers: dict[tuple[int, ...], _Solver] = {}
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
@@ -166,7 +173,7 @@ class ImpulseSteps:
         J, free, inverse, touching = self.terms(q, v, self._dt)
         turning = self._turning(q, v, touching, 0.5 * self._dt) if self._midpoint else np.zeros((len(touching), 3))
         shifts = self._shifts(J, q, v, touching, turning)
-        return self._solved(J, free, inverse, touching, shifts, self._dt, convex=self._settings.convex)
+        return self._turned(v, J, free, inverse, touching, shifts, self._dt, convex=self._settings.convex)
 
     def beginning(self, span: float, *, convex: bool) -> Impulses:
         """Impulses of a short time from now on, with the turning of the contacts (J̇v); open gaps stay open."""
@@ -175,7 +182,7 @@ class ImpulseSteps:
         shifts[: len(touching)] = self._turning(self.q, self.v, touching, span)
         apart = [touch.absent or touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
         shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
-        return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
+        return self._turned(self.v, J, free, inverse, touching, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:
         """Normals, positions and widest cones of contact points in Pinocchio, with gaps of the shapes at its poses."""
@@ -342,6 +349,44 @@ class ImpulseSteps:
                 shifts[k, :2] = self.contacts[k].tangential_restitution * (J[k, :2] @ v)
         return shifts
 
+    def _turned(
+        self,
+        v: Array,
+        J: Array,
+        free: Array,
+        inverse: Array,
+        touching: Sequence[Touching],
+        shifts: Array,
+        span: float,
+        *,
+        convex: bool,
+    ) -> Impulses:
+        """Impulses of a step that begins with the velocity ``v``, with those of friction against turning.
+
+        An impact has no moment of friction.
+        """
+        if not self._moments.frictions:
+            return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
+        rows, count = self._moments.rows(self._data, touching), len(touching)
+        soft = J[:, 2] @ v >= -_SOFT * self._gravity * span
+        kicks = list[Impulses]()
+
+        def pressed(along: Array) -> Pressed:
+            kick = self._solved(J, free + inverse @ along, inverse, touching, shifts, span, convex=convex)
+            kicks[:] = [kick]
+            sizes = np.array([touch.normal @ push for touch, push in zip(touching, kick.impulse, strict=True)])
+            held = [np.zeros((0, len(v)))]
+            for k in np.flatnonzero(sizes > 0).tolist():
+                aside = np.linalg.norm(kick.impulse[k] - sizes[k] * touching[k].normal)
+                held.append(J[k] if aside < _INSIDE * self.contacts[k].friction * sizes[k] else J[k, 2:])
+            return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(held))
+
+        moments, along = self._moments.found(rows, v, inverse, pressed, self.t)
+        by_contact = np.zeros((count, 3))
+        np.add.at(by_contact, self._pressed_by, moments)
+        driving = kicks[0].driving - self._motions[1].T @ along
+        return kicks[0]._replace(moment=by_contact, driving=driving)
+
     def _solved(
         self,
         J: Array,
@@ -366,7 +411,8 @@ class ImpulseSteps:
             # a speed that is round-off of its rows would be the unit of impulses, in which slips are huge
             closing = {k for k in gaps if blocks[k][-1] @ v + shifts[k, 2] < -_SMALL * np.abs(blocks[k] @ v).max()}
             if closing <= set(which) and not changed:
-                return Impulses(v=v, impulse=impulse, along=along_rows, driving=alone - held.T @ pushed)
+                driving = alone - held.T @ pushed
+                return Impulses(v=v, impulse=impulse, moment=np.zeros((count, 3)), along=along_rows, driving=driving)
             which, changed = tuple(sorted({*which, *closing})), False
             rows = np.concatenate([blocks[k] for k in which])
             to_joints = inverse @ rows.T

@@ -1,0 +1,99 @@
+"""Rolling resistance and friction against spin, by iteration around Pinocchio's solver, which has no moments."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.contact.turning import turning_frictions
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
+
+# Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one.
+_MOST, _SETTLED = 100, 10.0
+# Response to moments, in parts of that without contacts, that is round-off of what contacts hold.
+_HELD = 1e-9
+
+
+class Pressed(NamedTuple):
+    """Outcome of the contacts of a step for given moments.
+
+    Attributes:
+        v: velocities after it, (nv,).
+        normal: impulse along the normal of each contact whose friction against turning acts [N s].
+        held: rows that its contacts hold at zero, (rows, nv).
+    """
+
+    v: Array
+    normal: Array
+    held: Array
+
+
+class TurningMoments:
+    """Friction against turning of all contacts.
+
+    While a body turns, the moment opposes the mean of the angular velocities before and after a step; it holds what it
+    can stop within the step.
+    """
+
+    def __init__(self, tree: JointTree, tolerance: float) -> None:
+        """Takes the tolerance of the contact solver [1]."""
+        self._tree, self._tolerance = tree, tolerance
+        self.frictions = turning_frictions(tree.mechanism.contacts)
+
+    def rows(self, data: pin.Data, touching: Sequence[Touching]) -> Array:
+        """Derivative of the resisted angular velocities by the joint velocities, (frictions, 3, nv), from ``data``."""
+        index, model = self._tree.mechanism.body_index, self._tree.model
+        rows = np.zeros((len(self.frictions), 3, model.nv))
+        for k, friction in enumerate(self.frictions):
+            contact = self._tree.mechanism.contacts[friction.pressed_by]
+            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
+                if index[body] >= 0:
+                    frame = self._tree.body[index[body]]
+                    rows[k] += sign * pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[3:]
+            rows[k] = friction.resisted(touching[friction.pressed_by].normal, rows[k])
+        return rows
+
+    def found(
+        self, rows: Array, v: Array, inverse: Array, pressed: Callable[[Array], Pressed], time: float
+    ) -> tuple[Array, Array]:
+        """Impulsive moments of all frictions [N m s], (frictions, 3), and the joint impulses that they are, (nv,).
+
+        Args:
+            rows: see :meth:`rows`.
+            v: joint velocities before the step.
+            inverse: of the mass matrix.
+            pressed: contacts for joint impulses of the moments.
+            time: for messages [s].
+
+        Raises:
+            Diverged: they are not found.
+        """
+        moments, along = np.zeros((len(rows), 3)), np.zeros(len(v))
+        for _ in range(_MOST):
+            outcome, before = pressed(along), moments.copy()
+            bounds = np.array([friction.friction for friction in self.frictions]) * outcome.normal
+            for k, (row, bound) in enumerate(zip(rows, bounds, strict=True)):
+                moments[k] += _stopping(row, inverse, outcome)
+                if np.linalg.norm(moments[k]) > bound:
+                    turning = row @ (v + outcome.v)
+                    moments[k] = -bound * turning / (float(np.linalg.norm(turning)) or 1.0)
+            along = np.einsum("kin,ki->n", rows, moments)
+            if np.abs(moments - before).max() <= _SETTLED * self._tolerance * bounds.max():
+                return moments, along
+        raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")
+
+
+def _stopping(row: Array, inverse: Array, outcome: Pressed) -> Array:
+    """Moment that stops what still turns, while the contacts hold what they do [N m s]."""
+    ways, held = inverse @ row.T, outcome.held
+    free = row @ ways
+    into = held @ ways
+    response = free - into.T @ np.linalg.pinv(held @ inverse @ held.T, hermitian=True) @ into
+    ease = float(np.linalg.eigvalsh(response)[-1])
+    if ease <= _HELD * np.trace(free):
+        return np.zeros(3)
+    return np.asarray(-(row @ outcome.v) / ease)
