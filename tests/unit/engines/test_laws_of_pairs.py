@@ -106,7 +106,6 @@ def test_static_friction_holds_what_kinetic_would_not() -> None:
             "condim 6. it shares one cone with sliding",
         ),
         ("mujoco[formulation=geoms]", {"spinning_friction": 1e-3}, "friction = inf is the same in both"),
-        ("exudyn[formulation=spheres]", {"spinning_friction": 1e-3}, "this formulation gives a contact no moment"),
     ],
 )
 def test_who_lacks_a_law_says_so(engine: str, law: dict[str, float], why: str) -> None:

@@ -68,16 +68,20 @@ _ROUND_OFF = 1e-13  # of slides in a sequence of impacts, relative to the larges
 
 
 class ContactDynamics:
-    """A mechanism in the coordinates of its tree with its contacts: of bodies, laws of joints, friction of turning."""
+    """A mechanism in the coordinates of its tree with its contacts: of bodies, laws of joints, friction of turning.
+
+    Attributes:
+        turning: friction against turning, the last of the contacts.
+    """
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.equations = mechanism, JointCoordinates(mechanism)
         self._of_joints = joint_contacts(self.equations.switched)
-        self._turning = turning_frictions(mechanism.contacts)
+        self.turning = turning_frictions(mechanism.contacts)
         self.contacts: tuple[BodyContact | JointContact | TurningFriction, ...] = (
             *mechanism.contacts,
             *self._of_joints,
-            *self._turning,
+            *self.turning,
         )
         self.friction = np.array([contact.friction for contact in self.contacts])
         self._static = np.array([contact.static for contact in self.contacts])
@@ -110,8 +114,8 @@ class ContactDynamics:
             at = contact.joint.velocity
             touching += (contact.touching(float(q[contact.joint.coordinate]), float(v[at])),)
             parts.append((np.outer(contact.direction, np.eye(len(v))[at]), np.zeros(3)))
-        fastest = float(np.linalg.norm(found.motion.w_WB, axis=1).max()) if self._turning else 0.0
-        for friction in self._turning:
+        fastest = float(np.linalg.norm(found.motion.w_WB, axis=1).max()) if self.turning else 0.0
+        for friction in self.turning:
             there = touching[friction.pressed_by]
             turning, J, rate = turning_row(found.motion, self._bodies[friction.pressed_by])
             touching += (friction.touching(there, turning),)
@@ -420,7 +424,7 @@ class ContactDynamics:
             wrench = np.concatenate([push, cross(touch.place, push)])
             applied[a] += wrench
             applied[b] -= wrench
-        for k, friction in enumerate(self._turning, count + len(self._of_joints)):
+        for k, friction in enumerate(self.turning, count + len(self._of_joints)):
             a, b = self._bodies[friction.pressed_by]
             applied[a, 3:] += force[k]
             applied[b, 3:] -= force[k]

@@ -19,6 +19,8 @@ from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.contact.acting import OPEN
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
@@ -27,6 +29,8 @@ from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
 from proofroll.engines.exudyn.contact.hollow_spheres import HollowSphere, hollow_centre, hollow_radius
+from proofroll.engines.exudyn.contact.turning import add_turning
+from proofroll.engines.exudyn.integration import DIFFERENCED
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.smooth import redundant
@@ -34,12 +38,11 @@ from proofroll.engines.exudyn.smooth.redundant import Redundant
 
 _CAPABILITY = MechanismCapability
 _OF_CONTACT = {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.UNBOUNDED_FRICTION}
-PROVIDES = redundant.PROVIDES | _OF_CONTACT
+PROVIDES = redundant.PROVIDES | _OF_CONTACT | {_CAPABILITY.TURNING_FRICTION}
 LACKING: Mapping[str, str] = {
     **redundant.LACKING,
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
     _CAPABILITY.SLIP_REBOUNDS: "this formulation has no rebounds",
-    _CAPABILITY.TURNING_FRICTION: "this formulation gives a contact no moment",
     _CAPABILITY.CONTACT_REBOUNDS: "its restitution is a damping that comes near it with ever shorter steps alone",
 }
 # m: distance from the centre of the triangle that stands for a plane to its sides.
@@ -98,6 +101,9 @@ class Spheres(Redundant):
             self._contacts.append(self._add_contact(contact, each.gap, pressed, speed, settings))
             if speed < settings.penalty[1]:
                 lacking += float(np.linalg.norm(start.force[number] - pressed * each.normal))
+        moments = start.force[len(start.force) - len(dynamics.turning) :]
+        for friction, moment in zip(dynamics.turning, moments, strict=True):
+            lacking += self._add_turning(friction, moment, start.state.touching[friction.pressed_by], settings)
         if self._hollow:
             self.system.SetPreNewtonResidualUserFunction(self._follow)
         load = float(np.abs(start.force[: len(mechanism.contacts)]).max(initial=0.0))
@@ -153,6 +159,25 @@ class Spheres(Redundant):
                 **law,
             )
         return _Made(self.system.AddObject(made), sign, sunk)
+
+    def _add_turning(
+        self, friction: TurningFriction, moment: Array, touch: Touching, settings: ExudynSettings
+    ) -> float:
+        """Adds a friction against turning; returns the force at its sphere [N] that its ``moment`` at rest lacks."""
+        contact, made = self._mechanism.contacts[friction.pressed_by], self._contacts[friction.pressed_by]
+        radius = max(shape.radius for shape in (contact.shape_a, contact.shape_b) if isinstance(shape, SphereShape))
+        zone = settings.penalty[1] / radius
+
+        def pressing() -> tuple[float, Array]:
+            _, normal, _ = self._lying(made)
+            return made.sign * float(normal @ self.system.GetObjectOutput(made.item, Output.Force)), normal
+
+        bodies = contact.body_a, contact.body_b
+        add_turning(self.system, friction, [self.marker(body, np.zeros(3)) for body in bodies], pressing, zone)
+        motion = Tree(self._mechanism).at(*self._mechanism.start())
+        w_a, w_b = (motion.w_WB[self._mechanism.body_index[body]] for body in bodies)
+        turns = np.linalg.norm(friction.resisted(touch.normal, w_a - w_b)) >= zone
+        return 0.0 if turns else float(np.linalg.norm(moment)) / radius
 
     def _add_hollow(self, wall: CurvedWall, wall_body: str, sphere: SphereShape, body: str) -> HollowSphere:
         """Adds the markers of a hollow sphere that stands for a wall, where it is at the start."""
