@@ -100,3 +100,13 @@ def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
     np.testing.assert_allclose(run["p_WB"].sel(body="parcel").to_numpy()[:, 0], x, atol=1e-3)  # half a step at 0.8 m/s
     pull = np.where(t < carried, mu * m * g, 0.0)
     np.testing.assert_allclose(run["drive.run"].to_numpy()[1:], pull[1:], atol=1e-5)
+
+
+@pytest.mark.parametrize("preset", ["matched", "tuned"])
+def test_pinocchio_tells_the_friction_of_a_driven_table_at_the_start(preset: str) -> None:
+    """Forces at the start belong to the motion's place at the start, also where steps take all at their middle."""
+    scene, grid = proofroll.load_scene("turntable"), {"until": 0.02, "every": 0.01}
+    run = proofroll.simulate(scene, f"pinocchio[formulation=impulses,preset={preset}]", **grid)
+    right = proofroll.simulate(scene, "truth", **grid)
+    for force in ("F2", "F3"):
+        assert abs(run[force].values - right[force].values).max() < 2e-3  # N

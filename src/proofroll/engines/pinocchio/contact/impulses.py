@@ -168,9 +168,10 @@ class ImpulseSteps:
 
     def kick(self, q: Array, v: Array) -> Impulses:
         """Impulses of the step from a state; changes nothing but scratch data."""
+        late = 0.5 * self._dt * self._midpoint
         if self._midpoint:
-            q = pin.integrate(self._model, q, 0.5 * self._dt * v)
-        J, free, inverse, touching = self.terms(q, v, self._dt)
+            q = pin.integrate(self._model, q, late * v)
+        J, free, inverse, touching = self.terms(q, v, self._dt, late)
         turning = self._turning(q, v, touching, 0.5 * self._dt) if self._midpoint else np.zeros((len(touching), 3))
         shifts = self._shifts(J, q, v, touching, turning)
         return self._turned(v, J, free, inverse, touching, shifts, self._dt, convex=self._settings.convex)
@@ -204,14 +205,15 @@ class ImpulseSteps:
             "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
         }
 
-    def terms(self, q: Array, v: Array, span: float) -> tuple[Array, Array, Array, list[Touching]]:
+    def terms(self, q: Array, v: Array, span: float, late: float = 0.0) -> tuple[Array, Array, Array, list[Touching]]:
         """Contact rows (contacts, 3, nv), velocity without impulses, inverse mass matrix, and geometry of the contacts.
 
-        The rows are slip velocities along the normal's :func:`frame_of_axis`, the normal last.
+        The rows are slip velocities along the normal's :func:`frame_of_axis`, the normal last; ``q`` belongs to the
+        time ``late`` [s] after the start of the step.
         """
         tree, model, data = self._tree, self._model, self._data
         touching = self._touched(data, q, v, [None] * len(self.contacts))
-        tree.now = self.t + 0.5 * span * self._midpoint
+        tree.now = self.t + late
         pulls = tree.pulls(data) if tree.pushed else None
         tau = tree.drives(q, v)
         rate = pin.aba(model, data, q, v, tau, pulls) if pulls else pin.aba(model, data, q, v, tau)
@@ -219,7 +221,7 @@ class ImpulseSteps:
         inverse = np.triu(pin.computeMinverse(model, data, q))
         inverse = inverse + np.triu(inverse, 1).T
         if len(tree.geared):
-            free, inverse = self._driven(q, free, inverse, span)
+            free, inverse = self._driven(q, free, inverse, span, late)
         pin.computeJointJacobians(model, data, q)
         J = np.zeros((len(touching), 3, model.nv))
         all_of = self._solver(tuple(range(len(touching))))
@@ -227,13 +229,13 @@ class ImpulseSteps:
             J[k] = self._posed(all_of, k, contact_touch)
         return J, free, inverse, touching
 
-    def _driven(self, q: Array, free: Array, inverse: Array, span: float) -> tuple[Array, Array]:
+    def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
         """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
 
         A driven joint has the rate of its motion at the end of the step, and comes back to its place.
         """
         tree, rows = self._tree, self._tree.geared
-        now, tree.now = tree.now, self.t + 0.5 * span * self._midpoint
+        now, tree.now = tree.now, self.t + late
         off = tree.apart(q)[0]
         tree.now = self.t + span
         rates = tree.apart(q)[1] - (_CLOSED if self._midpoint else 1.0) * off / self._dt
