@@ -1,4 +1,4 @@
-"""Curved walls of bodies in Exudyn: hollow spheres that follow the spheres over their walls.
+"""Walls in Exudyn that follow spheres: hollow spheres in place of curved walls, and planes of moving bodies.
 
 Exudyn has no contact between a sphere and a curved wall, but one with the inside of a sphere
 (``ObjectContactSphereSphere``). Its marker is moved on the wall's body before every Newton residual, so that it touches
@@ -13,6 +13,40 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
 from proofroll.engines.exudyn.ball.contact import ON_A_PLANE
 from proofroll.engines.exudyn.native import Output, exu
+
+
+class MovingPlane(NamedTuple):
+    """Triangle that stands for the plane of a body, and stays under a sphere.
+
+    Corners as far off as those of a standing plane would magnify the round-off of the body's rotation, so that Newton's
+    method would not converge.
+
+    Attributes:
+        marker, sphere: Exudyn's markers of the triangle, on its body, and of the centre of the sphere.
+        body: Exudyn's number of its body.
+        point, normal: of the plane, in Exudyn's axes of the body [m].
+    """
+
+    marker: Any
+    sphere: Any
+    body: Any
+    point: Array
+    normal: Array
+
+    def follow(self, system: Any) -> None:
+        """Moves the triangle to where the sphere is nearest to the plane."""
+        centre = _centre(system, self.sphere, self.body)
+        place = centre - self.normal * (self.normal @ (centre - self.point))
+        system.SetMarkerParameter(self.marker, "localPosition", place.tolist())
+
+
+def _centre(system: Any, sphere: Any, body: Any) -> Array:
+    """Place of a marker in Exudyn's axes of a body, from its centre of mass [m]; None: in the world."""
+    centre = np.array(system.GetMarkerOutput(sphere, Output.Position, exu.ConfigurationType.Current))
+    if body is None:
+        return centre
+    R = np.reshape(system.GetObjectOutputBody(body, Output.RotationMatrix, [0, 0, 0]), (3, 3))
+    return np.asarray(R.T @ (centre - system.GetObjectOutputBody(body, Output.Position, [0, 0, 0])))
 
 
 class HollowSphere(NamedTuple):
@@ -37,10 +71,7 @@ class HollowSphere(NamedTuple):
 
     def follow(self, system: Any) -> None:
         """Moves the hollow sphere to where the sphere is nearest to the wall."""
-        centre = np.array(system.GetMarkerOutput(self.sphere, Output.Position, exu.ConfigurationType.Current))
-        if self.body is not None:
-            R = np.reshape(system.GetObjectOutputBody(self.body, Output.RotationMatrix, [0, 0, 0]), (3, 3))
-            centre = R.T @ (centre - system.GetObjectOutputBody(self.body, Output.Position, [0, 0, 0]))
+        centre = _centre(system, self.sphere, self.body)
         place = self.turn @ (self.centre(self.turn.T @ centre + self.com) - self.com)
         system.SetMarkerParameter(self.marker, "localPosition", place.tolist())
 

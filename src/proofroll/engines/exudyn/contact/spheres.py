@@ -28,7 +28,7 @@ from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
-from proofroll.engines.exudyn.contact.hollow_spheres import HollowSphere, hollow_centre, hollow_radius
+from proofroll.engines.exudyn.contact.hollow_spheres import HollowSphere, MovingPlane, hollow_centre, hollow_radius
 from proofroll.engines.exudyn.contact.turning import add_turning
 from proofroll.engines.exudyn.integration import DIFFERENCED
 from proofroll.engines.exudyn.native import Output, exu, items
@@ -45,8 +45,9 @@ LACKING: Mapping[str, str] = {
     _CAPABILITY.SLIP_REBOUNDS: "this formulation has no rebounds",
     _CAPABILITY.CONTACT_REBOUNDS: "its restitution is a damping that comes near it with ever shorter steps alone",
 }
-# m: distance from the centre of the triangle that stands for a plane to its sides.
-_WIDE = 1e3
+# Distance from the centre of the triangle that stands for a plane to its sides, in metres, and in radii of the sphere
+# of one that follows it.
+_WIDE, _FOLLOWS = 1e3, 10.0
 # Missing friction at the start, in units of the largest contact force: less than the first counts as none; the
 # tolerance of accelerations is at most the second, as for soft loops.
 _LITTLE, _LARGEST = 1e-6, 0.5
@@ -82,7 +83,7 @@ class Spheres(Redundant):
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
         """Adds contacts at the depth of their load at the start, with spheres enlarged by that depth."""
         self._contacts: list[_Made] = []
-        self._hollow: list[HollowSphere] = []
+        self._following: list[HollowSphere | MovingPlane] = []
         self._softness, self._larger, self._builds_up = 0.0, 0.0, False
         if not mechanism.contacts:
             return
@@ -104,7 +105,7 @@ class Spheres(Redundant):
         moments = start.force[len(start.force) - len(dynamics.turning) :]
         for friction, moment in zip(dynamics.turning, moments, strict=True):
             lacking += self._add_turning(friction, moment, start.state.touching[friction.pressed_by], settings)
-        if self._hollow:
+        if self._following:
             self.system.SetPreNewtonResidualUserFunction(self._follow)
         load = float(np.abs(start.force[: len(mechanism.contacts)]).max(initial=0.0))
         self._builds_up = lacking > _LITTLE * load
@@ -134,17 +135,19 @@ class Spheres(Redundant):
             "contactDamping": 2 * math.sqrt(stiffness * self._moved(body, other)),
         }
         if isinstance(second, HalfSpace):
-            frame = frame_of_axis(second.normal)
+            ball, plane = self._add_plane(second, other, shape, body)
+            wide = _WIDE if other == WORLD else _FOLLOWS * shape.radius
+            frame = self._turns[other] @ frame_of_axis(second.normal)
             made = items.ObjectContactSphereTriangle(
-                markerNumbers=[self.marker(body, shape.centre), self.marker(other, second.point)],
+                markerNumbers=[ball, plane],
                 sphereRadius=shape.radius + sunk,
-                trianglePoints=exu.Vector3DList([_WIDE * frame @ np.array(corner) for corner in _CORNERS]),
+                trianglePoints=exu.Vector3DList([wide * frame @ np.array(corner) for corner in _CORNERS]),
                 includeEdges=0,
                 **law,
             )
         elif isinstance(second, CurvedWall):
             hollow = self._add_hollow(second, other, shape, body)
-            self._hollow.append(hollow)
+            self._following.append(hollow)
             made = items.ObjectContactSphereSphere(
                 markerNumbers=[hollow.sphere, hollow.marker],
                 spheresRadii=[shape.radius + sunk / 2, hollow.radius - sunk / 2],  # or what rolls would slip
@@ -179,13 +182,27 @@ class Spheres(Redundant):
         turns = np.linalg.norm(friction.resisted(touch.normal, w_a - w_b)) >= zone
         return 0.0 if turns else float(np.linalg.norm(moment)) / radius
 
+    def _add_plane(self, plane: HalfSpace, plane_body: str, sphere: SphereShape, body: str) -> tuple[Any, Any]:
+        """Adds the markers of a sphere and of the triangle that stands for a plane; that of a moving body follows."""
+        turn, com, number = self._turns[plane_body], self._com[plane_body], self.bodies[plane_body]
+        point, normal, ball = np.array(plane.point), np.array(plane.normal), self.marker(body, sphere.centre)
+        centre = point if plane_body == WORLD else self._seen_from(plane_body, body, sphere)
+        place = turn @ (centre - normal * (normal @ (centre - point)) - com)
+        marker = self.system.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=place))
+        if plane_body != WORLD:
+            self._following.append(MovingPlane(marker, ball, number, turn @ (point - com), turn @ normal))
+        return ball, marker
+
+    def _seen_from(self, wall_body: str, body: str, sphere: SphereShape) -> Array:
+        """Centre of a sphere at the start, in the frame of the wall's body [m]."""
+        index, motion = self._mechanism.body_index, Tree(self._mechanism).at(*self._mechanism.start())
+        wall, ball = index[wall_body], index[body]
+        centre = motion.p_WB[ball] + motion.R_WB[ball] @ sphere.centre
+        return np.asarray(motion.R_WB[wall].T @ (centre - motion.p_WB[wall]))
+
     def _add_hollow(self, wall: CurvedWall, wall_body: str, sphere: SphereShape, body: str) -> HollowSphere:
         """Adds the markers of a hollow sphere that stands for a wall, where it is at the start."""
-        mechanism = self._mechanism
-        motion = Tree(mechanism).at(*mechanism.start())
-        carrier, ball = mechanism.body_index[wall_body], mechanism.body_index[body]
-        centre = motion.p_WB[ball] + motion.R_WB[ball] @ sphere.centre
-        centre = motion.R_WB[carrier].T @ (centre - motion.p_WB[carrier])
+        centre = self._seen_from(wall_body, body, sphere)
         turn, com, radius = self._turns[wall_body], self._com[wall_body], hollow_radius(wall, centre, sphere.radius)
         place = turn @ (hollow_centre(wall, centre, sphere.radius, radius) - com)
         marker = items.MarkerBodyRigid(bodyNumber=self.bodies[wall_body], localPosition=place)
@@ -201,8 +218,8 @@ class Spheres(Redundant):
         )
 
     def _follow(self, system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG002 -- Exudyn's signature
-        for hollow in self._hollow:
-            hollow.follow(system)
+        for wall in self._following:
+            wall.follow(system)
 
     def _moved(self, *bodies: str) -> float:
         """Reduced mass of two bodies [kg]; the world counts as infinite."""
