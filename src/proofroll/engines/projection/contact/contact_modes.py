@@ -135,7 +135,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             spaces.append(space)
             return divided(space.H, push[:, None])[:, 0], np.zeros(0)
 
-        free = equations.solve(x, 0.0, closing)
+        free = equations.solve(x, 0.0, None if equations.coupled else closing)
+        spaces = spaces or [equations.tree.space(free.bodies)]
         moving, touching = self._moving(x), self._touching(x)
         S, origin = spaces[0].S.reshape(-1, 4, 4), free.bodies.origin
         J, rate = np.zeros((len(touching), 3, len(S))), np.zeros((len(touching), 3))
@@ -163,7 +164,12 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             relative = moving[contact.body_a].w - moving[contact.body_b].w
             rate[k] = friction.resisted_rate(there, relative, spin_rate, fastest)
         flat = J.reshape(-1, J.shape[2]).T
-        return ContactsThere(touching, J, divided(spaces[0].H, flat).reshape(-1, *J.shape[:2]), rate)
+        if equations.coupled:
+            assert equations.split is not None  # of the last solution
+            response = equations.split(flat, np.zeros((equations.coupled, flat.shape[1])))[0]
+        else:
+            response = divided(spaces[0].H, flat)
+        return ContactsThere(touching, J, response.reshape(-1, *J.shape[:2]), rate)
 
     def _touching(self, x: Array) -> tuple[Touching, ...]:
         """Gap, normal and sliding velocity of each contact."""

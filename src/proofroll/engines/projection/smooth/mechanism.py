@@ -71,8 +71,8 @@ class ProjectionMechanism:
         self._timed = any(map(varies, mechanism.signals))
         limited = any(actuator.limit is not None for actuator in mechanism.actuators)
         switched = bool(switched_joints(mechanism)) or limited or bool(breaks(mechanism.signals))
-        if mechanism.contacts and (mechanism.loops or mechanism.couplings or mechanism.prescribed):
-            raise Refused("contacts are followed in trees, without loops, couplings and prescribed motions")
+        if mechanism.contacts and (mechanism.loops or mechanism.couplings):
+            raise Refused("contacts are followed in trees, without loops and couplings")
         if any(contact.box_slot is not None for contact in mechanism.contacts):
             raise Refused(
                 "a box meets boxes and capsules at places that begin and end at borders of faces, and this solver ends "
