@@ -50,6 +50,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, coef
 from proofroll.elements.mechanism.scene.signal import breaks, varies
 from proofroll.engines.projection.contact.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.contact.slip_directions import SlipDirections
+from proofroll.engines.projection.smooth.connections import Bodies
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.smooth.elimination import Space
 from proofroll.engines.projection.smooth.elimination import solved as divided
@@ -68,12 +69,14 @@ class ContactsThere(NamedTuple):
         J: derivative of each sliding velocity with respect to ν, (contacts, 3, nv).
         response: H⁻¹ Jᵀ with the mass matrix H, (nv, contacts, 3).
         rate: rate of each sliding velocity without contact forces, (contacts, 3).
+        free: equations of motion solved without contact forces.
     """
 
     touching: tuple[Touching, ...]
     J: Array
     response: Array
     rate: Array
+    free: SolvedState
 
 
 class ContactMotion(AlternatingMotion[ContactMode]):
@@ -137,7 +140,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
         free = equations.solve(x, 0.0, None if equations.coupled else closing)
         spaces = spaces or [equations.tree.space(free.bodies)]
-        moving, touching = self._moving(x), self._touching(x)
+        moving = self._moving(x, free.bodies)
+        touching = self._touching(x, moving)
         S, origin = spaces[0].S.reshape(-1, 4, 4), free.bodies.origin
         J, rate = np.zeros((len(touching), 3, len(S))), np.zeros((len(touching), 3))
         for k, (contact, there) in enumerate(zip(self._bodies, touching, strict=False)):
@@ -169,11 +173,11 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             response = equations.split(flat, np.zeros((equations.coupled, flat.shape[1])))[0]
         else:
             response = divided(spaces[0].H, flat)
-        return ContactsThere(touching, J, response.reshape(-1, *J.shape[:2]), rate)
+        return ContactsThere(touching, J, response.reshape(-1, *J.shape[:2]), rate, free)
 
-    def _touching(self, x: Array) -> tuple[Touching, ...]:
+    def _touching(self, x: Array, moving: dict[str, Moving]) -> tuple[Touching, ...]:
         """Gap, normal and sliding velocity of each contact."""
-        moving, joints = self._moving(x), self._equations.watched(x) if self._joints else {}
+        joints = self._equations.watched(x) if self._joints else {}
         pairs = [(moving[contact.body_a], moving[contact.body_b]) for contact in self._bodies]
         bodies = [touch(contact, a, b) for contact, (a, b) in zip(self._bodies, pairs, strict=True)]
         turns = [(friction, friction.pressed_by) for friction in self._turning]
@@ -183,11 +187,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             *(friction.touching(bodies[k], pairs[k][0].w - pairs[k][1].w) for friction, k in turns),
         )
 
-    def _moving(self, x: Array) -> dict[str, Moving]:
+    def _moving(self, x: Array, bodies: Bodies) -> dict[str, Moving]:
         """Motion of the frames of all bodies, and of the world."""
         equations = self._equations
         r, _, v, _ = equations.parts(x)
-        bodies = equations.bodies(x)
         moving = {"world": Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))}
         for name, i in self._index.items():
             if i >= 0:
@@ -295,12 +298,17 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _rates(self, y: Array) -> Array:
         now = self.at(y)
-        load = np.einsum("kin,ki->n", now.J, self.forces(now, self.mode))
-        return self._equations.rates(y[:-1], load)
+        return self._pushed_rates(y, now, self.forces(now, self.mode))
+
+    def _pushed_rates(self, y: Array, now: ContactsThere, force: Array) -> Array:
+        """Time derivative of x with contact forces."""
+        return self._equations.pushed_rates(y[:-1], now.free, np.einsum("nki,ki->n", now.response, force))
 
     def _look(self, y: Array) -> None:
         """Stores the directions of slips, to detect reversals."""
-        self._slipping.look(float(y[-1]), self.mode, self._touching(y[:-1]))
+        x = y[:-1]
+        moving = self._moving(x, self._equations.bodies(x))
+        self._slipping.look(float(y[-1]), self.mode, self._touching(x, moving))
 
     def _enter(self, t: float, x: Array, mode: ContactMode) -> None:
         opened = [k for k, acting in enumerate(mode) if acting.kind == "open" and self.mode[k].kind != "open"]
@@ -383,8 +391,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         if self._timed or any(acting.kind == "slip" for acting in mode):
             return False
         now = self.at(y := self._settled(y, mode))
-        load = np.einsum("kin,ki->n", now.J, self.forces(now, mode))
-        n, rate = len(self._equations.mass), self._equations.rates(y[:-1], load)
+        n, rate = len(self._equations.mass), self._pushed_rates(y, now, self.forces(now, mode))
         sizes = np.repeat([1.0, self._unit / self._rate], 3 * n)  # for velocities and angular velocities
         moves, will = (float(np.abs(sizes * part[7 * n : 13 * n]).max()) for part in (y, rate))
         return moves <= self._still and will <= _STANDS * self._unit * self._rate

@@ -224,13 +224,25 @@ class DependentCoordinates:
 
     def pushed(self, x: Array, change: Array) -> Array:
         """State after a change of the velocities ν, (nv,)."""
-        bodies, x = self.bodies(x), x.copy()
-        motion = self.tree.twists(bodies, change)[:-1]
-        pose, inverse = bodies.pose[:-1], bodies.inverse[:-1]
+        linear, angular = self._of_bodies(self.bodies(x), change)
+        x = x.copy()
         _, _, v, w = self.parts(x)
-        v += (motion @ pose[:, :, 3:])[:, :3, 0]
-        w += 0.5 * (inverse @ motion @ pose)[:, :3, :3].reshape(-1, 9) @ SKEW.T
+        v += linear
+        w += angular
         return x
+
+    def pushed_rates(self, x: Array, free: SolvedState, change: Array) -> Array:
+        """Time derivative ẋ after a change of the accelerations ν̇, (nv,), of a solution at x."""
+        _, q, v, w = self.parts(x)
+        linear, angular = self._of_bodies(free.bodies, change)
+        return _joined(v, quaternion_rates(q, w), free.linear + linear, free.angular + angular)
+
+    def _of_bodies(self, bodies: Bodies, velocities: Array) -> tuple[Array, Array]:
+        """Velocities and angular velocities (own axes) of the bodies for velocities ν, (bodies, 3) each."""
+        motion = self.tree.twists(bodies, velocities)[:-1]
+        pose, inverse = bodies.pose[:-1], bodies.inverse[:-1]
+        turning = 0.5 * (inverse @ motion @ pose)[:, :3, :3].reshape(-1, 9) @ SKEW.T
+        return (motion @ pose[:, :, 3:])[:, :3, 0], turning
 
     def watched(self, x: Array) -> dict[int, tuple[float, float]]:
         """Coordinate and velocity of each joint with dry friction, stops, a coupling or a motion, by its index."""
