@@ -82,19 +82,27 @@ class ContactWatch:
         """See :class:`proofroll.core.element_abilities.TellsBounces`."""
         return sampled_bounces(self._element.mechanism, columns)
 
-    def _reconciled(self, located: Sequence[Event], seen: Sequence[Event]) -> Sequence[Event]:
-        """The engine's own events of contacts, unless its samples show one that is not among them."""
+    def _reconciled(self, located: Sequence[Event], seen: Sequence[tuple[Event, float]]) -> Sequence[Event]:
+        """The engine's own events of contacts, unless its samples show one that is not among them.
+
+        Args:
+            located: the engine's own.
+            seen: events in the samples, each with the time from which it may have been going on [s].
+        """
         names = {contact.name for contact in self._element.mechanism.contacts}
         events = [event for event in located if event.name in names]
         left = list(events)
-        for event in seen:
-            match = next((candidate for candidate in left if _alike(candidate, event)), None)
+        for event, since in seen:
+            match = next((candidate for candidate in left if _alike(candidate, event, since)), None)
             if match is None:
-                return seen
+                return [event for event, _ in seen]
             left.remove(match)
         return events
 
-    def _events(self, times: FloatArray, followed: Followed, pressed: FloatArray, speeds: FloatArray) -> list[Event]:
+    def _events(
+        self, times: FloatArray, followed: Followed, pressed: FloatArray, speeds: FloatArray
+    ) -> list[tuple[Event, float]]:
+        """Events in order, each with the time from which it may have been going on [s]."""
         presses = normal_forces(followed, pressed) > PRESSES * self._element.force
         # Several engines have forces only after a first step, and a slip from rest is slow at first
         presses[0] |= presses[1] & (followed.gap[0] <= _CLOSED * self._element.length)
@@ -107,7 +115,7 @@ class ContactWatch:
         slips[0] |= presses[0] & slips[1]
         slips = presses & _without_lone(slips)
         stands = (speeds <= _CREEPS * self._element.speed) & ~slips.any(axis=1)
-        events = []
+        events: list[tuple[Event, float]] = []
         for c, contact in enumerate(self._element.mechanism.contacts):
             states = forces[:, c], presses[:, c], slips[:, c]
             for k in range(len(times) - 1):
@@ -116,18 +124,21 @@ class ContactWatch:
                     kind = EventKind.REST
                 if kind:
                     low, high = float(times[k]), float(times[k + 1])
-                    events.append(
-                        Event(
-                            kind=kind, time=min(max(moment, low), high), time_low=low, time_high=high, name=contact.name
-                        )
-                    )
-        return sorted(events, key=lambda event: event.time)
+                    event = Event(kind, min(max(moment, low), high), low, high, contact.name)
+                    since = float(times[_rises_since(followed.slip[:, c], k)]) if kind == EventKind.SLIP else low
+                    events.append((event, since))
+        return sorted(events, key=lambda pair: pair[0].time)
 
 
-def _alike(located: Event, seen: Event) -> bool:
+def _rises_since(slip: FloatArray, k: int) -> int:
+    """Number of the sample from which a slip speed rises up to sample k; one that grazes creeps long before it counts."""
+    return next((j for j in range(k, 0, -1) if slip[j - 1] >= slip[j]), 0)
+
+
+def _alike(located: Event, seen: Event, since: float) -> bool:
     """True if an event may be the one seen in the samples: same contact and kind, at most one interval off."""
     wide = seen.time_high - seen.time_low
-    near = seen.time_low - wide <= located.time <= seen.time_high + wide
+    near = since - wide <= located.time <= seen.time_high + wide
     return (
         near
         and located.name == seen.name
