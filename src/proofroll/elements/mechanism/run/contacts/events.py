@@ -131,7 +131,7 @@ class ContactWatch:
 
 
 def _rises_since(slip: FloatArray, k: int) -> int:
-    """Number of the sample from which a slip speed rises up to sample k; one that grazes creeps long before it counts."""
+    """Number of the sample from which a slip speed rises up to sample k: one that grazes first creeps."""
     return next((j for j in range(k, 0, -1) if slip[j - 1] >= slip[j]), 0)
 
 
