@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from balls_as_bodies import as_bodies
 
 import proofroll
 from proofroll.core.errors import Refused
@@ -90,7 +91,7 @@ def test_a_ball_slides_on_each_wall_as_its_truth_says(engine: str, kind: str) ->
 @pytest.mark.parametrize(("name", "error"), [("sphere_in_cylinder", 2.5e-3), ("bowl", 2e-5), ("cone", 4e-6)])
 def test_pinocchios_midpoint_is_of_second_order_on_curved_walls(name: str, error: float) -> None:
     """Half the step gives a quarter of the error, for the wall's turning within a step (J̇v) is part of its rows."""
-    scene, grid = proofroll.load_scene(name), {"until": 0.4, "every": 0.04}
+    scene, grid = as_bodies(name), {"until": 0.4, "every": 0.04}
     right = proofroll.simulate(scene, "truth", **grid)["p_WB"].values
     settings = [f"pinocchio[formulation=impulses,preset=tuned,dt={dt}]" for dt in (4e-3, 2e-3)]
     far, near = (abs(proofroll.simulate(scene, setting, **grid)["p_WB"].values - right).max() for setting in settings)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from balls_as_bodies import as_bodies
 
 import proofroll
 from proofroll.core.scene import Scene
@@ -105,7 +106,7 @@ def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
 @pytest.mark.parametrize("preset", ["matched", "tuned"])
 def test_pinocchio_tells_the_friction_of_a_driven_table_at_the_start(preset: str) -> None:
     """Forces at the start belong to the motion's place at the start, also where steps take all at their middle."""
-    scene, grid = proofroll.load_scene("turntable"), {"until": 0.02, "every": 0.01}
+    scene, grid = as_bodies("turntable"), {"until": 0.02, "every": 0.01}
     run = proofroll.simulate(scene, f"pinocchio[formulation=impulses,preset={preset}]", **grid)
     right = proofroll.simulate(scene, "truth", **grid)
     for force in ("F2", "F3"):
@@ -114,8 +115,8 @@ def test_pinocchio_tells_the_friction_of_a_driven_table_at_the_start(preset: str
 
 def test_exudyns_triangle_of_a_turning_plane_does_not_press_by_round_off() -> None:
     """It is small and stays under the ball; Newton's method did not converge with corners a kilometre off."""
-    scene, grid = proofroll.load_scene("turntable"), {"until": 0.2, "every": 0.05}
-    run = proofroll.simulate(scene, "exudyn[formulation=spheres,preset=tuned,dt=1e-3]", **grid)
+    scene, grid = as_bodies("turntable"), {"until": 0.2, "every": 0.05}
+    run = proofroll.simulate(scene, "exudyn[formulation=spheres,dt=1e-3]", **grid)
     right = proofroll.simulate(scene, "truth", **grid)
     assert run.attrs["status"] == "done"
     assert abs(run["p_WB"].values - right["p_WB"].values).max() < 1e-4  # m
@@ -125,7 +126,7 @@ def test_exudyns_triangle_of_a_turning_plane_does_not_press_by_round_off() -> No
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
 def test_the_projection_solver_rolls_a_ball_on_a_driven_table(tilt: float) -> None:
     """Path, forces and slip on a plane that a motion turns are the truth's to round-off."""
-    scene, grid = proofroll.load_scene("turntable", tilt=tilt), {"until": 0.1, "every": 0.05}
+    scene, grid = as_bodies("turntable", tilt=tilt), {"until": 0.1, "every": 0.05}
     run, right = (proofroll.simulate(scene, engine, **grid) for engine in ("projection", "truth"))
     for field in ("p_WB", "v_WB", "F2", "F3", "N"):
         assert abs(run[field].values - right[field].values).max() < 2e-13  # 2e-14 is seen

@@ -38,7 +38,13 @@ class Projection:
     name: ClassVar[str] = "projection"
     title: ClassVar[str] = "projection solver"
     witness: ClassVar[bool] = True
-    provides: ClassVar[Mapping[str, frozenset[str]]] = {"dependent": mechanism.PROVIDES}
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        **dict.fromkeys(_OF_BALLS, ALL_OF_A_BALL | {BallCapability.MOVING_WALL}),
+        "dependent": mechanism.PROVIDES,
+    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        name: {BallCapability.IMPACTS: "its constraint holds the ball on the wall"} for name in _OF_BALLS
+    }
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {

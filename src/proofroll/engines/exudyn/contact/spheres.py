@@ -30,7 +30,6 @@ from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereSh
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
 from proofroll.engines.exudyn.contact.hollow_spheres import HollowSphere, MovingPlane, hollow_centre, hollow_radius
 from proofroll.engines.exudyn.contact.turning import add_turning
-from proofroll.engines.exudyn.integration import DIFFERENCED
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.smooth import redundant
