@@ -189,7 +189,8 @@ class Spheres(Redundant):
         place = turn @ (centre - normal * (normal @ (centre - point)) - com)
         marker = self.system.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=place))
         if plane_body != WORLD:
-            self._following.append(MovingPlane(marker, ball, number, turn @ (point - com), turn @ normal))
+            place, axis = turn @ (point - com), turn @ normal
+            self._following.append(MovingPlane(marker=marker, sphere=ball, body=number, point=place, normal=axis))
         return ball, marker
 
     def _seen_from(self, wall_body: str, body: str, sphere: SphereShape) -> Array:

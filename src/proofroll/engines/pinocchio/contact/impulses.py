@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_
 from proofroll.engines.pinocchio.ball.contact import LARGEST_FRICTION
 from proofroll.engines.pinocchio.ball.plane_contact import solver_of
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
-from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningMoments
+from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningImpulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
@@ -128,7 +128,7 @@ class ImpulseSteps:
         self.joints = JointRows(tree)
         stops = [item.joint.restitution for item in self.joints.stops]
         self._returned = np.concatenate([self.restitution, np.zeros(len(self.joints.friction)), stops])
-        self._moments = TurningMoments(tree, float(settings.solver_tolerance or 0.0))
+        self._moments = TurningImpulses(tree, float(settings.solver_tolerance or 0.0))
         self._pressed_by = [friction.pressed_by for friction in self._moments.frictions]
         self._solvers: dict[tuple[int, ...], _Solver] = {}
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.

@@ -32,7 +32,7 @@ class Pressed(NamedTuple):
     held: Array
 
 
-class TurningMoments:
+class TurningImpulses:
     """Friction against turning of all contacts.
 
     While a body turns, the moment opposes the mean of the angular velocities before and after a step; it holds what it
@@ -70,20 +70,20 @@ class TurningMoments:
             time: for messages [s].
 
         Raises:
-            Diverged: they are not found.
+            Diverged: the iterations do not settle.
         """
-        moments, along = np.zeros((len(rows), 3)), np.zeros(len(v))
+        moments, impulses = np.zeros((len(rows), 3)), np.zeros(len(v))
         for _ in range(_MOST):
-            outcome, before = pressed(along), moments.copy()
+            outcome, last = pressed(impulses), moments.copy()
             bounds = np.array([friction.friction for friction in self.frictions]) * outcome.normal
             for k, (row, bound) in enumerate(zip(rows, bounds, strict=True)):
                 moments[k] += _stopping(row, inverse, outcome)
                 if np.linalg.norm(moments[k]) > bound:
                     turning = row @ (v + outcome.v)
                     moments[k] = -bound * turning / (float(np.linalg.norm(turning)) or 1.0)
-            along = np.einsum("kin,ki->n", rows, moments)
-            if np.abs(moments - before).max() <= _SETTLED * self._tolerance * bounds.max():
-                return moments, along
+            impulses = np.einsum("kin,ki->n", rows, moments)
+            if np.abs(moments - last).max() <= _SETTLED * self._tolerance * bounds.max():
+                return moments, impulses
         raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")
 
 

@@ -173,7 +173,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             response = equations.split(flat, np.zeros((equations.coupled, flat.shape[1])))[0]
         else:
             response = divided(spaces[0].H, flat)
-        return ContactsThere(touching, J, response.reshape(-1, *J.shape[:2]), rate, free)
+        response = response.reshape(-1, *J.shape[:2])
+        return ContactsThere(touching=touching, J=J, response=response, rate=rate, free=free)
 
     def _touching(self, x: Array, moving: dict[str, Moving]) -> tuple[Touching, ...]:
         """Gap, normal and sliding velocity of each contact."""

@@ -124,7 +124,8 @@ class ContactWatch:
                     kind = EventKind.REST
                 if kind:
                     low, high = float(times[k]), float(times[k + 1])
-                    event = Event(kind, min(max(moment, low), high), low, high, contact.name)
+                    time = min(max(moment, low), high)
+                    event = Event(kind=kind, time=time, time_low=low, time_high=high, name=contact.name)
                     since = float(times[_rises_since(followed.slip[:, c], k)]) if kind == EventKind.SLIP else low
                     events.append((event, since))
         return sorted(events, key=lambda pair: pair[0].time)
