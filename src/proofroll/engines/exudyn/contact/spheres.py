@@ -44,8 +44,8 @@ LACKING: Mapping[str, str] = {
     _CAPABILITY.SLIP_REBOUNDS: "this formulation has no rebounds",
     _CAPABILITY.CONTACT_REBOUNDS: "its restitution is a damping that comes near it with ever shorter steps alone",
 }
-# Distance from the centre of the triangle that stands for a plane to its sides, in metres, and in radii of the sphere
-# of one that follows it.
+# Distance from the centre of the triangle that stands for a plane to its sides, in metres, and of one that follows its
+# sphere in radii of that: the sphere moves by far less than one between two residuals.
 _WIDE, _FOLLOWS = 1e3, 10.0
 # Missing friction at the start, in units of the largest contact force: less than the first counts as none; the
 # tolerance of accelerations is at most the second, as for soft loops.

@@ -65,7 +65,7 @@ class ImpulseRun(MechanismRun):
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, accelerations, joint forces in the next step, and empty loop forces."""
         q, v, kick = self.steps.q, self.steps.v, self._kick()
-        touching = self.steps.terms(q, v, self._dt)[-1]
+        touching = self.steps.terms(q, v, self._dt).touching
         self.tree.now = self.steps.t
         data = self._placed(kick.v)
         forces = self.tree.pulls(data)

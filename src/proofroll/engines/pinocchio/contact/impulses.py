@@ -80,6 +80,22 @@ class Impulses(NamedTuple):
     driving: Array
 
 
+class StepTerms(NamedTuple):
+    """Terms of a step's equations.
+
+    Attributes:
+        J: contact rows, (contacts, 3, nv): slip velocities along the normal's :func:`frame_of_axis`, the normal last.
+        free: velocity after the step without impulses, (nv,).
+        inverse: of the mass matrix, (nv, nv).
+        touching: geometry of the contacts.
+    """
+
+    J: Array
+    free: Array
+    inverse: Array
+    touching: list[Touching]
+
+
 def _carried(vector: Array, start: Array, end: Array) -> Array:
     """A vector turned by the smallest rotation that takes a unit vector to another one less than a half turn away."""
     axis = cross(start, end)
@@ -134,9 +150,9 @@ class ImpulseSteps:
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
         try:
-            J, _, inverse, _ = self.terms(self.q, self.v, self._dt)
+            terms = self.terms(self.q, self.v, self._dt)
             for k in range(len(self.contacts)):
-                self._check(k, J[k] @ inverse @ J[k].T)
+                self._check(k, terms.J[k] @ terms.inverse @ terms.J[k].T)
         except Diverged as error:
             raise Refused(str(error)) from None
 
@@ -172,19 +188,21 @@ class ImpulseSteps:
         late = 0.5 * self._dt * self._midpoint
         if self._midpoint:
             q = pin.integrate(self._model, q, late * v)
-        J, free, inverse, touching = self.terms(q, v, self._dt, late)
-        turning = self._turning(q, v, touching, 0.5 * self._dt) if self._midpoint else np.zeros((len(touching), 3))
-        shifts = self._shifts(J, q, v, touching, turning)
-        return self._turned(v, J, free, inverse, touching, shifts, self._dt, convex=self._settings.convex)
+        terms = self.terms(q, v, self._dt, late)
+        turning = np.zeros((len(terms.touching), 3))
+        if self._midpoint:
+            turning = self._turning(q, v, terms.touching, 0.5 * self._dt)
+        shifts = self._shifts(terms.J, q, v, terms.touching, turning)
+        return self._turned(v, terms, shifts, self._dt, convex=self._settings.convex)
 
     def beginning(self, span: float, *, convex: bool) -> Impulses:
         """Impulses of a short time from now on, with the turning of the contacts (J̇v); open gaps stay open."""
-        J, free, inverse, touching = self.terms(self.q, self.v, span)
-        shifts = np.zeros((len(self._returned), 3))
+        terms = self.terms(self.q, self.v, span)
+        touching, shifts = terms.touching, np.zeros((len(self._returned), 3))
         shifts[: len(touching)] = self._turning(self.q, self.v, touching, span)
         apart = [touch.absent or touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
         shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
-        return self._turned(self.v, J, free, inverse, touching, shifts, span, convex=convex)
+        return self._turned(self.v, terms, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:
         """Normals, positions and widest cones of contact points in Pinocchio, with gaps of the shapes at its poses."""
@@ -206,12 +224,8 @@ class ImpulseSteps:
             "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
         }
 
-    def terms(self, q: Array, v: Array, span: float, late: float = 0.0) -> tuple[Array, Array, Array, list[Touching]]:
-        """Contact rows (contacts, 3, nv), velocity without impulses, inverse mass matrix, and geometry of the contacts.
-
-        The rows are slip velocities along the normal's :func:`frame_of_axis`, the normal last; ``q`` belongs to the
-        time ``late`` [s] after the start of the step.
-        """
+    def terms(self, q: Array, v: Array, span: float, late: float = 0.0) -> StepTerms:
+        """Terms of a step of length ``span`` [s]; ``q`` belongs to the time ``late`` [s] after its start."""
         tree, model, data = self._tree, self._model, self._data
         touching = self._touched(data, q, v, [None] * len(self.contacts))
         tree.now = self.t + late
@@ -228,7 +242,7 @@ class ImpulseSteps:
         all_of = self._solver(tuple(range(len(touching))))
         for k, contact_touch in enumerate(touching):
             J[k] = self._posed(all_of, k, contact_touch)
-        return J, free, inverse, touching
+        return StepTerms(J=J, free=free, inverse=inverse, touching=touching)
 
     def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
         """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
@@ -352,30 +366,20 @@ class ImpulseSteps:
                 shifts[k, :2] = self.contacts[k].tangential_restitution * (J[k, :2] @ v)
         return shifts
 
-    def _turned(
-        self,
-        v: Array,
-        J: Array,
-        free: Array,
-        inverse: Array,
-        touching: Sequence[Touching],
-        shifts: Array,
-        span: float,
-        *,
-        convex: bool,
-    ) -> Impulses:
+    def _turned(self, v: Array, terms: StepTerms, shifts: Array, span: float, *, convex: bool) -> Impulses:
         """Impulses of a step that begins with the velocity ``v``, with those of friction against turning.
 
         An impact has no moment of friction.
         """
         if not self._moments.frictions:
-            return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
+            return self._solved(terms, shifts, span, convex=convex)
+        J, free, inverse, touching = terms
         rows, count = self._moments.rows(self._data, touching), len(touching)
         soft = J[:, 2] @ v >= -_SOFT * self._gravity * span
         kicks = list[Impulses]()
 
-        def pressed(along: Array) -> Pressed:
-            kick = self._solved(J, free + inverse @ along, inverse, touching, shifts, span, convex=convex)
+        def pressed(impulses: Array) -> Pressed:
+            kick = self._solved(terms._replace(free=free + inverse @ impulses), shifts, span, convex=convex)
             kicks[:] = [kick]
             sizes = np.array([touch.normal @ push for touch, push in zip(touching, kick.impulse, strict=True)])
             held = [np.zeros((0, len(v)))]
@@ -384,24 +388,15 @@ class ImpulseSteps:
                 held.append(J[k] if aside < _INSIDE * self.contacts[k].friction * sizes[k] else J[k, 2:])
             return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(held))
 
-        moments, along = self._moments.found(rows, v, inverse, pressed, self.t)
+        moments, impulses = self._moments.found(rows, v, inverse, pressed, self.t)
         by_contact = np.zeros((count, 3))
         np.add.at(by_contact, self._pressed_by, moments)
-        driving = kicks[0].driving - self._motions[1].T @ along
+        driving = kicks[0].driving - self._motions[1].T @ impulses
         return kicks[0]._replace(moment=by_contact, driving=driving)
 
-    def _solved(
-        self,
-        J: Array,
-        free: Array,
-        inverse: Array,
-        touching: Sequence[Touching],
-        shifts: Array,
-        span: float,
-        *,
-        convex: bool,
-    ) -> Impulses:
+    def _solved(self, terms: StepTerms, shifts: Array, span: float, *, convex: bool) -> Impulses:
         """Impulses of dry friction and of all contacts and stops that would close, also due to other impulses."""
+        J, free, inverse, touching = terms
         count, v = len(touching), free
         blocks = [*J, *self.joints.J[:, None]]
         of_blocks = [*shifts[:count], *shifts[count:, 2:]]

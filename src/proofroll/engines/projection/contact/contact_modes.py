@@ -280,7 +280,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         force, forces = self.solve()[1], np.full((2, joints), np.nan)
         for contact in self._joints:
             forces[:, contact.joint.number] = 0.0
-        for contact, push in zip(self._joints, force[len(self._bodies) :], strict=False):
+        along_joints = force[len(self._bodies) : len(force) - len(self._turning)]
+        for contact, push in zip(self._joints, along_joints, strict=True):
             forces[int(contact.side != 0), contact.joint.number] += contact.direction @ push
         return {"contact_force": force[: len(self._bodies)], "friction": forces[0], "stop": forces[1]}
 
@@ -475,6 +476,6 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
             part, slides = slice(3 * place, 3 * place + 3), sliding[place]
             response = line_response(self.contacts[k], frame @ G[part, part] @ frame.T, now.touching)
-            along = -force[place, 1:] if slides is None else slides
-            mode[k] = first_mode(done[place], frame, along, frame.T @ response @ frame)
+            direction = -force[place, 1:] if slides is None else slides
+            mode[k] = first_mode(done[place], frame, direction, frame.T @ response @ frame)
         return tuple(mode)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.events import Event
-from proofroll.elements.mechanism.run.contacts.events import ContactWatch
+from proofroll.elements.mechanism.run.contacts.events import _CREEPS, ContactWatch
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.run.sampling import MechanismSample
 from proofroll.files.scene_file import load_scene
@@ -64,6 +64,24 @@ def test_an_engines_own_event_is_taken_unless_samples_contradict_it(kind: str, t
     events = seen([0] * 7, slides, [1.0] * 7, ball(), [own])
     assert (events == [own]) == taken
     assert [event.kind for event in events] == ["rest"]
+
+
+@pytest.mark.parametrize(("time", "taken"), [(0.0004, True), (0.0103, True), (0.0493, True), (0.0503, False)])
+def test_a_slip_that_grazes_is_taken_where_it_begins(time: float, taken: bool) -> None:
+    """Slip that rises for long before it counts may have begun at any of these samples, and not after it counts."""
+    creeps = _CREEPS * ball().speed
+    slides = [[k**2 * creeps / 12, 0, 0] for k in range(8)]  # counts at the fifth sample
+    own = Event("slip", time, time, time, "contact")
+    assert (seen([0] * 8, slides, [1.0] * 8, ball(), [own]) == [own]) == taken
+
+
+def test_a_slip_before_another_rise_is_none_of_it() -> None:
+    """Where creep has come to rest before it rises, the slip began with the last rise."""
+    creeps = _CREEPS * ball().speed
+    slides = [[part * creeps, 0, 0] for part in (0.1, 0.5, 0.0, 0.0, 0.0, 0.2, 0.6, 3.0, 5.0, 7.0)]
+    early = Event("slip", 0.005, 0.005, 0.005, "contact")
+    (found,) = seen([0] * 10, slides, [1.0] * 10, ball(), [early])
+    assert (found.time_low, found.time_high) == pytest.approx((0.06, 0.07))
 
 
 def test_what_slides_back_has_turned() -> None:
