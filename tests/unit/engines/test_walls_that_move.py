@@ -123,6 +123,21 @@ def test_exudyns_triangle_of_a_turning_plane_does_not_press_by_round_off() -> No
     assert abs(run["N"].values - right["N"].values).max() < 1e-9  # N; 1e-7 with corners a kilometre off
 
 
+def test_exudyns_triangle_of_a_moving_plane_follows_a_sphere_that_goes_far() -> None:
+    """A ball that slides by twenty of its radii over a plane that a motion lifts stays on it."""
+    joints = (
+        Joint("lift", "prismatic", "world", "floor", axis=(0.0, 0.0, 1.0), motion=Formula("0.1*t")),
+        Joint("free", "free", "world", "ball", q0=(0, 0, 0.02, 1, 0, 0, 0), v0=(4.0, 0, 0.1, 0, 0, 0)),
+    )
+    shapes = (Geometry("top", "floor", "plane"), Geometry("round", "ball", "sphere", radius=0.02))
+    bodies = (Body("floor", 5.0), Body("ball", 0.1, inertia=(2e-5,) * 3))
+    mechanism = Mechanism(bodies, joints, geometries=shapes, pairs=(Pair("touch", ("round", "top"), 0.0),))
+    scene = Scene("lift", "", (MechanismElement(mechanism),))
+    run = proofroll.simulate(scene, "exudyn[formulation=spheres,dt=1e-3]", until=0.1, every=0.05)
+    place = run["p_WB"].sel(body="ball").to_numpy()[-1]
+    np.testing.assert_allclose(place, [0.4, 0.0, 0.03], atol=1e-6)  # m; it fell by 25 mm beside the triangle
+
+
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
 def test_the_projection_solver_rolls_a_ball_on_a_driven_table(tilt: float) -> None:
     """Path, forces and slip on a plane that a motion turns are the truth's to round-off."""

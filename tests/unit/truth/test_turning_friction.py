@@ -16,7 +16,9 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.parts import Force
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.truth.switched_truth import truth_of
 
 RADIUS, MASS, MOMENT, G = 0.05, 0.7, 0.0009, 9.81
@@ -203,3 +205,32 @@ def test_engines_follow_friction_against_turning(
     right = proofroll.simulate(scene, "truth", until=0.2, every=0.1)
     for field, error in zip(("p_WB", "v_WB", "w_WB"), errors, strict=True):
         assert np.abs(at(run, field) - at(right, field)).max() < error
+
+
+@pytest.mark.parametrize(
+    "friction", [{"rolling_resistance": 0.01}, {"rolling_resistance": 0.01, "spinning_friction": 0.01}]
+)
+def test_the_projection_solver_holds_what_its_weight_would_turn(friction: dict[str, float]) -> None:
+    """A ball whose centre of mass lies 2 mm beside its middle slides without turning: its resistance acts on 10 mm."""
+    scene = ball(law(friction=0.0, **friction), (1.0, 0, 0, 0, 0, 0))
+    element = scene.elements[0]
+    assert isinstance(element, MechanismElement)
+    (body,) = element.mechanism.bodies
+    heavy = replace(element.mechanism, bodies=(replace(body, com=(0.002, 0.0, 0.0)),))
+    run = proofroll.simulate(replace(scene, elements=(MechanismElement(heavy),)), "projection", until=0.2, every=0.1)
+    assert np.abs(at(run, "w_WB")).max() < 1e-12  # rad/s; without resistance it turns by 10 rad/s^2
+    np.testing.assert_allclose(at(run, "p_WB")[-1], [0.2, 0.0, RADIUS], atol=1e-13)  # m
+
+
+@pytest.mark.parametrize(("engine", "error"), [("projection", 1e-11), ("pinocchio[formulation=impulses]", 1e-2)])
+def test_a_growing_moment_turns_a_ball_once_it_exceeds_its_friction(engine: str, error: float) -> None:
+    """Against a moment k t a ball stands until k t = f m g, and then has the spin k (t - f m g/k)²/(2 J)."""
+    f, grows, until = 1e-3, 0.1, 0.2
+    scene = ball(law(spinning_friction=f))
+    element = scene.elements[0]
+    assert isinstance(element, MechanismElement)
+    twisted = replace(element.mechanism, forces=(Force("twist", "ball", "moment", (0.0, 0.0, Formula(f"{grows}*t"))),))
+    run = proofroll.simulate(replace(scene, elements=(MechanismElement(twisted),)), engine, until=until, every=0.05)
+    begins = f * MASS * G / grows
+    spin = [grows * max(t - begins, 0.0) ** 2 / (2 * MOMENT) for t in run["time"].to_numpy()]
+    np.testing.assert_allclose(at(run, "w_WB")[:, 2], spin, atol=error)  # rad/s; of first order 7e-3
