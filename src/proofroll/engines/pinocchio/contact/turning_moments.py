@@ -12,8 +12,8 @@ from proofroll.elements.mechanism.contact.turning import turning_frictions
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
-# Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one: what
-# the iteration leaves is not seen beside what the solver leaves.
+# Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one:
+# what the iteration leaves is not seen beside what the solver leaves.
 _MOST, _SETTLED = 100, 1e-2
 # Response to moments, in parts of that without contacts, that is round-off of what contacts hold.
 _HELD = 1e-9
