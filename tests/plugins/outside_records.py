@@ -15,6 +15,7 @@ import numpy as np
 
 JOINTS = ("FL_HAA", "FL_HFE", "FL_KFE", "FR_HAA", "FR_HFE", "FR_KFE")
 POSE = np.array([0.1, 0.7, -1.4, 0.1, 0.7, -1.4])
+CENTRE = (0.02, 0.0, 0.01)  # of the trunk
 KP, KD, SCALE, ARMATURE, EFFORT, RATE = 5.0, 0.2, 0.25, 1e-3, 0.8, 50
 OFFSET = 0.15 * np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0])
 QUATERNION = np.array([0.9, 0.3, -0.2, 0.25]) / np.linalg.norm([0.9, 0.3, -0.2, 0.25])
@@ -77,6 +78,21 @@ class Loop:
     signs: np.ndarray = field(default_factory=lambda: np.ones(6))
     lag: int = 0
     gravity: float = 9.81
+    periods: float = 1.0
+    repeated: int = -1
+    back: bool = False
+    velocity_back: bool = False
+    spin_back: bool = False
+    at_centre: bool = False
+    factors: Mapping[str, float] = field(default_factory=dict)
+    relative: bool = False
+    hold: bool = False
+    smoothing: float = 1.0
+    clip: float = np.inf
+    raw: bool = False
+    damping: float = 0.0
+    friction: float = 0.0
+    payload: float = 0.0
 
     def record(self, program: Callable[[Loop], Simulator]) -> dict[str, np.ndarray]:
         """Columns over time of a run, each named as in the documentation."""
@@ -84,32 +100,47 @@ class Loop:
         from proofroll.robots.probe import make
 
         sim, act, rows = program(self), make(JOINTS), []
-        action, queue = np.zeros(6), [POSE.copy() for _ in range(self.late)]
-        period = round(1 / RATE / self.step) + self.more_steps
+        action, counts, queue = np.zeros(6), np.zeros(6), [POSE.copy() for _ in range(self.late)]
+        period = round(self.periods / RATE / self.step) + self.more_steps
         before = sim.state()
+        factor = {key: self.factors.get(key, 1.0) for key in ("q", "v", "v_WB_W", "w_WB_B", "last")}
         for k in range(self.steps + 1):
             state = sim.state()
-            if k % period == 0:
+            if k % period == 0 and k != self.repeated * period:
                 quaternion = np.roll(state["q_WB"], -1) if self.xyzw else state["q_WB"]
                 R, body = _matrix(quaternion), _matrix(state["q_WB"])
+                R = R.T if self.back else R
+                velocity, spin = state["v_WB"], body.T @ state["w_WB"]
+                if self.at_centre:
+                    velocity = velocity + np.cross(state["w_WB"], body @ np.array(CENTRE))
+                velocity = body.T @ velocity if self.body_velocity else velocity
+                velocity = body @ velocity if self.velocity_back else velocity
+                spin = state["w_WB"] if self.world_spin else body.T @ spin if self.spin_back else spin
+                places = state["q"] - POSE if self.relative else state["q"]
                 seen = {
-                    "q": state["q"][list(self.seen)],
-                    "v": state["v"][list(self.seen)],
-                    "v_WB_W": body.T @ state["v_WB"] if self.body_velocity else state["v_WB"],
-                    "w_WB_B": state["w_WB"] if self.world_spin else body.T @ state["w_WB"],
+                    "q": factor["q"] * places[list(self.seen)],
+                    "v": factor["v"] * state["v"][list(self.seen)],
+                    "v_WB_W": factor["v_WB_W"] * velocity,
+                    "w_WB_B": factor["w_WB_B"] * spin,
                     "gravity_B": R.T @ np.array([0, 0, self.gravity_sign]),
                 }
-                action = act(Observation(time=k * self.step, p_WB=state["p_WB"], R_WB=R, last=action, **seen))
+                last = factor["last"] * action
+                action = act(Observation(time=k * self.step, p_WB=state["p_WB"], R_WB=R, last=last, **seen))
+                clipped = np.clip(action, -self.clip, self.clip)
+                action = action if self.raw else clipped
+                counts = counts + self.smoothing * (clipped - counts)
                 placed = np.zeros(6)
-                placed[list(self.to_joint)] = action
+                placed[list(self.to_joint)] = counts
                 queue.append(self.signs * (self.pose + self.scale * placed))
                 target = queue.pop(0)
             servo = before if self.lag else state
-            effort = np.clip(self.kp * (target - servo["q"]) - self.kd * servo["v"], -self.limit, self.limit)
+            if not self.hold or k % period == 0:
+                effort = np.clip(self.kp * (target - servo["q"]) - self.kd * servo["v"], -self.limit, self.limit)
             row = {"time": np.array([k * self.step]), **state, **{f"observed.{key}": seen[key] for key in seen}}
             rows.append({**row, "action": action, "target": target, "effort": effort})
             before = state
-            sim.step(effort, target)
+            lost = self.damping * state["v"] + self.friction * np.sign(state["v"])
+            sim.step(effort - lost, target)
         return {key: np.array([row[key] for row in rows]) for key in rows[0]}
 
 
@@ -148,6 +179,9 @@ class MujocoAlone:
         for joint in spec.joints:
             if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
                 joint.armature, joint.actfrclimited = loop.armature, 0
+        if loop.payload:
+            mass = spec.worldbody.first_body().add_body(name="payload", pos=[0.1, 0.05, 0.12])
+            mass.mass, mass.inertia, mass.explicitinertial = loop.payload, [1e-9, 1e-9, 1e-9], True
         self.add_servos(spec, loop)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
@@ -199,6 +233,9 @@ class PinocchioAlone:
         self.model = pinocchio.buildModelFromXML(urdf(), pinocchio.JointModelFreeFlyer())
         self.model.armature = np.array([*np.zeros(6), *np.full(6, loop.armature)])
         self.model.gravity.linear = np.array([0, 0, -loop.gravity])
+        if loop.payload:
+            place = np.array([0.1, 0.05, 0.12])
+            self.model.inertias[1] += pinocchio.Inertia(loop.payload, place, np.zeros((3, 3)))
         self.data, self.h = self.model.createData(), loop.step
         x, y, z, w = *QUATERNION[1:], QUATERNION[0]
         self.q = np.array([0, 0, 1, x, y, z, w, *(POSE + OFFSET)])
@@ -251,7 +288,33 @@ MISTAKES: Mapping[str, tuple[str, str, dict[str, Any]]] = {
     "state before": ("state_before", "effort", {"lag": 1}),
     "gravity 9.80": ("gravity", "acceleration", {"gravity": 9.80}),
     "no gravity": ("gravity", "acceleration", {"gravity": 0.0}),
+    "half the rate": ("rate", "instants", {"periods": 2}),
+    "a quarter of the rate": ("rate", "instants", {"periods": 4, "steps": 200}),
+    "twice the rate": ("rate", "instants", {"periods": 0.5}),
+    "four times the rate": ("rate", "instants", {"periods": 0.25}),
+    "an action repeated": ("repeated", "instants", {"repeated": 2}),
+    "two instants late": ("late", "target", {"late": 2, "steps": 200}),
+    "breadth first, back": ("joint_order", "target", {"to_joint": (0, 2, 4, 1, 3, 5)}),
+    "rotation back": ("rotation", "observation", {"back": True}),
+    "velocity back": ("velocity_frame", "observation", {"velocity_back": True}),
+    "spin back": ("spin_frame", "observation", {"spin_back": True}),
+    "velocity of the centre": ("velocity_point", "observation", {"at_centre": True}),
+    "rates at 0.05": ("observed_v", "observation", {"factors": {"v": 0.05}}),
+    "spin at 0.25": ("observed_w_WB_B", "observation", {"factors": {"w_WB_B": 0.25}}),
+    "velocity at 2": ("observed_v_WB_W", "observation", {"factors": {"v_WB_W": 2.0}}),
+    "relative coordinates": ("observed_pose", "observation", {"relative": True}),
+    "no last action": ("observed_last", "action", {"factors": {"last": 0.0}}),
+    "half of the last action": ("observed_last", "action", {"factors": {"last": 0.5}}),
+    "held efforts": ("held_effort", "effort", {"hold": True}),
+    "low pass": ("smoothing", "target", {"smoothing": 0.3}),
+    "clipped actions": ("action_clip", "action", {"clip": 0.2}),
+    "clipped targets": ("action_clip", "target", {"clip": 0.2, "raw": True}),
+    "damping": ("damping", "acceleration", {"damping": 0.02}),
+    "dry friction": ("friction", "acceleration", {"friction": 0.03}),
+    "payload": ("payload", "acceleration", {"payload": 0.15}),
 }
+# Mistakes of observations, which show at the action where no observation is recorded.
+OBSERVED = tuple(name for name, (_, layer, _) in MISTAKES.items() if layer == "observation")
 
 
 def columns_of(record: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

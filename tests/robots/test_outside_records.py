@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from outside_records import CONTROL, JOINTS, MISTAKES, PROGRAMS, Loop, columns_of, urdf, written
+from outside_records import CONTROL, JOINTS, MISTAKES, OBSERVED, PROGRAMS, Loop, columns_of, urdf, written
 
 from proofroll.robots.control_judge import RecordJudgement, judge_record
 
@@ -52,6 +52,14 @@ def test_a_right_record_of_another_program_holds(
         ("pinocchio", "", "no armature"),
         ("pinocchio", "single", "xyzw"),
         ("pinocchio", "3", "legs swapped"),
+        ("mujoco", "", "half the rate"),
+        ("pinocchio", "single", "four times the rate"),
+        ("mujoco", "3", "an action repeated"),
+        ("pinocchio", "", "two instants late"),
+        ("mujoco", "single", "velocity of the centre"),
+        ("pinocchio", "", "held efforts"),
+        ("mujoco", "", "clipped targets"),
+        ("pinocchio", "single", "low pass"),
     ],
 )
 def test_a_mistake_of_another_program_is_named(
@@ -72,6 +80,81 @@ def test_all_mistakes_of_another_program_are_named(
     for name in MISTAKES:
         if (name, digits) != (FINE, "3"):
             _named(judged(program, digits, **MISTAKES[name][2]), name)
+
+
+def without(columns: dict[str, np.ndarray], *kinds: str) -> dict[str, np.ndarray]:
+    """Columns but those of some kinds."""
+    return {name: values for name, values in columns.items() if not name.startswith(kinds)}
+
+
+def judged_without(folder: Path, name: str, *kinds: str, program: str = "mujoco") -> RecordJudgement:
+    """Judgement of a record of a mistake that lacks columns of some kinds."""
+    (folder / "legs.urdf").write_text(urdf())
+    (folder / "legs.toml").write_text(CONTROL)
+    columns = columns_of(Loop(**(MISTAKES[name][2] if name else {})).record(PROGRAMS[program]))
+    record = written(without(columns, *kinds), folder / "record.csv")
+    return judge_record(record, folder / "legs.urdf", folder / "legs.toml")
+
+
+def require_first(judgement: RecordJudgement, layer: str, cause: str) -> None:
+    """Checks the first layer that does not hold, and its first cause."""
+    wrong = next(item for item in judgement.layers if not item.holds)
+    assert (wrong.name, wrong.causes[0].id) == (layer, cause)
+
+
+@pytest.mark.parametrize("name", ["xyzw", "velocity back", "rates at 0.05"])
+def test_a_mistake_of_an_observation_shows_in_actions(name: str, tmp_path: Path) -> None:
+    """Where no observation is recorded, its mistakes are named at the action."""
+    require_first(judged_without(tmp_path, name, "observed"), "action", MISTAKES[name][0])
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("name", OBSERVED)
+def test_mistakes_of_observations_show_in_actions(name: str, tmp_path: Path) -> None:
+    """Every mistake of an observation is named at the action, where none is recorded."""
+    require_first(judged_without(tmp_path, name, "observed", program="pinocchio"), "action", MISTAKES[name][0])
+
+
+@pytest.mark.parametrize("name", ["damping", "dry friction", "payload"])
+def test_what_no_file_has_is_named_with_what_it_explains(name: str, tmp_path: Path) -> None:
+    """Damping, dry friction and a payload are named at the accelerations with their sizes, and close them."""
+    layer = judged_without(tmp_path, name).layers[-1]
+    size = next(iter(MISTAKES[name][2].values()))
+    assert (layer.name, layer.holds, layer.causes[0].id) == ("acceleration", False, MISTAKES[name][0])
+    assert layer.causes[0].size == pytest.approx(size, rel=1e-6)
+    assert layer.causes[0].after < 1e-6 < layer.residual  # type: ignore[operator]
+
+
+def test_a_payload_shows_in_states_alone(tmp_path: Path) -> None:
+    """A payload is named with its mass and place from states alone, and a right record of states holds."""
+    kinds = ("observed", "action", "target", "effort")
+    judgement = judged_without(tmp_path, "payload", *kinds)
+    require_first(judgement, "motion", "payload")
+    assert "trunk carries 0.15 kg more, at (0.1, 0.05, 0.12) m" in "\n".join(judgement.lines())
+
+
+def test_two_mistakes_at_two_layers_are_both_named(tmp_path: Path) -> None:
+    """Each layer is computed from recorded ones, so mistakes at several layers are named one by one."""
+    (tmp_path / "legs.urdf").write_text(urdf())
+    (tmp_path / "legs.toml").write_text(CONTROL)
+    columns = columns_of(Loop(kd=0.1, pose=np.zeros(6), xyzw=True).record(PROGRAMS["mujoco"]))
+    judgement = judge_record(written(columns, tmp_path / "record.csv"), tmp_path / "legs.urdf", tmp_path / "legs.toml")
+    causes = {layer.name: layer.causes[0].id for layer in judgement.layers if not layer.holds and layer.causes}
+    assert causes["observation"] == "quaternion"
+    assert causes["target"] == "pose_missing"
+    assert causes["effort"] == "kd"
+
+
+def test_a_quaternion_of_few_digits_is_no_mistake(tmp_path: Path) -> None:
+    """What a program loses of a quaternion, its length shows; other columns have all digits."""
+    (tmp_path / "legs.urdf").write_text(urdf())
+    (tmp_path / "legs.toml").write_text(CONTROL)
+    columns = columns_of(Loop().record(PROGRAMS["mujoco"]))
+    columns |= {
+        name: np.float32(values).astype(float) * (1 + 1e-5) for name, values in columns.items() if name[:5] == "q_WB."
+    }
+    judgement = judge_record(written(columns, tmp_path / "record.csv"), tmp_path / "legs.urdf", tmp_path / "legs.toml")
+    assert judgement.agrees, "\n".join(judgement.lines())
 
 
 def _named(judgement: RecordJudgement, name: str) -> None:
@@ -174,3 +257,61 @@ def _in_base(quaternion: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).inv().apply(vectors))
+
+
+@pytest.mark.parametrize("layout", ["playground", "isaaclab", "legged_gym"])
+def test_arrays_of_a_training_framework(layout: str, tmp_path: Path) -> None:
+    """Arrays are read with the quaternion, frames, point and order of joints of their program, in single precision."""
+    (tmp_path / "legs.urdf").write_text(urdf())
+    (tmp_path / "legs.toml").write_text(CONTROL)
+    ours = Loop().record(PROGRAMS["mujoco"])
+    turned, spin = ours["q_WB"], ours["w_WB"]
+    by_level = [0, 3, 1, 4, 2, 5] if layout == "isaaclab" else range(6)
+    joints = {key: ours[key][:, list(by_level)] for key in ("q", "v", "action", "target", "effort")}
+    if layout == "playground":
+        base = _in_base(turned, spin)
+        arrays = {
+            "qpos": np.concatenate([ours["p_WB"], turned, joints["q"]], axis=1),
+            "qvel": np.concatenate([ours["v_WB"], base, joints["v"]], axis=1),
+            "ctrl": joints["target"],
+            "action": joints["action"],
+        }
+    else:
+        centre = -_in_base(turned * [1, -1, -1, -1], np.tile(-np.array([0.02, 0, 0.01]), (len(turned), 1)))
+        moving = ours["v_WB"] + np.cross(spin, centre)
+        scalar = turned if layout == "isaaclab" else np.roll(turned, -1, axis=1)
+        names = ("root_state_w", "joint_pos", "joint_vel", "applied_torque")
+        names = names if layout == "isaaclab" else ("root_states", "dof_pos", "dof_vel", "torques")
+        values = (
+            np.concatenate([ours["p_WB"], scalar, moving, spin], axis=1),
+            *(joints[k] for k in ("q", "v", "effort")),
+        )
+        arrays = dict(zip(names, values, strict=True)) | {"actions": joints["action"]}
+    stored = {name: values.astype(np.float32) for name, values in arrays.items()}
+    np.savez(tmp_path / "record.npz", dt=1e-3, **stored)
+    judgement = judge_record(tmp_path / "record.npz", tmp_path / "legs.urdf", tmp_path / "legs.toml", layout=layout)
+    assert judgement.agrees, "\n".join(judgement.lines())
+    assert [layer.name for layer in judgement.layers if layer.residual is not None][:2] == ["instants", "action"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "lacking", "said"),
+    [
+        ([], (), "say whose arrays these are: playground, isaaclab"),
+        (["--as", "gym"], (), "choose the program whose arrays these are"),
+        (["--as", "isaacgym"], (), "isaacgym calls it dof_pos"),
+        (["--as", "playground"], ("dt",), "give an array time [s], or a number dt"),
+    ],
+)
+def test_arrays_that_cannot_be_read(
+    asked: list[str], lacking: tuple[str, ...], said: str, proofroll: Proofroll, tmp_path: Path
+) -> None:
+    """Arrays without the name of their program, with a wrong one, or without times are one line."""
+    (tmp_path / "legs.urdf").write_text(urdf())
+    (tmp_path / "legs.toml").write_text(CONTROL)
+    arrays = {"qpos": np.zeros((9, 13)), "qvel": np.zeros((9, 12)), "dt": np.array(0.01)}
+    np.savez(tmp_path / "record.npz", **{key: values for key, values in arrays.items() if key not in lacking})
+    files = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
+    code, _, err = proofroll("judge", str(tmp_path / "record.npz"), *files, *asked)
+    assert code == 2
+    assert said in err

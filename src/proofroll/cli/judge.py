@@ -28,9 +28,12 @@ def judge(
         typer.Option("--map", help="Your columns: t=time,theta=q.pivot[deg],x=tip.x[cm]; units are converted."),
     ] = None,
     robot: Annotated[
-        Path | None, typer.Option(help="The robot file (URDF, MJCF) of a record with actions or efforts (.csv).")
+        Path | None, typer.Option(help="The robot file (URDF, MJCF) of a record with actions or efforts.")
     ] = None,
     control: Annotated[Path | None, typer.Option(help="With --robot: the controller's file (.toml).")] = None,
+    layout: Annotated[
+        str, typer.Option("--as", help="With --robot: whose arrays: playground, isaaclab, isaacgym, legged_gym.")
+    ] = "",
     because: Annotated[str, typer.Option(help="Why that is close enough.")] = "",
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the truth is given up.")] = RUN_TIME_LIMIT,
     as_json: options.Json = False,
@@ -49,7 +52,7 @@ def judge(
         either = f", and {named} is none either" if named and not Path(named).is_file() else ""
         raise InputError("run", run, f"there is no such file{either}; proofroll judge FILE SCENE")
     if robot is not None or control is not None:
-        _judge_record(run, robot, control, _names(columns), as_json=as_json)
+        _judge_record(run, robot, control, _names(columns), layout, as_json=as_json)
     from proofroll.files.scene_file import load_scene
     from proofroll.studies.judging import judge as judging
 
@@ -75,7 +78,7 @@ def _names(columns: list[str] | None) -> dict[str, str]:
 
 
 def _judge_record(
-    record: Path, robot: Path | None, control: Path | None, names: Mapping[str, str], *, as_json: bool
+    record: Path, robot: Path | None, control: Path | None, names: Mapping[str, str], layout: str, *, as_json: bool
 ) -> None:
     """Judges a record of a robot under a controller, and exits."""
     from proofroll.core.errors import InputError
@@ -88,7 +91,7 @@ def _judge_record(
     if source is None or not isinstance(source[0], JudgesRecords):
         raise InputError("--robot", robot, "give the path of a robot file, .urdf or .xml")
     with options.spinner(f"layers of {record}"):
-        judged = source[0].judge_record(record, robot, control, names)
+        judged = source[0].judge_record(record, robot, control, names, layout)
     if as_json:
         options.write_json(judged)
     else:

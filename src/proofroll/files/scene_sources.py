@@ -110,14 +110,17 @@ class JudgesRecords(Protocol):
     """Ability of a reader that judges records of its scenes under a controller, without a simulation."""
 
     @staticmethod
-    def judge_record(record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None) -> JudgedRecord:
-        """Judgement of the record in a CSV file.
+    def judge_record(
+        record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None, layout: str = ""
+    ) -> JudgedRecord:
+        """Judgement of the record in a CSV file, or in a file of arrays.
 
         Args:
             record: path of the record.
             robot: path of the file of the scene.
             control: path of the controller's file.
             names: column of the record -> its name here, perhaps with its unit, ``q.hip[deg]``.
+            layout: program whose arrays the file has; empty: it has columns.
 
         Raises:
             InputError: a file is wrong, or they do not fit.

@@ -1,89 +1,227 @@
-"""Gravity, scale of efforts and armature of a record in the air, by least squares of its accelerations."""
+"""Robot in the air whose accelerations are recorded: gravity, efforts, inertias and losses, by least squares.
+
+M dv/dt + armature dv/dt + damping v + friction sign v + payload = scale · effort + gravity - h. What the right numbers
+leave is held against the rounding of the record; a number that is not right counts if with it no more than rounding is
+left.
+"""
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.number_format import error as short
+from proofroll.core.number_format import with_bar
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.air import AirRobot
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
 from proofroll.robots.control_record import BASE, ControlRecord
 from proofroll.robots.model import Array
+from proofroll.robots.record_layer import LayerCause
 
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEWEST_ROWS = 4
-_SAFETY = 10.0  # on the standard error: what is left over is an error of the scheme, and no noise
-_ALIKE = 10.0  # sums of squares that are left and tell nothing apart differ by no more
+_SAFETY = 10.0  # on what rounding of the record leaves, whose size is estimated and whose errors are not independent
 _EQUAL = 1e-3  # part of an interval by which intervals may differ
+_ROUND_OFF = 1e-9  # part of the forces: round-off of a sum of some terms
+_HELPS = 0.1  # part of a difference that a cause may leave where the scheme of the program is not known
+_SMALL = 1e-6  # smallest number that is told, in its unit
+# Number -> what it is called, and its unit; gravity and efforts are in parts of the right ones.
+_NUMBERS: Mapping[str, tuple[str, str]] = {
+    "gravity": ("the gravity is", "of the right one"),
+    "effort": ("the effort scale is", "of the right one"),
+    "armature": ("the armature is", "of the right one"),
+    "damping": ("joints have damping of", "N m s/rad or N s/m"),
+    "friction": ("joints have dry friction of", "N m or N"),
+}
 
 
 @dataclass(frozen=True)
 class AirFit:
-    """Parameters of a robot in the air.
+    """Accelerations of a robot in the air against the right ones, in parts of the largest forces.
 
     Attributes:
-        names: of the parameters: gravity and the scale of efforts, in parts of the right ones; armature in parts of the
-            law's, or in kg m² where the law has none.
-        values, right, errors: fitted, by the law, and error bars; shape (3,).
+        off: root mean square of what the right numbers leave.
+        bar: part of it that the rounding of the record explains.
+        causes: numbers with which no more than rounding is left; empty where the right ones leave no more.
         imitated: True if the record fits kd at the velocity after a step h, and explicit kd with an armature of h kd
             more as well.
+        tried: number of numbers and bodies that were tried.
     """
 
-    names: tuple[str, ...]
-    values: Array
-    right: Array
-    errors: Array
-    imitated: bool
+    off: float
+    bar: float
+    causes: tuple[LayerCause, ...] = ()
+    imitated: bool = False
+    tried: int = 0
 
 
-def acceleration_fit(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -> AirFit | str:
+@dataclass(frozen=True)
+class _Rows:
+    """Forces at rows of a record, whitened by the masses, one after the other.
+
+    Attributes:
+        left: what the right numbers leave, (numbers,).
+        columns: number -> what one more of it takes away, (numbers,).
+        added: body -> the same of its mass, first moment [kg m] and inertia about its origin, (numbers, 10).
+        rounding: what rounding of the record makes of ``left``.
+        unknown: what half an interval between rows makes of it, as where the steps of a program are not the rows.
+        size: root mean square of the forces.
+    """
+
+    left: Array
+    columns: Mapping[str, Array]
+    added: Mapping[str, Array]
+    rounding: float
+    unknown: float
+    size: float
+
+    @property
+    def off(self) -> float:
+        return _rms(self.left)
+
+    @cached_property
+    def exact(self) -> bool:
+        """True if rounding explains what the right numbers leave, alone and along each number."""
+        parts = [abs(float(column @ self.left)) / float(np.linalg.norm(column)) for column in self.columns.values()]
+        return max(parts, default=0.0) <= _SAFETY * self.rounding and self.off <= _SAFETY * self.rounding
+
+
+def acceleration_fit(
+    record: ControlRecord, law: ControlLaw, mechanism: Mechanism, efforts: Array, held: Array
+) -> AirFit | str:
     """Fit of a record with a row for each step or a few steps, or the reason why there is none.
 
-    M dv/dt + armature dv/dt = scale · effort + gravity - h; with implicit kd there is also h kd dv/dt on the left.
+    Args:
+        record: with the state.
+        law: the law as it should be.
+        mechanism: the robot.
+        efforts: that act from each row on, (times, n).
+        held: True at rows at which no target changes, (times,).
     """
-    efforts, targets = record.stacked("effort", law.joints), record.stacked("target", law.joints)
-    if efforts is None:
-        return "the record has no columns effort.JOINT"
     robot = AirRobot(mechanism, law.change(armature=np.zeros(len(law.joints)), gravity=1.0))
     motion = _motion(record, robot)
     if isinstance(motion, str):
         return motion
     at, velocities, base_axes = motion
-    step = float(np.diff(record.time).mean())
-    held = np.ones(len(record.time), bool)
-    if targets is not None:
-        held[1:] = np.all(targets[1:] == targets[:-1], axis=1)
-    fits = []
     # A method adds steps to the velocity of a floating base along the world's axes, or along the base's.
     moving = [(velocities, base_axes)] + ([] if robot.base is None else [(np.array([v for _, v in at]), None)])
-    for central, (rated, axes) in itertools.product((False, True), moving):
-        rows = np.flatnonzero(held[1:-1]) + 1 if central else np.arange(len(record.time) - 1)
-        if len(rows) < _FEWEST_ROWS:
-            continue
-        rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(_MOST_ROWS, len(rows))).astype(int))]
-        before, width = (rows - 1, 2 * step) if central else (rows, step)
-        rates = (rated[rows + 1] - rated[before]) / width
-        try:
-            table = _table(robot, mechanism, law, [at[row] for row in rows], rates, efforts[rows], axes, rows)
-        except (Diverged, Refused) as error:
-            return str(error)
-        for implicit in (False, True):
-            fits.append((*_solved(table, step if implicit else 0.0), implicit))
-    if not fits:
+    table = _Table(record, law, robot, mechanism, at, efforts)
+    trials: list[tuple[bool, _Rows]] = []
+    try:
+        for central, (rated, axes) in itertools.product((False, True), moving):
+            rows = np.flatnonzero(held[1:-1]) + 1 if central else np.arange(len(record.time) - 1)
+            if len(rows) < _FEWEST_ROWS:
+                continue
+            rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(_MOST_ROWS, len(rows))).astype(int))]
+            for implicit in (False, True):
+                trials.append((implicit, table.rows(rows, rated, axes, central=central, implicit=implicit)))
+                if trials[-1][1].exact and not implicit:
+                    return AirFit(
+                        trials[-1][1].off / trials[-1][1].size, _SAFETY * trials[-1][1].rounding / trials[-1][1].size
+                    )
+    except (Diverged, Refused) as error:
+        return str(error)
+    if not trials:
         return "too few rows lie between instants"
-    right = np.array([law.gravity, 1.0, 1.0 if law.armature.any() else 0.0])
-    least = min(square for _, _, square, _ in fits)
-    alike = [fit for fit in fits if fit[2] <= _ALIKE * least]
-    values, errors, _, implicit = min(alike, key=lambda fit: float((np.abs(fit[0] - right) / fit[1]).max()))
-    imitated = implicit and not all(fit[3] for fit in alike)
-    return AirFit(
-        names=("gravity", "effort scale", "armature"), values=values, right=right, errors=errors, imitated=imitated
-    )
+    return _judged(trials, law, robot)
+
+
+def _judged(trials: Sequence[tuple[bool, _Rows]], law: ControlLaw, robot: AirRobot) -> AirFit:
+    """Fit with the scheme that leaves least, and causes where that is more than rounding."""
+    implicit, best = min(trials, key=lambda trial: trial[1].off / trial[1].size)
+    scale = 1 / best.size
+    if best.exact:
+        armed = [rows for is_implicit, rows in trials if not is_implicit and _fits(rows, "implicit")]
+        return AirFit(best.off * scale, _SAFETY * best.rounding * scale, imitated=implicit and bool(armed))
+    causes: dict[str, LayerCause] = {}
+    for _, rows in trials:
+        for cause in _causes(rows, law, robot):
+            if cause.id not in causes or cause.after < causes[cause.id].after:
+                causes[cause.id] = cause
+    named = sorted(causes.values(), key=lambda cause: cause.after)
+    bar = _SAFETY * best.rounding
+    if not named:  # the steps of the program may be no rows
+        bar = max(bar, min(rows.unknown for _, rows in trials))
+    return AirFit(best.off * scale, bar * scale, tuple(named), tried=len(_NUMBERS) + len(best.added))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _fits(rows: _Rows, name: str) -> bool:
+    """True if a number of 1 leaves no more than rounding."""
+    return _rms(rows.left - rows.columns[name]) <= _SAFETY * rows.rounding
+
+
+def _causes(rows: _Rows, law: ControlLaw, robot: AirRobot) -> Iterator[LayerCause]:
+    """Numbers with which no more than rounding is left, or a small part if rounding is not all that is left anyway."""
+    enough = max(_SAFETY * rows.rounding, _HELPS * rows.off if rows.off > rows.unknown else 0.0)
+    right = {"gravity": law.gravity, "effort": 1.0, "armature": float(law.armature.any())}
+    for name, (words, unit) in _NUMBERS.items():
+        column = rows.columns[name]
+        square = float(column @ column)
+        if not square:
+            continue
+        change = float(column @ rows.left) / square
+        after, value = _rms(rows.left - change * column), right.get(name, 0.0) + change
+        bar = _SAFETY * max(rows.rounding, after) / np.sqrt(square) + _ROUND_OFF
+        if after > enough or abs(change) <= bar or (name != "effort" and value < -bar):
+            continue
+        text, interval = with_bar(value, bar, 1)
+        in_unit = "kg m² or kg" if name == "armature" and not law.armature.any() else unit
+        yield _cause(name, f"{words} {text} ± {interval} {in_unit}", value, rows, after)
+    yield from _heavier(rows, robot, enough)
+
+
+def _cause(name: str, sentence: str, value: float, rows: _Rows, after: float) -> LayerCause:
+    proof = f"forces off by {short(rows.off / rows.size)} of their size, by {short(after / rows.size, 1)} with that"
+    return LayerCause(name, f"{sentence} ({proof})", value, after / rows.size)
+
+
+def _heavier(rows: _Rows, robot: AirRobot, enough: float) -> Iterator[LayerCause]:
+    """A body that weighs more: a mass at a point of it, else any inertia."""
+    found: list[tuple[float, str, float, str]] = []
+    for body, columns in rows.added.items():
+        sizes = np.linalg.norm(columns, axis=0)
+        seen = sizes > _ROUND_OFF * sizes.max()
+        values = np.zeros(10)
+        values[seen] = np.linalg.lstsq(columns[:, seen] / sizes[seen], rows.left, rcond=_SMALL)[0] / sizes[seen]
+        if _rms(rows.left - columns @ values) > enough:
+            continue
+        mass = robot.mechanism.bodies[robot.mechanism.body_index[body]].mass
+        start = np.array([values[0] if values[0] > 0 else 0.05 * mass, *values[1:4]])
+
+        def left(numbers: Array, columns: Array = columns) -> Array:
+            return rows.left - columns @ _point(numbers)
+
+        numbers = least_squares_parameters(left, start, float(np.abs(start).max()) or 1.0)
+        after = _rms(left(numbers))
+        if after <= enough and numbers[0] > 0:
+            place = ", ".join(f"{x:.3g}" for x in (numbers[1:] / numbers[0]).round(4).tolist())
+            found.append((after, body, float(numbers[0]), f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"))
+        elif values[0] > 0:
+            after = _rms(rows.left - columns @ values)
+            words = f"mass, centre and inertia of {body} are others, {values[0]:+.3g} kg"
+            found.append((_SAFETY * after, body, float(values[0]), words))
+    for after, _, mass, words in sorted(found)[:1]:
+        yield _cause("payload", words, mass, rows, after)
+
+
+def _point(numbers: Array) -> Array:
+    """Mass, first moment and inertia (xx, yy, zz, xy, xz, yz) of a point of a mass with a first moment."""
+    m, (x, y, z) = numbers[0], numbers[1:]
+    xx, yy, zz, xy, xz, yz = np.array([x * x, y * y, z * z, x * y, x * z, y * z]) / (m or np.inf)
+    return np.array([m, x, y, z, yy + zz, xx + zz, xx + yy, -xy, -xz, -yz])
 
 
 def states_of(record: ControlRecord, robot: AirRobot) -> list[tuple[Array, Array]] | str:
@@ -120,48 +258,124 @@ def _motion(record: ControlRecord, robot: AirRobot) -> tuple[list[tuple[Array, A
     return at, velocities, rotations
 
 
-def _table(
-    robot: AirRobot,
-    mechanism: Mechanism,
-    law: ControlLaw,
-    at: list[tuple[Array, Array]],
-    rates: Array,
-    efforts: Array,
-    rotations: Array | None,
-    rows: Array,
-) -> tuple[Array, Array, Array]:
-    """Forces that the rates need, what each parameter adds to them, and kd dv/dt; whitened by the mass matrix.
+class _Table:
+    """Forces at rows of a record; what no scheme changes is computed once for each row."""
 
-    ``rotations``: of the base, whose rates are then along the world's axes; None: along its own.
-    """
-    weightless = AirRobot(replace(mechanism, gravity=(0.0, 0.0, 0.0)), law.change(armature=0.0 * law.armature))
-    added = law.armature if law.armature.any() else np.ones(len(law.joints))
-    needed, columns, damped = [], [], []
-    for (q, v), rate, effort, row in zip(at, rates.copy(), efforts, rows, strict=True):
-        if robot.base is not None and rotations is not None:
-            base = rate[robot.base[1]]
-            moving, spin = v[robot.base[1]][:3], v[robot.base[1]][3:]
-            base[:3] = rotations[row].T @ base[:3] - np.cross(spin, moving)
-        M = robot.equations.inertial(robot.equations.tree.at(q, v))[1]
-        inner = M @ weightless.equations.solve(q, v).acceleration
-        weight = M @ robot.equations.solve(q, v).acceleration - inner
-        into = np.linalg.inv(np.linalg.cholesky(M + np.diag(robot.load(law.armature))))
-        needed.append(into @ (M @ rate - inner))
-        columns.append(into @ np.stack([weight, robot.load(effort), -robot.load(added) * rate], axis=1))
-        held = np.where(np.abs(effort) < law.limit * (1 - 1e-6), law.kd, 0.0)
-        damped.append(into @ (robot.load(held) * rate))
-    return np.concatenate(needed), np.concatenate(columns), np.concatenate(damped)
+    def __init__(
+        self,
+        record: ControlRecord,
+        law: ControlLaw,
+        robot: AirRobot,
+        mechanism: Mechanism,
+        at: list[tuple[Array, Array]],
+        efforts: Array,
+    ) -> None:
+        self.law, self.robot, self.at, self.efforts = law, robot, at, efforts
+        self.step = float(np.diff(record.time).mean())
+        bare = law.change(armature=0.0 * law.armature)
+        self.weightless = AirRobot(replace(mechanism, gravity=(0.0, 0.0, 0.0)), bare)
+        self.rated = _largest(record, ("v.", "v_WB.", "w_WB."))
+        self.placed, self.forced = _largest(record, ("q.", "q_WB.")), _largest(record, ("effort.",))
+        self._known: dict[int, tuple[Array, ...]] = {}
+
+    def _forces(self, row: int) -> tuple[Array, ...]:
+        """Mass matrix with armatures, inertial forces, weight, and the whitening of free directions, at a row."""
+        if row not in self._known:
+            q, v = self.at[row]
+            robot = self.robot
+            M = robot.equations.inertial(robot.equations.tree.at(q, v))[1]
+            inner = M @ self.weightless.equations.solve(q, v).acceleration
+            weight = M @ robot.equations.solve(q, v).acceleration - inner
+            armed = M + np.diag(robot.load(self.law.armature))
+            free = null_space(robot.equations.rows(q).C) if robot.equations.rank else np.eye(len(M))
+            into = np.linalg.inv(np.linalg.cholesky(free.T @ armed @ free)) @ free.T
+            self._known[row] = armed, inner, weight, into
+        return self._known[row]
+
+    def rows(self, rows: Array, rated: Array, axes: Array | None, *, central: bool, implicit: bool) -> _Rows:
+        """Forces at some rows.
+
+        Args:
+            rows: their indices.
+            rated: velocities whose differences are accelerations, (times, nv).
+            axes: rotation of the base, whose rates are then along the world's axes; None: along its own.
+            central: True if accelerations are differences over two intervals.
+            implicit: True if kd acts at the velocity after a step.
+        """
+        law, robot, h = self.law, self.robot, self.step
+        before, width = (rows - 1, 2 * h) if central else (rows, h)
+        rates = (rated[rows + 1] - rated[before]) / width
+        late = np.minimum(rows + 1, len(rated) - 2)
+        ahead = (rated[late + 1] - rated[late]) / h
+        added = law.armature if law.armature.any() else np.ones(len(law.joints))
+        driven = robot.driven[:, 1]
+        left, noise, unknown, sizes = [], [], [], []
+        columns: dict[str, list[Array]] = {name: [] for name in (*_NUMBERS, "implicit")}
+        bodies: dict[str, list[Array]] = {body.name: [] for body in robot.mechanism.bodies}
+        for row, rate, following in zip(rows.tolist(), rates.copy(), ahead.copy(), strict=True):
+            q, v = self.at[row]
+            M, inner, weight, into = self._forces(row)
+            for item in (rate, following):
+                if robot.base is not None and axes is not None:
+                    base, moving, spin = item[robot.base[1]], v[robot.base[1]][:3], v[robot.base[1]][3:]
+                    base[:3] = axes[row].T @ base[:3] - np.cross(spin, moving)
+            effort = self.efforts[row]
+            acting = M @ rate - inner - law.gravity * weight - robot.load(effort)
+            if implicit:
+                acting += h * robot.load(np.where(np.abs(effort) < law.limit * (1 - 1e-6), law.kd, 0.0)) * rate
+            left.append(into @ acting)
+            forces = np.linalg.norm(into @ (M @ rate)) + np.linalg.norm(into @ weight)
+            sizes.append(into @ (M @ rate - inner))
+            noise.append(np.abs(into @ M) @ np.full(len(v), 2 * self.rated / width))
+            noise[-1] = noise[-1] + np.abs(into) @ robot.load(np.full(len(effort), self.forced))
+            noise[-1] = (
+                noise[-1] + (2 * self.placed + 2 * self.rated / (1e-300 + np.abs(v).max()) + _ROUND_OFF) * forces
+            )
+            unknown.append(into @ (M @ (following - rate)) / 2)
+            columns["gravity"].append(into @ weight)
+            columns["effort"].append(into @ robot.load(effort))
+            columns["armature"].append(-into @ (robot.load(added) * rate))
+            columns["damping"].append(-into @ robot.load(v[driven]))
+            columns["friction"].append(-into @ robot.load(np.sign(v[driven])))
+            columns["implicit"].append(-into @ (robot.load(h * law.kd) * rate))
+            for body, forces_of in zip(bodies, self._of_bodies(q, v, rate), strict=True):
+                bodies[body].append(-into @ forces_of)
+        return _Rows(
+            left=np.concatenate(left),
+            columns={name: np.concatenate(parts) for name, parts in columns.items()},
+            added={name: np.concatenate(parts) for name, parts in bodies.items()},
+            rounding=_rms(np.concatenate(noise)),
+            unknown=_rms(np.concatenate(unknown)),
+            size=_rms(np.concatenate(sizes)) or 1.0,
+        )
+
+    def _of_bodies(self, q: Array, v: Array, rate: Array) -> Iterator[Array]:
+        """Forces along the velocities that a mass, a first moment and an inertia of each body need, (nv, 10)."""
+        tree, gravity = self.robot.equations.tree, np.array(self.robot.mechanism.gravity)
+        motion = tree.at(q, v)
+        for k in range(len(self.robot.mechanism.bodies)):
+            R, J = motion.R_WB[k], motion.J[k]
+            acceleration = J @ rate + motion.bias[k]
+            pull, turning, spin = R.T @ (acceleration[:3] - gravity), R.T @ acceleration[3:], R.T @ motion.w_WB[k]
+            moved = _skew(turning) + _skew(spin) @ _skew(spin)
+            wrench = np.zeros((6, 10))
+            wrench[:3, 0], wrench[:3, 1:4] = pull, moved
+            wrench[3:, 1:4] = -_skew(pull)
+            wrench[3:, 4:] = _inertial(turning) + _skew(spin) @ _inertial(spin)
+            yield J[:3].T @ R @ wrench[:3] + J[3:].T @ R @ wrench[3:]
 
 
-def _solved(table: tuple[Array, Array, Array], step: float) -> tuple[Array, Array, float]:
-    """Parameters, their error bars, and the sum of squares that is left; ``step``: of implicit kd, else 0."""
-    needed, columns, damped = table
-    wanted = needed + step * damped
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0] = 1.0
-    values, *_ = np.linalg.lstsq(columns / size, wanted, rcond=None)
-    left = wanted - columns @ (values / size)
-    square = float(left @ left)
-    inverse = np.linalg.pinv((columns / size).T @ (columns / size))
-    errors = _SAFETY * np.sqrt(np.diag(inverse) * square / max(1, len(wanted) - len(size)))
-    return values / size, errors / size + 1e-9, square
+def _largest(record: ControlRecord, kinds: tuple[str, ...]) -> float:
+    """Largest rounding of columns whose names begin so; 0 without one."""
+    return max((float(item.max()) for name, item in record.rounding.items() if name.startswith(kinds)), default=0.0)
+
+
+def _skew(a: Array) -> Array:
+    x, y, z = a
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _inertial(a: Array) -> Array:
+    """Matrix that turns an inertia (xx, yy, zz, xy, xz, yz) into its product with a vector, (3, 6)."""
+    x, y, z = a
+    return np.array([[x, 0, 0, y, z, 0], [0, y, 0, x, 0, z], [0, 0, z, 0, x, y]])

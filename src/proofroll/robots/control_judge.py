@@ -8,15 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
+from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
-from proofroll.elements.mechanism.bookkeeping.mistakes import LAYERS
+from proofroll.elements.mechanism.bookkeeping.mistakes import LAYERS, SEARCH_TIME
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.step_limits import servo_steps
 from proofroll.robots.control_layers import record_layers
-from proofroll.robots.control_record import ControlRecord, read_record
+from proofroll.robots.control_record import ControlRecord, read_record, record_of
 from proofroll.robots.controlled import ControlledScenes
+from proofroll.robots.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 from proofroll.robots.record_layer import Layer
 
 
@@ -68,11 +70,20 @@ class RecordJudgement:
             yield f"{self.record} ({rows}): the {first.name} is the first layer that does not hold"
         for layer in self.layers:
             yield f"  {_mark(layer)} {layer.name} ({LAYERS[layer.name]}): {_found(layer)}"
-            if layer is first:
+            if not layer.holds and (layer is first or layer.causes):
                 yield from (f"       {cause.sentence}" for cause in layer.causes[:3])
                 if not layer.causes:
-                    yield "       no known mistake explains it"
+                    yield f"       {_unexplained(layer)}"
         yield from self.remarks
+
+
+def _unexplained(layer: Layer) -> str:
+    if layer.tried >= layer.known:
+        return f"none of {counted(layer.tried, 'known mistakes')} explains it"
+    return (
+        f"none of {layer.tried} of {counted(layer.known, 'known mistakes')} explains it; the search ended after "
+        f"{SEARCH_TIME:.0f} s of processor time"
+    )
 
 
 def _mark(layer: Layer) -> str:
@@ -82,22 +93,42 @@ def _mark(layer: Layer) -> str:
 def _found(layer: Layer) -> str:
     if layer.residual is None:
         return layer.reason
-    where = "" if layer.holds else f", most in {layer.column} at {layer.time:.4g} s"
+    where = "" if layer.holds else f", most in {layer.column}"
+    where += f" at {layer.time:.4g} s" if where and np.isfinite(layer.time) else ""
     remark = f"; {layer.reason}" if layer.reason else ""
     return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{where}{remark}"
 
 
-def judge_record(record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None) -> RecordJudgement:
+def judge_record(
+    record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None, layout: str = ""
+) -> RecordJudgement:
     """Judges a record by layers, without a simulation; a robot whose record has columns of a base is free.
 
-    ``names``: column of the record -> its name here, perhaps with its unit, ``q.hip[deg]``.
+    Args:
+        record: file of the record.
+        robot: file of the robot.
+        control: file of its controller.
+        names: column of the record -> its name here, perhaps with its unit, ``q.hip[deg]``.
+        layout: program whose arrays the record has (:data:`.LAYOUTS`); empty: it has columns.
 
     Raises:
         InputError: a file is wrong, or they do not fit.
     """
-    read = read_record(record, names or {})
-    free = any(name.startswith("q_WB.") for name in read.columns)
-    model = ControlledScenes(control).of_record(robot, free=free)
+    if layout:
+        arrays, scenes = read_arrays(record), ControlledScenes(control)
+        held = scenes.of_record(robot, free=False).mechanism
+        free = floats(arrays, layout, sum(joint.nq == 1 for joint in held.joints))
+        model = scenes.of_record(robot, free=free)
+        driven = ControlLaw.of(model.mechanism).joints
+        time, columns = columns_of(record, arrays, layout, model.mechanism, driven)
+        digits = max(float(np.finfo(item.dtype).eps) / 2 for item in arrays.values() if item.dtype.kind == "f")
+        read = record_of(time, columns, record, digits=digits)
+    else:
+        if record.suffix in ARRAYS:
+            raise InputError("--as", "", f"say whose arrays these are: {', '.join(LAYOUTS)}")
+        read = read_record(record, names or {})
+        free = any(name.startswith("q_WB.") for name in read.columns)
+        model = ControlledScenes(control).of_record(robot, free=free)
     law = ControlLaw.of(model.mechanism)
     law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
     layers = record_layers(read, law, model.mechanism, grounded=model.grounded)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.air import AirRobot
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw, RobotState
-from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT
+from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT, SearchTime, mistakes
 from proofroll.elements.mechanism.bookkeeping.search import EXACT, Depth, MistakeSearch, explained
 from proofroll.elements.mechanism.bookkeeping.seen import SHOWN, WHOLE, LawMotions, SeenMotion
-from proofroll.robots.air_fit import states_of
+from proofroll.robots.air_fit import AirFit, states_of
 from proofroll.robots.control_record import ControlRecord
 from proofroll.robots.record_layer import Layer, LayerCause
 
 _STEPS, _LEAST_STEP = (1, 2, 5, 10), 4.9e-4  # steps between rows that are tried, and the shortest [s]
+# What no motion under a law has, and the fit of forces tells; damping moves the robot as more of kd does.
+_ONLY_FORCES = ("damping", "friction", "payload")
 _DEPTHS: tuple[Depth, ...] = ("a mistake", "a pair")
 _ON_INSTANT, _FEWEST = 1e-5, 4  # part of the time between instants that is round-off, and least rows of a motion
 
@@ -63,7 +66,9 @@ def _looks_back(law: ControlLaw) -> bool:
     return bool(np.any(answers[0] != answers[1]))
 
 
-def _best(mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, steps: list[float]) -> MistakeSearch:
+def _best(
+    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, steps: list[float], time: SearchTime
+) -> MistakeSearch:
     """Search at the step of the program [s], which the record does not tell: the one whose motions come nearest."""
     plain = {}
     for step in steps:
@@ -71,19 +76,35 @@ def _best(mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, steps: list[f
         plain[step] = min(motions.distance(law, scheme) for scheme in motions.schemes)
         if plain[step] <= seen.bar:
             return explained(mechanism, law, seen, step)
-    searches = {}
+    searches: dict[float, MistakeSearch] = {}
     for depth, step in itertools.product(_DEPTHS, sorted(steps, key=lambda step: plain[step])):
-        search = searches[step] = explained(mechanism, law, seen, step, depth=depth)
+        if time.over and searches:
+            break
+        search = searches[step] = explained(mechanism, law, seen, step, depth, time)
         if search.explanations and search.explanations[0].after <= max(EXACT * search.before, seen.bar):
             return search
-    if all(search.before > search.spread and not search.explanations for search in searches.values()):
+    if not time.over and all(item.before > item.spread and not item.explanations for item in searches.values()):
         nearest = min(steps, key=lambda step: plain[step])
-        return explained(mechanism, law, seen, nearest)
+        return explained(mechanism, law, seen, nearest, time=time)
     return min(searches.values(), key=lambda item: item.explanations[0].after if item.explanations else item.before)
 
 
-def motion_layer(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -> Layer:
-    """Layer of a record that lacks others: its states are those of a motion under the law, or under a known mistake."""
+def motion_layer(
+    record: ControlRecord,
+    law: ControlLaw,
+    mechanism: Mechanism,
+    forces: Callable[[ControlRecord], AirFit | str],
+    time: SearchTime,
+) -> Layer:
+    """Layer of a record that lacks others: its states are those of a motion under the law, or under a known mistake.
+
+    Args:
+        record: of a run under the law.
+        law: the law as it should be.
+        mechanism: the robot.
+        forces: fit of the record's accelerations under efforts of the law.
+        time: of the search.
+    """
     robot = AirRobot(mechanism, law)
     motion = states_of(record, robot)
     if isinstance(motion, str):
@@ -102,10 +123,20 @@ def motion_layer(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -
     divided = [n for n in divided if abs(n / every / law.rate % 1 - 0.5) >= 0.5 - WHOLE]
     if not divided:
         return Layer("motion", reason="no step divides both the interval of rows and the time between instants")
-    best = _best(mechanism, law, seen, [every / n for n in divided])
+    steps = [every / n for n in divided]
+    least = min(
+        motions.distance(law, scheme)
+        for motions in (LawMotions(mechanism, law, seen, step) for step in steps)
+        for scheme in motions.schemes
+    )
+    fit = forces(record) if least > seen.bar else ""
+    fitted = [] if isinstance(fit, str) else [cause for cause in fit.causes if cause.id in _ONLY_FORCES]
+    if fitted and any(cause.id != "damping" for cause in fitted):
+        return Layer("motion", least, min(seen.bar, 0.5 * least), "the state", float(seen.time[-1]), "", tuple(fitted))
+    best = _best(mechanism, law, seen, steps, time)
     bar = max(best.spread, seen.bar)
-    if best.explanations:
-        bar = best.explanations[0].after
+    if best.explanations or fitted:
+        bar = min([item.after for item in best.explanations] or [seen.bar])
     causes = (
         LayerCause(
             id=" + ".join(mistake.id for mistake in item.mistakes),
@@ -122,5 +153,7 @@ def motion_layer(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -
         column="the state",
         time=float(seen.time[-1]),
         reason=IMPLICIT if best.imitated else "",
-        causes=tuple(causes),
+        causes=(*causes, *fitted),
+        tried=best.tried,
+        known=len(mistakes(law)),
     )

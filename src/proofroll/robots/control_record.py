@@ -52,7 +52,9 @@ class ControlRecord:
         if len(absent) == len(wanted):
             return None
         if absent:
-            raise InputError(str(self.path), absent[0], f"the record has no such column, but {choices(wanted)}")
+            raise InputError(
+                str(self.path), absent[0], f"the record has no such column; it has {choices(list(self.columns))}"
+            )
         return np.stack([self.columns[name] for name in wanted], axis=1)
 
     def rounding_of(self, kind: str, names: Sequence[str]) -> Array:
@@ -95,9 +97,20 @@ def read_record(path: Path, names: Mapping[str, str]) -> ControlRecord:
 
 
 def record_of(
-    time: Array, columns: Mapping[str, Array], path: Path = Path("record"), units: Mapping[str, str] | None = None
+    time: Array,
+    columns: Mapping[str, Array],
+    path: Path = Path("record"),
+    units: Mapping[str, str] | None = None,
+    digits: float | None = None,
 ) -> ControlRecord:
-    """Record of columns; ``units``: column, or ``time`` -> its unit, where that need not be an SI unit.
+    """Record of columns.
+
+    Args:
+        time: [s], or in the unit of ``time``.
+        columns: name -> values.
+        path: of the file, for messages.
+        units: column, or ``time`` -> its unit, where that need not be an SI unit.
+        digits: relative rounding of the numbers that the columns were computed from; None: the columns show it.
 
     Raises:
         InputError: times do not grow, or a value is not finite.
@@ -109,11 +122,20 @@ def record_of(
             row = int(np.flatnonzero(~np.isfinite(values))[0])
             raise InputError(f"{path}: {name}", float(values[row]), f"it is not finite at t = {time[row]:g} s")
     factors = {name: in_si(unit)[1] for name, unit in (units or {}).items()}
-    rounding = _roundings(columns)  # of the digits that are written
+    if digits is None:
+        rounding = _roundings(columns)  # of the digits that are written
+    else:
+        rounding = {name: np.full(item.shape, 2 * digits * np.abs(item).max()) for name, item in columns.items()}
     converted, rounding = (
         {name: item * factors.get(name, 1.0) for name, item in part.items()} for part in (columns, rounding)
     )
-    return _in_world(ControlRecord(path, converted, rounding, time * factors.get("time", 1.0)))
+    record = ControlRecord(path, converted, rounding, time * factors.get("time", 1.0))
+    attitude = record.stacked("q_WB", "wxyz")
+    if attitude is not None:  # a program that keeps a quaternion to fewer digits than it writes shows it by its length
+        off = np.abs(np.linalg.norm(attitude, axis=1) - 1)
+        for axis in "wxyz":
+            rounding[f"q_WB.{axis}"] = np.maximum(rounding[f"q_WB.{axis}"], off)
+    return _in_world(record)
 
 
 def _in_world(record: ControlRecord) -> ControlRecord:

@@ -28,6 +28,7 @@ class Layer:
         time: of that difference [s].
         reason: reason why it was not looked at, or a remark.
         causes: mistakes that explain it, the best first.
+        tried: number of mistakes that were tried, of those that are ``known``.
     """
 
     name: str
@@ -37,6 +38,8 @@ class Layer:
     time: float = math.nan
     reason: str = ""
     causes: tuple[LayerCause, ...] = ()
+    tried: int = 0
+    known: int = 0
 
     @property
     def holds(self) -> bool:

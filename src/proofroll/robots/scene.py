@@ -73,11 +73,13 @@ class RobotScenes:
         return tables | {"actuators": acting, "unmodelled": [*clauses, *tables["unmodelled"]]}
 
     @staticmethod
-    def judge_record(record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None) -> Any:
+    def judge_record(
+        record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None, layout: str = ""
+    ) -> Any:
         """See :class:`proofroll.files.scene_sources.JudgesRecords`."""
         from proofroll.robots.control_judge import judge_record
 
-        return judge_record(record, robot, control, names)
+        return judge_record(record, robot, control, names, layout)
 
 
 def _parameters(file: RobotFile, robot: Robot) -> dict[str, ParameterRow]:

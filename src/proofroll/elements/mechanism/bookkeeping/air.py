@@ -164,7 +164,7 @@ def steps_in_air(
     q, v = start
     period = max(1, whole_steps(0.0, 1 / law.rate, step) + law.extra_steps)
     answer, (last, waiting) = law.answer(), law.waiting()
-    target, states = law.pose.copy(), [robot.state(law.begins, q, v)]
+    target, states, counts = law.pose.copy(), [robot.state(law.begins, q, v)], last
     efforts = np.zeros(len(law.joints))
     for k in itertools.count():
         time = law.begins + k * step
@@ -173,7 +173,8 @@ def steps_in_air(
             observation = law.observed(state, last)
             action = None if answer is None else answer(observation)
             last = last if action is None else action
-            waiting.append(law.target(action, time))
+            counts = counts if action is None else law.smoothed(action, counts)
+            waiting.append(law.target(None if action is None else counts, time))
             target = waiting.pop(0)
         servo = states[-law.lag] if law.lag and len(states) >= law.lag else state
         if not law.hold_effort or k % period == 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,12 +14,14 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.scene.control import EFFORT
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.policy import Observation, PolicySource
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import Signal, value_at
 
 VECTORS = ("p_WB", "v_WB_W", "w_WB_B", "gravity_B")  # of an observation, shape (3,) each
+SCALED = ("q", "v", "v_WB_W", "w_WB_B", "last")  # parts of an observation that programs scale
 
 
 @dataclass(frozen=True)
@@ -61,9 +64,16 @@ class ControlLaw:
         observed_order: joint that each entry of the observed coordinates and rates is of.
         signs: sign of each joint's target, shape (n,).
         scalar_last: True if a quaternion with its scalar last is read as one with its scalar first.
+        turned_back: True if the rotation of the base is used the other way around.
         gravity_sign: of the observed direction of gravity.
-        velocity_in_body: True if the velocity of the base is observed in the base's axes.
-        spin_in_world: True if the angular velocity of the base is observed in the world's axes.
+        velocity_turns: times that the observed velocity of the base is turned from the world's axes to the base's.
+        spin_turns: the same of its angular velocity, right being 1.
+        centre: centre of mass of the base from its origin, in its own axes [m], shape (3,).
+        at_centre: True if the velocity of the base is observed there.
+        factors: on observed q, v, linear velocity, angular velocity and last action, shape (5,).
+        pose_observed: part of the pose that is added to observed coordinates; -1: they are relative to it.
+        clip: largest size of an action.
+        smoothing: part of an action that counts, beside what counted at the instant before; 1: all.
         hold_effort: True if efforts hold between instants, False if they follow the state.
         reductions: turns of each joint's motor per turn of the joint, shape (n,).
         effort_factor: on what a servo's effort is before it acts, shape (n,).
@@ -90,9 +100,16 @@ class ControlLaw:
     observed_order: tuple[int, ...] = ()
     signs: Array = dataclasses.field(default_factory=lambda: np.ones(1))
     scalar_last: bool = False
+    turned_back: bool = False
     gravity_sign: float = 1.0
-    velocity_in_body: bool = False
-    spin_in_world: bool = False
+    velocity_turns: int = 0
+    spin_turns: int = 1
+    centre: Array = dataclasses.field(default_factory=lambda: np.zeros(3))
+    at_centre: bool = False
+    factors: tuple[float, ...] = (1.0,) * len(SCALED)
+    pose_observed: float = 0.0
+    clip: float = math.inf
+    smoothing: float = 1.0
     hold_effort: bool = False
     reductions: Array = dataclasses.field(default_factory=lambda: np.ones(1))
     effort_factor: Array = dataclasses.field(default_factory=lambda: np.ones(1))
@@ -120,6 +137,8 @@ class ControlLaw:
         joints = tuple(item.joint for item in servos)
         of_joint = {joint.name: joint.armature for joint in mechanism.joints}
         size = float(np.linalg.norm(mechanism.gravity))
+        base = next((joint.child for joint in mechanism.joints if joint.kind == JointKind.FREE), None)
+        centre = np.zeros(3) if base is None else np.array(mechanism.bodies[mechanism.body_index[base]].com)
         return cls(
             joints=joints,
             rate=control.rate,
@@ -134,6 +153,7 @@ class ControlLaw:
             targets=tuple(item.target for item in servos),
             down=np.array(mechanism.gravity) / (size or 1.0),
             signs=np.ones(len(joints)),
+            centre=centre,
             hold_effort=control.held == EFFORT,
         )
 
@@ -155,19 +175,33 @@ class ControlLaw:
         """Observation of a state, ``last`` being the action before."""
         quaternion = np.roll(state.q_WB, -1) if self.scalar_last else state.q_WB
         R = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+        R = R.T if self.turned_back else R
         body = Rotation.from_quat(state.q_WB, scalar_first=True).as_matrix()
         order = self._entries[1]
+        q, v, velocity, spin, before = self.factors
+        moving = state.v_WB + self.at_centre * np.cross(state.w_WB, body @ self.centre)
         return Observation(
             time=state.time,
-            q=state.q[order],
-            v=state.v[order],
+            q=q * (state.q + self.pose_observed * self.pose)[order],
+            v=v * state.v[order],
             p_WB=state.p_WB,
             R_WB=R,
-            v_WB_W=body.T @ state.v_WB if self.velocity_in_body else state.v_WB,
-            w_WB_B=state.w_WB if self.spin_in_world else body.T @ state.w_WB,
+            v_WB_W=velocity * (_turned(body, self.velocity_turns) @ moving),
+            w_WB_B=spin * (_turned(body, self.spin_turns) @ state.w_WB),
             gravity_B=self.gravity_sign * (R.T @ self.down),
-            last=last,
+            last=before * last,
         )
+
+    @property
+    def observing(self) -> tuple[object, ...]:
+        """What :meth:`observed` depends on besides a state."""
+        turns = (self.scalar_last, self.turned_back, self.gravity_sign, self.velocity_turns, self.spin_turns)
+        return (*turns, self.observed_order, self.factors, self.pose_observed, self.at_centre)
+
+    def smoothed(self, action: Array, before: Array) -> Array:
+        """What counts of an action, clipped, beside what counted at the instant ``before``."""
+        clipped = np.clip(action, -self.clip, self.clip)
+        return np.asarray(clipped if self.smoothing == 1 else before + self.smoothing * (clipped - before), float)
 
     def target(self, action: Array | None, time: float) -> Array:
         """Targets of the joints for an action, shape (n,), before any delay; without a policy those of ``time``."""
@@ -189,3 +223,8 @@ class ControlLaw:
         """Efforts of the servos [N m or N], clamped; arrays have the joints last."""
         unclamped = self.kp * (target - q) - self.kd * v
         return np.asarray(self.effort_factor * np.clip(unclamped, -self.limit, self.limit))
+
+
+def _turned(body: Array, turns: int) -> Array:
+    """Matrix that turns a vector so many times from the world's axes to those of the body, or back."""
+    return np.linalg.matrix_power(body.T if turns > 0 else body, abs(turns))

@@ -23,7 +23,6 @@ from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
 
 _FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried, 1 being right
-_ARMATURES = (1e-4, 1e-3, 1e-2, 0.1)  # kg m², where the right one is 0
 _AT_ONCE = 500  # laws that move at once: some 100 MB
 _SLOPE, _ROUNDS, _REFINED = 1e-3, 3, 40  # part of a size for slopes, rounds of a fit, and choices that are fitted
 _ALONE = (-0.4, -0.2, -0.1, 0.1, 0.2, 0.4)  # values of a number that are tried [rad, m, or parts]
@@ -100,7 +99,7 @@ class MistakeScreen:
     def _acted(self, law: ControlLaw) -> list[Array]:
         """Actions at the instants of a law, which observes the motion that was seen."""
         period = max(1, whole_steps(0.0, 1 / law.rate, self.step) + law.extra_steps)
-        key = (period, law.observed_order, law.scalar_last, law.gravity_sign, law.velocity_in_body, law.spin_in_world)
+        key = (period, *law.observing)
         if key not in self._actions:
             answer, (last, _), found = law.answer(), law.waiting(), []
             assert answer is not None  # the caller knows that there is a policy
@@ -115,7 +114,10 @@ class MistakeScreen:
         period = max(1, whole_steps(0.0, 1 / law.rate, self.step) + law.extra_steps)
         times = law.begins + self.step * np.arange(0, len(self._states), period)
         actions = [None] * len(times) if law.policy is None else self._acted(law)
-        targets = [law.target(action, float(time)) for action, time in zip(actions, times, strict=True)]
+        counts, targets = law.waiting()[0], []
+        for action, time in zip(actions, times, strict=True):
+            counts = counts if action is None else law.smoothed(action, counts)
+            targets.append(law.target(None if action is None else counts, float(time)))
         delayed = np.array([*law.waiting()[1], *targets])
         return delayed[np.arange(len(self._states) - 1) // period]
 
@@ -131,7 +133,9 @@ class MistakeScreen:
             for name in ("kp", "kd", "limit", "armature", "effort_factor")
         )
         gravity = np.array([law.gravity for law in laws])[:, None, None]
-        lag = np.array([bool(law.lag) for law in laws])[:, None, None]
+        lag, holds = (
+            np.array([bool(getattr(law, name)) for law in laws])[:, None, None] for name in ("lag", "hold_effort")
+        )
         every, h = slice(None, None, self.stride), self.step
         q, v = (np.tile(item[:-1][every], (len(laws), 1, 1)) for item in (self._q, self._v))
         previous = np.maximum(np.arange(len(self._states) - 1)[every] - 1, 0)
@@ -142,14 +146,14 @@ class MistakeScreen:
         for k in range(self.stride):
             rows = slice(k, None, self.stride)
             now = q, v[..., self._at_v]
-            held = self._instants(laws, rows) if self.law.hold_effort else None
+            held = self._instants(laws, rows) if holds.any() else None
             inertial = self._inertial[rows] + gravity * self._weight[rows]
             inverse = None if treatment == "implicit" else self._inverses(rows, armature[:, 0])
 
             def efforts(
                 seen: tuple[Array, Array], held: tuple[Array, Array] | None = held, rows: slice = rows
             ) -> Array:
-                at_q, at_v = held or seen
+                at_q, at_v = seen if held is None else (np.where(holds, *pair) for pair in zip(held, seen, strict=True))
                 return np.asarray(factor * np.clip(kp * (targets[:, rows] - at_q) - kd * at_v, -limit, limit))
 
             def accelerated(
@@ -159,7 +163,7 @@ class MistakeScreen:
                 load[..., self._at_v] += acting
                 if inverse is not None:
                     return np.asarray(np.einsum("hkij,hkj->hki", inverse, load))
-                free = (np.abs(acting) < limit) & (not self.law.hold_effort)  # what is clamped does not follow
+                free = (np.abs(acting) < limit) & ~holds  # what is clamped does not follow
                 return self._solved(rows, armature + h * np.where(free, kd, 0.0), load)
 
             acting = efforts((np.where(lag, late[0], now[0]), np.where(lag, late[1], now[1])))
@@ -224,9 +228,7 @@ class MistakeScreen:
         return sorted(found, key=lambda item: item.left)
 
     def _sizes(self, item: Mistake) -> tuple[float, ...]:
-        if not item.sized:
-            return (1.0,)
-        return _FACTORS if item.none else _ARMATURES
+        return item.trials or _FACTORS if item.sized else (1.0,)
 
     def _fitted(self, items: list[Screened], treatment: Treatment) -> list[Screened]:
         """Choices with sizes that fit best, by Gauss-Newton, all at once."""

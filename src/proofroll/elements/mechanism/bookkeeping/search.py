@@ -17,7 +17,14 @@ import numpy as np
 
 from proofroll.elements.mechanism.bookkeeping.air import AirRobot, Scheme, steps_in_air
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
-from proofroll.elements.mechanism.bookkeeping.mistakes import Mistake, changed, fitted, mistakes, offsets_told
+from proofroll.elements.mechanism.bookkeeping.mistakes import (
+    Mistake,
+    SearchTime,
+    changed,
+    fitted,
+    mistakes,
+    offsets_told,
+)
 from proofroll.elements.mechanism.bookkeeping.screen import TREATMENTS, MistakeScreen, Screened, Treatment
 from proofroll.elements.mechanism.bookkeeping.seen import LawMotions, SeenMotion
 from proofroll.elements.mechanism.scene.model import Mechanism
@@ -76,6 +83,7 @@ class MistakeSearch:
         explicit: distance without a mistake, with kd at the velocity before a step.
         imitated: True if the motion is that of kd at the velocity after a step h, and that of explicit kd with an
             armature of h kd more at each joint as well, as where no effort is at its limit.
+        tried: number of mistakes that were tried alone.
     """
 
     before: float
@@ -84,10 +92,16 @@ class MistakeSearch:
     explanations: tuple[MistakesFound, ...]
     explicit: float = 0.0
     imitated: bool = False
+    tried: int = 0
 
 
 def explained(
-    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, step: float, depth: Depth = "a pair with a pose"
+    mechanism: Mechanism,
+    law: ControlLaw,
+    seen: SeenMotion,
+    step: float,
+    depth: Depth = "a pair with a pose",
+    time: SearchTime | None = None,
 ) -> MistakeSearch:
     """Mistakes that explain the motion of a robot in the air.
 
@@ -97,6 +111,7 @@ def explained(
         seen: motion that a program says it made; its interval is a whole number of steps.
         step: of the program [s].
         depth: most that is tried, where nothing simpler explains the motion.
+        time: of the search; None: as long as it needs.
 
     Raises:
         InputError: the step does not divide the time between instants.
@@ -106,13 +121,15 @@ def explained(
     scheme = min(plain, key=lambda name: plain[name])
     before = plain[scheme]
     right = before <= seen.bar
+    trial = None if right else _Trial(search, before, scheme, time or SearchTime())
     return MistakeSearch(
         before=before,
         scheme=scheme,
         spread=search.spread(),
-        explanations=() if right else tuple(_explanations(_Trial(search, before, scheme), depth)),
+        explanations=() if trial is None else tuple(_explanations(trial, depth)),
         explicit=plain["explicit"],
         imitated=right and search.imitated(scheme),
+        tried=0 if trial is None else len(trial.alone),
     )
 
 
@@ -120,13 +137,14 @@ def _explanations(trial: _Trial, depth: Depth) -> list[MistakesFound]:
     """Explanations, the best first; the simplest are tried first, until nothing is left to explain."""
     every = mistakes(trial.search.law)
     found = trial.best([(item,) for item in every], len(every) * len(TREATMENTS))
-    if depth != "a mistake" and not trial.settled(found):
+    if depth != "a mistake" and not trial.settled(found) and not trial.time.over:
         both = [pair for pair in itertools.combinations(every, 2) if _together(*pair)]
         found = _sorted([*found, *trial.best(both, _PAIRS)])
-    if depth != "a mistake" and not trial.settled(found):
+    if depth != "a mistake" and not trial.settled(found) and not trial.time.over:
         found = _sorted([*found, *trial.other_pose([None])])
-    if depth == "a pair with a pose" and not trial.settled(found):
-        found = _sorted([*found, *trial.other_pose([item for item in every if item.id != "pose_missing"])])
+    if depth == "a pair with a pose" and not trial.settled(found) and not trial.time.over:
+        seconds = [item for item in every if item.id != "pose_missing" and math.isfinite(item.none)]
+        found = _sorted([*found, *trial.other_pose(seconds)])
     return found
 
 
@@ -181,10 +199,13 @@ class _Trial:
         window: number of the first samples in which a good part of the distance shows.
         plain: distance in the window without a mistake.
         treatments: of gains with which poses are tried.
+        time: of the search.
+        alone: words of the mistakes that were tried alone.
     """
 
-    def __init__(self, search: LawMotions, before: float, scheme: Scheme) -> None:
-        self.search, self.before, seen = search, before, search.seen
+    def __init__(self, search: LawMotions, before: float, scheme: Scheme, time: SearchTime) -> None:
+        self.search, self.before, seen, self.time = search, before, search.seen, time
+        self.alone: set[str] = set()
         self.screen = MistakeScreen(search.mechanism, search.law, seen.q, seen.v, search.step, search.stride)
         count = len(seen.time)
         largest = [float(np.abs(item).max()) for item in search.differences(search.law, scheme, count)]
@@ -202,8 +223,9 @@ class _Trial:
         found: dict[tuple[str, ...], MistakesFound] = {}
         enough = math.inf
         for item in self.screen.best(choices)[:most]:
-            if item.left > enough:
+            if item.left > enough or self.time.over:
                 break
+            self.alone |= {item.mistakes[0].words} if len(item.mistakes) == 1 else set()
             tried = min(self.tried(item), key=lambda trial: trial.after, default=None)
             if tried is not None and all(map(_differs, tried.mistakes, tried.sizes)):
                 name = tuple(mistake.words for mistake in item.mistakes)
@@ -239,6 +261,8 @@ class _Trial:
             return []
         fits = []
         for second, treatment in itertools.product(seconds, self.treatments):
+            if self.time.over:
+                return []
             moved = partial(_moved, law, second)
             size = len(law.joints) + int(second is not None and second.sized)
             fits.append((*self.screen.numbers(moved, size, treatment), moved, second, treatment))
@@ -246,6 +270,8 @@ class _Trial:
         found = []
         for near, _, moved, second, treatment in sorted(fits, key=lambda fit: fit[1])[:_POSES]:
             for scheme in (name for name in search.schemes if name.startswith(treatment)):
+                if self.time.over:
+                    break
                 if math.isinf(search.distance(moved(near), scheme, _NEAR * self.before)):
                     continue
                 values = search.fit(moved, near, scheme, count, 4)
@@ -291,4 +317,4 @@ def _scaled_by(law: Callable[[Array], ControlLaw], values: Array, _: ControlLaw,
 
 def _differs(item: Mistake, size: float) -> bool:
     """True if a size is no error of a step."""
-    return not item.sized or item.id == "gravity" or abs(size - 1) > _CHANGED
+    return not item.sized or item.id == "gravity" or math.isinf(item.none) or abs(size - 1) > _CHANGED
