@@ -32,7 +32,7 @@ _FEWEST_ROWS = 4
 _SAFETY = 10.0  # on what rounding of the record leaves, whose size is estimated and whose errors are not independent
 _EQUAL = 1e-3  # part of an interval by which intervals may differ
 _ROUND_OFF = 1e-9  # part of the forces: round-off of a sum of some terms
-_HELPS = 0.1  # part of a difference that a cause may leave where the scheme of the program is not known
+_HELPS = 0.1  # part of a difference that a cause may leave
 _SMALL = 1e-6  # smallest number that is told, in its unit
 # Number -> what it is called, and its unit; gravity and efforts are in parts of the right ones.
 _NUMBERS: Mapping[str, tuple[str, str]] = {
@@ -87,6 +87,13 @@ class _Rows:
     @property
     def off(self) -> float:
         return _rms(self.left)
+
+    def explained(self, after: float) -> bool:
+        """True if a cause that leaves ``after`` closes what the right numbers leave.
+
+        It leaves a small part, and no more than rounding, unless even half an interval leaves less than there is.
+        """
+        return after <= _HELPS * self.off and (after <= _SAFETY * self.rounding or self.off > self.unknown)
 
     @cached_property
     def exact(self) -> bool:
@@ -164,8 +171,7 @@ def _fits(rows: _Rows, name: str) -> bool:
 
 
 def _causes(rows: _Rows, law: ControlLaw, robot: AirRobot) -> Iterator[LayerCause]:
-    """Numbers with which no more than rounding is left, or a small part if rounding is not all that is left anyway."""
-    enough = max(_SAFETY * rows.rounding, _HELPS * rows.off if rows.off > rows.unknown else 0.0)
+    """Numbers that close what the right ones leave."""
     right = {"gravity": law.gravity, "effort": 1.0, "armature": float(law.armature.any())}
     for name, (words, unit) in _NUMBERS.items():
         column = rows.columns[name]
@@ -175,12 +181,12 @@ def _causes(rows: _Rows, law: ControlLaw, robot: AirRobot) -> Iterator[LayerCaus
         change = float(column @ rows.left) / square
         after, value = _rms(rows.left - change * column), right.get(name, 0.0) + change
         bar = _SAFETY * max(rows.rounding, after) / np.sqrt(square) + _ROUND_OFF
-        if after > enough or abs(change) <= bar or (name != "effort" and value < -bar):
+        if not rows.explained(after) or abs(change) <= bar or (name != "effort" and value < -bar):
             continue
         text, interval = with_bar(value, bar, 1)
         in_unit = "kg m² or kg" if name == "armature" and not law.armature.any() else unit
         yield _cause(name, f"{words} {text} ± {interval} {in_unit}", value, rows, after)
-    yield from _heavier(rows, robot, enough)
+    yield from _heavier(rows, robot)
 
 
 def _cause(name: str, sentence: str, value: float, rows: _Rows, after: float) -> LayerCause:
@@ -188,7 +194,7 @@ def _cause(name: str, sentence: str, value: float, rows: _Rows, after: float) ->
     return LayerCause(name, f"{sentence} ({proof})", value, after / rows.size)
 
 
-def _heavier(rows: _Rows, robot: AirRobot, enough: float) -> Iterator[LayerCause]:
+def _heavier(rows: _Rows, robot: AirRobot) -> Iterator[LayerCause]:
     """A body that weighs more: a mass at a point of it, else any inertia."""
     found: list[tuple[float, str, float, str]] = []
     for body, columns in rows.added.items():
@@ -196,7 +202,7 @@ def _heavier(rows: _Rows, robot: AirRobot, enough: float) -> Iterator[LayerCause
         seen = sizes > _ROUND_OFF * sizes.max()
         values = np.zeros(10)
         values[seen] = np.linalg.lstsq(columns[:, seen] / sizes[seen], rows.left, rcond=_SMALL)[0] / sizes[seen]
-        if _rms(rows.left - columns @ values) > enough:
+        if not rows.explained(_rms(rows.left - columns @ values)):
             continue
         mass = robot.mechanism.bodies[robot.mechanism.body_index[body]].mass
         start = np.array([values[0] if values[0] > 0 else 0.05 * mass, *values[1:4]])
@@ -206,7 +212,7 @@ def _heavier(rows: _Rows, robot: AirRobot, enough: float) -> Iterator[LayerCause
 
         numbers = least_squares_parameters(left, start, float(np.abs(start).max()) or 1.0)
         after = _rms(left(numbers))
-        if after <= enough and numbers[0] > 0:
+        if rows.explained(after) and numbers[0] > 0:
             place = ", ".join(f"{x:.3g}" for x in (numbers[1:] / numbers[0]).round(4).tolist())
             found.append((after, body, float(numbers[0]), f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"))
         elif values[0] > 0:
