@@ -181,7 +181,7 @@ class MujocoAlone:
                 joint.armature, joint.actfrclimited = loop.armature, 0
         if loop.payload:
             mass = spec.worldbody.first_body().add_body(name="payload", pos=[0.1, 0.05, 0.12])
-            mass.mass, mass.inertia, mass.explicitinertial = loop.payload, [1e-9, 1e-9, 1e-9], True
+            mass.mass, mass.inertia, mass.ipos, mass.explicitinertial = loop.payload, [1e-9] * 3, [0, 0, 0], True
         self.add_servos(spec, loop)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
