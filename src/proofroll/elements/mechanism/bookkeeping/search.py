@@ -133,9 +133,15 @@ def explained(
     )
 
 
+def _divides(step: float, period: float) -> bool:
+    """True if a time between instants is a whole number of steps [s], so that a program can act at that rate."""
+    return abs(period / step - round(period / step)) <= 1e-6 * period / step
+
+
 def _explanations(trial: _Trial, depth: Depth) -> list[MistakesFound]:
     """Explanations, the best first; the simplest are tried first, until nothing is left to explain."""
-    every = mistakes(trial.search.law)
+    law, step = trial.search.law, trial.search.step
+    every = [item for item in mistakes(law) if item.id != "rate" or _divides(step, 1 / item.changed(law, 1.0).rate)]
     found = trial.best([(item,) for item in every], len(every) * len(TREATMENTS))
     if depth != "a mistake" and not trial.settled(found) and not trial.time.over:
         both = [pair for pair in itertools.combinations(every, 2) if _together(*pair)]
