@@ -135,7 +135,7 @@ def columns_of(
     """
     kind = LAYOUTS[layout]
     found = _named(arrays, kind)
-    count = len(next(iter(found.values()), ()))
+    times = _times(path, arrays, len(next(iter(found.values()), ())))
     joints = _in_order(mechanism, arrays, by_level=kind.by_level)
     if "qpos" in found and "qvel" in found:
         positions, rates = found.pop("qpos"), found.pop("qvel")
@@ -158,8 +158,10 @@ def columns_of(
             raise InputError(str(path), name, advice)
         columns |= {f"{name}.{label}": found[name][:, k] for k, label in enumerate(labels)}
     if "base" in found:
+        if not np.all(np.any(found["base"][:, 3:_POSE], axis=1)):
+            raise InputError(str(path), "quaternion of the base", "it is zero in a row, which is no orientation")
         columns |= _base(found["base"], kind, mechanism)
-    return _times(path, arrays, count), columns
+    return times, columns
 
 
 def _named(arrays: Mapping[str, Array], layout: Layout) -> dict[str, Array]:

@@ -230,6 +230,7 @@ def _factor(place: int, words: str, absent: str) -> Mistake:
         layer="observation",
         changed=changed_part,
         sized=True,
+        starts=(0.95, 0.1),  # a policy that saturates leads from either to the scales near it alone
         absent=absent,
         later=True,
     )
