@@ -61,6 +61,14 @@ def test_a_mistake_shows_in_few_digits(name: str, digits: str) -> None:
         require_named(name, LAW, MISTAKES[name][2], ROBOT, digits)
 
 
+def test_what_rounding_leaves_hides_no_armature() -> None:
+    """Where rounding makes a third of what is off, a missing armature is named, and nothing else that halves it."""
+    record = recorded(ROBOT, MISTAKES["no armature"][2], LAW, digits="3")
+    layer = record_layers(record, LAW, ROBOT, grounded=False)[-1]
+    assert [cause.id for cause in layer.causes] == ["armature"]
+    assert layer.causes[0].size == pytest.approx(0.0, abs=0.1)
+
+
 @pytest.mark.drill
 def test_mistakes_of_a_robot_of_a_package() -> None:
     """Each mistake is named in a record of solo12, of which a clean one holds."""

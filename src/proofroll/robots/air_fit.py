@@ -69,11 +69,11 @@ class _Rows:
     """Forces at rows of a record, whitened by the masses, one after the other.
 
     Attributes:
-        left: what the right numbers leave, (numbers,).
+        left: remainder with the right numbers, (numbers,).
         columns: number -> what one more of it takes away, (numbers,).
         added: body -> the same of its mass, first moment [kg m] and inertia about its origin, (numbers, 10).
-        rounding: what rounding of the record makes of ``left``.
-        unknown: what half an interval between rows makes of it, as where the steps of a program are not the rows.
+        rounding: root mean square of what rounding of the record makes of ``left``.
+        late: part of ``left`` that half an interval between rows makes, where steps are not the rows, (numbers,).
         size: root mean square of the forces.
     """
 
@@ -81,25 +81,38 @@ class _Rows:
     columns: Mapping[str, Array]
     added: Mapping[str, Array]
     rounding: float
-    unknown: float
+    late: Array
     size: float
 
     @property
     def off(self) -> float:
         return _rms(self.left)
 
-    def explained(self, after: float) -> bool:
-        """True if a cause that leaves ``after`` closes what the right numbers leave.
+    @cached_property
+    def unknown(self) -> float:
+        return _rms(self.late)
+
+    def explained(self, remainder: float) -> bool:
+        """True if a cause that leaves ``remainder`` closes what the right numbers leave.
 
         It leaves a small part, and no more than rounding, unless even half an interval leaves less than there is.
         """
-        return after <= _HELPS * self.off and (after <= _SAFETY * self.rounding or self.off > self.unknown)
+        return remainder <= _HELPS * self.off and (remainder <= _SAFETY * self.rounding or self.off > self.unknown)
+
+    def rounded(self, remainder: Array) -> bool:
+        """True if rounding explains a remainder, alone and along each number."""
+        parts = [_along(column, remainder) for column in self.columns.values()]
+        return max(parts) <= _SAFETY * self.rounding and _rms(remainder) <= _SAFETY * self.rounding
 
     @cached_property
     def exact(self) -> bool:
-        """True if rounding explains what the right numbers leave, alone and along each number."""
-        parts = [abs(float(column @ self.left)) / float(np.linalg.norm(column)) for column in self.columns.values()]
-        return max(parts, default=0.0) <= _SAFETY * self.rounding and self.off <= _SAFETY * self.rounding
+        """True if rounding explains what the right numbers leave."""
+        return self.rounded(self.left)
+
+    def shown(self, column: Array, remainder: Array) -> bool:
+        """True if rounding explains what a number leaves, and neither it nor half an interval what it takes away."""
+        taken = _SAFETY * self.rounding + _along(column, self.late)
+        return self.rounded(remainder) and _along(column, self.left) > taken
 
 
 def acceleration_fit(
@@ -111,7 +124,7 @@ def acceleration_fit(
         record: with the state.
         law: the law as it should be.
         mechanism: the robot.
-        efforts: that act from each row on, (times, n).
+        efforts: of the joints from each row on, (times, n).
         held: True at rows at which no target changes, (times,).
     """
     robot = AirRobot(mechanism, law.change(armature=np.zeros(len(law.joints)), gravity=1.0))
@@ -149,10 +162,11 @@ def _judged(trials: Sequence[tuple[bool, _Rows]], law: ControlLaw, robot: AirRob
     if best.exact:
         armed = [rows for is_implicit, rows in trials if not is_implicit and _fits(rows, "implicit")]
         return AirFit(best.off * scale, _SAFETY * best.rounding * scale, imitated=implicit and bool(armed))
+    right = LayerCause("", "", None, best.off * scale)  # what no cause may leave, whatever the scheme
     causes: dict[str, LayerCause] = {}
     for _, rows in trials:
         for cause in _causes(rows, law, robot):
-            if cause.id not in causes or cause.after < causes[cause.id].after:
+            if cause.after < causes.get(cause.id, right).after:
                 causes[cause.id] = cause
     named = sorted(causes.values(), key=lambda cause: cause.after)
     bar = _SAFETY * best.rounding
@@ -165,13 +179,25 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
+def _along(column: Array, values: Array) -> float:
+    """Size of the part of values along a column."""
+    return abs(float(column @ values)) / float(np.linalg.norm(column) or 1.0)
+
+
 def _fits(rows: _Rows, name: str) -> bool:
     """True if a number of 1 leaves no more than rounding."""
     return _rms(rows.left - rows.columns[name]) <= _SAFETY * rows.rounding
 
 
-def _causes(rows: _Rows, law: ControlLaw, robot: AirRobot) -> Iterator[LayerCause]:
-    """Numbers that close what the right ones leave."""
+def _causes(rows: _Rows, law: ControlLaw, robot: AirRobot) -> list[LayerCause]:
+    """Numbers and bodies that close what the right ones leave, but those that leave more than the best's errors."""
+    found = [*_numbers(rows, law), *_heavier(rows, robot)]
+    least = max(min((cause.after for cause in found), default=0.0), _ROUND_OFF)
+    return [cause for cause in found if cause.after <= least * np.sqrt(1 + _SAFETY**2 / len(rows.left))]
+
+
+def _numbers(rows: _Rows, law: ControlLaw) -> Iterator[LayerCause]:
+    """Numbers of the robot that close what the right ones leave."""
     right = {"gravity": law.gravity, "effort": 1.0, "armature": float(law.armature.any())}
     for name, (words, unit) in _NUMBERS.items():
         column = rows.columns[name]
@@ -179,14 +205,14 @@ def _causes(rows: _Rows, law: ControlLaw, robot: AirRobot) -> Iterator[LayerCaus
         if not square:
             continue
         change = float(column @ rows.left) / square
-        after, value = _rms(rows.left - change * column), right.get(name, 0.0) + change
-        bar = _SAFETY * max(rows.rounding, after) / np.sqrt(square) + _ROUND_OFF
-        if not rows.explained(after) or abs(change) <= bar or (name != "effort" and value < -bar):
+        remainder, value = rows.left - change * column, right.get(name, 0.0) + change
+        after, closed = _rms(remainder), rows.shown(column, remainder)
+        bar = _SAFETY * (rows.rounding if closed else max(rows.rounding, after)) / np.sqrt(square) + _ROUND_OFF
+        if not (closed or rows.explained(after)) or abs(change) <= bar or (name != "effort" and value < -bar):
             continue
         text, interval = with_bar(value, bar, 1)
         in_unit = "kg m² or kg" if name == "armature" and not law.armature.any() else unit
         yield _cause(name, f"{words} {text} ± {interval} {in_unit}", value, rows, after)
-    yield from _heavier(rows, robot)
 
 
 def _cause(name: str, sentence: str, value: float, rows: _Rows, after: float) -> LayerCause:
@@ -315,7 +341,7 @@ class _Table:
         ahead = (rated[late + 1] - rated[late]) / h
         added = law.armature if law.armature.any() else np.ones(len(law.joints))
         driven = robot.driven[:, 1]
-        left, noise, unknown, sizes = [], [], [], []
+        left, noise, lates, sizes = [], [], [], []
         columns: dict[str, list[Array]] = {name: [] for name in (*_NUMBERS, "implicit")}
         bodies: dict[str, list[Array]] = {body.name: [] for body in robot.mechanism.bodies}
         for row, rate, following in zip(rows.tolist(), rates.copy(), ahead.copy(), strict=True):
@@ -332,12 +358,12 @@ class _Table:
             left.append(into @ acting)
             forces = np.linalg.norm(into @ (M @ rate)) + np.linalg.norm(into @ weight)
             sizes.append(into @ (M @ rate - inner))
-            noise.append(np.abs(into @ M) @ np.full(len(v), 2 * self.rated / width))
-            noise[-1] = noise[-1] + np.abs(into) @ robot.load(np.full(len(effort), self.forced))
-            noise[-1] = (
-                noise[-1] + (2 * self.placed + 2 * self.rated / (1e-300 + np.abs(v).max()) + _ROUND_OFF) * forces
-            )
-            unknown.append(into @ (M @ (following - rate)) / 2)
+            # Rounding errors spread evenly up to the largest, whose variance is a third of its square.
+            squares = ((into @ M) ** 2).sum(axis=1) * 2 * (self.rated / width) ** 2 / 3
+            squares = squares + into**2 @ robot.load(np.full(len(effort), self.forced)) ** 2 / 3
+            parts = 2 * self.placed + 2 * self.rated / (1e-300 + np.abs(v).max()) + _ROUND_OFF
+            noise.append(np.sqrt(squares + (parts * forces) ** 2))
+            lates.append(into @ (M @ (following - rate)) / 2)
             columns["gravity"].append(into @ weight)
             columns["effort"].append(into @ robot.load(effort))
             columns["armature"].append(-into @ (robot.load(added) * rate))
@@ -351,7 +377,7 @@ class _Table:
             columns={name: np.concatenate(parts) for name, parts in columns.items()},
             added={name: np.concatenate(parts) for name, parts in bodies.items()},
             rounding=_rms(np.concatenate(noise)),
-            unknown=_rms(np.concatenate(unknown)),
+            late=np.concatenate(lates),
             size=_rms(np.concatenate(sizes)) or 1.0,
         )
 

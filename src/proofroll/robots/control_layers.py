@@ -180,7 +180,7 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
 
 
 def _shows(mistake: Mistake, layers: Sequence[str]) -> bool:
-    """True if a record may show a mistake first at one of the layers, of which the last is looked at."""
+    """True if a record may show a mistake first at one of the layers; the last of them is looked at."""
     order = list(LAYERS)
     return mistake.layer in layers or (mistake.later and order.index(mistake.layer) + 1 == order.index(layers[-1]))
 

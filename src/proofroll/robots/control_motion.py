@@ -49,7 +49,7 @@ def _begun(record: ControlRecord, law: ControlLaw) -> tuple[int, ControlLaw] | s
 def _looks_back(law: ControlLaw) -> bool:
     """True if the policy of a law answers differently where its last action was another."""
     count = len(law.joints)
-    still = RobotState(
+    rest = RobotState(
         time=0.0,
         q=law.pose,
         v=np.zeros(count),
@@ -62,7 +62,7 @@ def _looks_back(law: ControlLaw) -> bool:
     for last in (np.zeros(count), np.full(count, 0.1)):
         if (answer := law.answer()) is None:
             return False
-        answers.append(answer(law.observed(still, last)))
+        answers.append(answer(law.observed(rest, last)))
     return bool(np.any(answers[0] != answers[1]))
 
 
@@ -132,7 +132,14 @@ def motion_layer(
     fit = forces(record) if least > seen.bar else ""
     fitted = [] if isinstance(fit, str) else [cause for cause in fit.causes if cause.id in _ONLY_FORCES]
     if fitted and any(cause.id != "damping" for cause in fitted):
-        return Layer("motion", least, min(seen.bar, 0.5 * least), "the state", float(seen.time[-1]), "", tuple(fitted))
+        return Layer(
+            name="motion",
+            residual=least,
+            bar=min(seen.bar, 0.5 * least),
+            column="the state",
+            time=float(seen.time[-1]),
+            causes=tuple(fitted),
+        )
     best = _best(mechanism, law, seen, steps, time)
     bar = max(best.spread, seen.bar)
     if best.explanations or fitted:

@@ -89,15 +89,15 @@ def _of_npz(path: Path) -> dict[str, Any]:
 
 
 def _of_hdf5(path: Path) -> dict[str, Any]:
-    library, found = importlib.import_module("h5py"), dict[str, Any]()
+    library, arrays = importlib.import_module("h5py"), dict[str, Any]()
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, library.Dataset):
-            found[name] = item[()]
+            arrays[name] = item[()]
 
     with library.File(path) as content:
         content.visititems(visit)
-    return found
+    return arrays
 
 
 def _of_parquet(path: Path) -> dict[str, Any]:

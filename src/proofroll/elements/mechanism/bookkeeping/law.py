@@ -194,12 +194,12 @@ class ControlLaw:
 
     @property
     def observing(self) -> tuple[object, ...]:
-        """What :meth:`observed` depends on besides a state."""
+        """Settings on which :meth:`observed` depends besides a state."""
         turns = (self.scalar_last, self.turned_back, self.gravity_sign, self.velocity_turns, self.spin_turns)
         return (*turns, self.observed_order, self.factors, self.pose_observed, self.at_centre)
 
     def smoothed(self, action: Array, before: Array) -> Array:
-        """What counts of an action, clipped, beside what counted at the instant ``before``."""
+        """Part of an action that counts, clipped, beside what counted at the instant ``before``."""
         clipped = np.clip(action, -self.clip, self.clip)
         return np.asarray(clipped if self.smoothing == 1 else before + self.smoothing * (clipped - before), float)
 
