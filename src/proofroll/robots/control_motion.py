@@ -66,26 +66,38 @@ def _looks_back(law: ControlLaw) -> bool:
     return bool(np.any(answers[0] != answers[1]))
 
 
+def _without_mistakes(
+    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, steps: list[float]
+) -> dict[float, float]:
+    """Distance of a motion from the nearest one under the law, by the step of the program [s]."""
+    motions = {step: LawMotions(mechanism, law, seen, step) for step in steps}
+    return {step: min(tried.distance(law, scheme) for scheme in tried.schemes) for step, tried in motions.items()}
+
+
 def _best(
-    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, steps: list[float], time: SearchTime
+    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, plain: dict[float, float], time: SearchTime
 ) -> MistakeSearch:
-    """Search at the step of the program [s], which the record does not tell: the one whose motions come nearest."""
-    plain = {}
-    for step in steps:
-        motions = LawMotions(mechanism, law, seen, step)
-        plain[step] = min(motions.distance(law, scheme) for scheme in motions.schemes)
-        if plain[step] <= seen.bar:
-            return explained(mechanism, law, seen, step)
+    """Search at the step of the program, which the record does not tell: the one whose motions come nearest.
+
+    Args:
+        mechanism: the robot.
+        law: its controller's law as it should be.
+        seen: the motion of the record.
+        plain: distance without a mistake, by step [s].
+        time: of the search.
+    """
+    if right := [step for step, distance in plain.items() if distance <= seen.bar]:
+        return explained(mechanism, law, seen, right[0])
+    steps = sorted(plain, key=lambda step: plain[step])
     searches: dict[float, MistakeSearch] = {}
-    for depth, step in itertools.product(_DEPTHS, sorted(steps, key=lambda step: plain[step])):
+    for depth, step in itertools.product(_DEPTHS, steps):
         if time.over and searches:
             break
         search = searches[step] = explained(mechanism, law, seen, step, depth, time)
         if search.explanations and search.explanations[0].after <= max(EXACT * search.before, seen.bar):
             return search
     if not time.over and all(item.before > item.spread and not item.explanations for item in searches.values()):
-        nearest = min(steps, key=lambda step: plain[step])
-        return explained(mechanism, law, seen, nearest, time=time)
+        return explained(mechanism, law, seen, steps[0], time=time)
     return min(searches.values(), key=lambda item: item.explanations[0].after if item.explanations else item.before)
 
 
@@ -123,12 +135,8 @@ def motion_layer(
     divided = [n for n in divided if abs(n / every / law.rate % 1 - 0.5) >= 0.5 - WHOLE]
     if not divided:
         return Layer("motion", reason="no step divides both the interval of rows and the time between instants")
-    steps = [every / n for n in divided]
-    least = min(
-        motions.distance(law, scheme)
-        for motions in (LawMotions(mechanism, law, seen, step) for step in steps)
-        for scheme in motions.schemes
-    )
+    plain = _without_mistakes(mechanism, law, seen, [every / n for n in divided])
+    least = min(plain.values())
     fit = forces(record) if least > seen.bar else ""
     fitted = [] if isinstance(fit, str) else [cause for cause in fit.causes if cause.id in _ONLY_FORCES]
     if fitted and any(cause.id != "damping" for cause in fitted):
@@ -140,7 +148,7 @@ def motion_layer(
             time=float(seen.time[-1]),
             causes=tuple(fitted),
         )
-    best = _best(mechanism, law, seen, steps, time)
+    best = _best(mechanism, law, seen, plain, time)
     bar = max(best.spread, seen.bar)
     if best.explanations or fitted:
         bar = min([item.after for item in best.explanations] or [seen.bar])
