@@ -14,6 +14,12 @@ from proofroll.running.process import Worker
 PLUGINS = Path(__file__).parents[1] / "plugins"
 
 
+@pytest.fixture(autouse=True)
+def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Searches for mistakes in records end by what they find, not by the speed of this processor."""
+    monkeypatch.setattr("proofroll.robots.control_layers.SEARCH_TIME", 1e4)
+
+
 @pytest.fixture
 def install_readers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Mapping[str, str]], None]:
     """Announces readers of robot files to this process and to its workers."""

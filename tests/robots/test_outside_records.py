@@ -185,6 +185,26 @@ def test_states_alone_tell_a_mistake(name: str, said: str, proofroll: Proofroll,
     assert said in " ".join(out.split())
 
 
+@pytest.mark.drill
+def test_a_search_that_ran_out_of_time_decides_nothing(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """States that are off, and that no search has explained, are neither right nor wrong: exit 3, with the reason."""
+    monkeypatch.setattr("proofroll.robots.control_layers.SEARCH_TIME", 0.0)
+    (tmp_path / "legs.urdf").write_text(urdf())
+    (tmp_path / "legs.toml").write_text(CONTROL)
+    columns = columns_of(Loop(step=5e-3, steps=20, **MISTAKES["spin in the world"][2]).record(PROGRAMS["mujoco"]))
+    states = {key: values for key, values in columns.items() if key.split(".")[0] in {"time", "q", "v", *BASE}}
+    record = written(states, tmp_path / "record.csv", "single")
+    robot = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
+    code, out, err = proofroll("judge", str(record), *robot)
+    assert code == 3, out + err
+    assert "not decided: off by" in out
+    assert proofroll("judge", str(record), *robot, "--as", "isaaclab", "--map", "a=q.b")[0] == 2
+    code, out, err = proofroll("judge", str(record), "pendulum", "--as", "isaaclab")
+    assert (code, "give --robot and --control" in " ".join(err.split())) == (2, True)
+
+
 @pytest.mark.parametrize(("begin", "named"), [(0.04, False), (0.033, False), (0.033, True)])
 def test_a_record_that_begins_later(begin: float, named: bool, proofroll: Proofroll, tmp_path: Path) -> None:
     """A record that begins at an instant, or between two, holds in every layer, and a mistake in it is named."""

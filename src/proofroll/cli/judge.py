@@ -53,6 +53,8 @@ def judge(
         raise InputError("run", run, f"there is no such file{either}; proofroll judge FILE SCENE")
     if robot is not None or control is not None:
         _judge_record(run, robot, control, _names(columns), layout, as_json=as_json)
+    if layout:
+        raise InputError("--as", layout, "it is for the record of a robot: give --robot and --control, too")
     from proofroll.files.scene_file import load_scene
     from proofroll.studies.judging import judge as judging
 

@@ -191,9 +191,9 @@ def _fits(rows: _Rows, name: str) -> bool:
 
 def _causes(rows: _Rows, law: ControlLaw, robot: AirRobot) -> list[LayerCause]:
     """Numbers and bodies that close what the right ones leave, but those that leave more than the best's errors."""
-    found = [*_numbers(rows, law), *_heavier(rows, robot)]
-    least = max(min((cause.after for cause in found), default=0.0), _ROUND_OFF)
-    return [cause for cause in found if cause.after <= least * np.sqrt(1 + _SAFETY**2 / len(rows.left))]
+    causes = [*_numbers(rows, law), *_heavier(rows, robot)]
+    least = max(min((cause.after for cause in causes), default=0.0), _ROUND_OFF)
+    return [cause for cause in causes if cause.after <= least * np.sqrt(1 + _SAFETY**2 / len(rows.left))]
 
 
 def _numbers(rows: _Rows, law: ControlLaw) -> Iterator[LayerCause]:

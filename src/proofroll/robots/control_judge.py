@@ -93,10 +93,10 @@ def _mark(layer: Layer) -> str:
 def _found(layer: Layer) -> str:
     if layer.residual is None:
         return layer.reason
-    where = "" if layer.holds else f", most in {layer.column}"
-    where += f" at {layer.time:.4g} s" if where and np.isfinite(layer.time) else ""
+    place = "" if layer.holds else f", most in {layer.column}"
+    place += f" at {layer.time:.4g} s" if place and np.isfinite(layer.time) else ""
     remark = f"; {layer.reason}" if layer.reason else ""
-    return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{where}{remark}"
+    return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{place}{remark}"
 
 
 def judge_record(
@@ -115,13 +115,16 @@ def judge_record(
         InputError: a file is wrong, or they do not fit.
     """
     if layout:
+        if names:
+            raise InputError("--map", ", ".join(names), f"--as {layout} names the arrays; leave one of both out")
         arrays, scenes = read_arrays(record), ControlledScenes(control)
         held = scenes.of_record(robot, free=False).mechanism
         free = floats(arrays, layout, sum(joint.nq == 1 for joint in held.joints))
         model = scenes.of_record(robot, free=free)
         driven = ControlLaw.of(model.mechanism).joints
         time, columns = columns_of(record, arrays, layout, model.mechanism, driven)
-        digits = max(float(np.finfo(item.dtype).eps) / 2 for item in arrays.values() if item.dtype.kind == "f")
+        eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
+        digits = max(eps, default=0.0) / 2
         read = record_of(time, columns, record, digits=digits)
     else:
         if record.suffix in ARRAYS:

@@ -7,10 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from proofroll.core.number_format import error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.air import AirRobot
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw, RobotState
-from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT, SearchTime, mistakes
+from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT, SEARCH_TIME, SearchTime, mistakes
 from proofroll.elements.mechanism.bookkeeping.search import EXACT, Depth, MistakeSearch, explained
 from proofroll.elements.mechanism.bookkeeping.seen import SHOWN, WHOLE, LawMotions, SeenMotion
 from proofroll.robots.air_fit import AirFit, states_of
@@ -161,7 +162,7 @@ def motion_layer(
         )
         for item in best.explanations
     )
-    return Layer(
+    layer = Layer(
         name="motion",
         residual=best.before,
         bar=bar,
@@ -172,3 +173,6 @@ def motion_layer(
         tried=best.tried,
         known=len(mistakes(law)),
     )
+    undecided = time.over and least > seen.bar and not layer.causes
+    ended = f"the search ended after {SEARCH_TIME:.0f} s of processor time without a mistake that explains it"
+    return Layer("motion", reason=f"not decided: off by {error(least)}, and {ended}") if undecided else layer
