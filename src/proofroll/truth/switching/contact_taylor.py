@@ -329,12 +329,13 @@ class CompiledMode:
         while state[-1] < until:
             end, last, inside = step(place, state, np.inf if self._slips else until)
             states = inside.at_points()
+            lands = last[-1] >= until or (not self._slips and end >= until)
             if last[-1] > until and self._slips:
                 (end,) = self._places(pars, place, end, inside, np.array([until]))
                 last = inside(np.array([end]))[:, 0]
                 states = inside(points_within(place, end))
-            if last[-1] >= until or (not self._slips and end >= until):
-                last[-1] = until
+            if lands:
+                last[-1] = until  # but for round-off
             yield ModeStep(
                 start=place, end=end, first=state, last=last, inside=inside, guards=self._guards(pars, states)
             )

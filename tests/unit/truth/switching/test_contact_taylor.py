@@ -198,3 +198,16 @@ def test_a_load_that_contacts_share_compiles_nothing(monkeypatch: pytest.MonkeyP
     pairs = [replace(sled.pairs[0], name=each.name, geometries=(each.name, "floor")) for each in four]
     truth_of(replace(sled, geometries=(sled.geometries[0], *four), pairs=tuple(pairs)), np.array([0.0, 0.01]))
     assert not compiled
+
+
+def test_a_slip_lands_on_the_end_of_its_stretch_but_for_round_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A last step that round-off leaves one digit before its time is the last one all the same."""
+    places_at = contact_taylor.CompiledMode._places
+
+    def places(self: Any, pars: Any, start: float, end: float, inside: Any, times: Any) -> Any:
+        found = places_at(self, pars, start, end, inside, times)
+        return np.nextafter(found, start) if len(times) == 1 else found
+
+    monkeypatch.setattr(contact_taylor.CompiledMode, "_places", places)
+    sled = load_scene("sled").elements[0].mechanism  # type: ignore[attr-defined]
+    assert not any("DOP853" in route for route in truth_of(sled, np.array([0.0, 0.05])).routes)
