@@ -28,7 +28,10 @@ from proofroll.truth.switching.contact_guards import SolvedContacts
 _FIRST, _HALVINGS = 2.0, 20
 SHORTEST = _FIRST * 2.0**-_HALVINGS  # of beginnings
 _RESOLVED = 1e-14  # last coefficients of the states' series, relative to their sizes, that count as zero
-_SLOWEST = 0.7  # change of a round over that of the round before, above which the iteration does not settle
+# Change of a round over the larger one of the two rounds before, above which the iteration does not settle: where
+# friction's direction first turns with the square of time, as a rolling resistance turns it, its change is seen one
+# round after that of the states.
+_SLOWEST = 0.7
 _ROUNDS = 40  # of the iteration at most
 _SETTLED = 1e-15  # change of states and angles in the last round, relative to their sizes
 _STALLED = 1e-13  # change below which a round that changes no less than the one before is round-off
@@ -229,7 +232,7 @@ def _settled(state: Array, start: Array, length: float, nodes: _Nodes, led: Led)
     answer = float(middle / np.linalg.norm(middle) @ (rates[1] - rates[0])) / (2 * _TURN)
     if not abs(answer) > _FREE * float(np.abs(rates).max()) / _TURN:
         return None
-    states, angles, before = np.repeat(state[None], count, axis=0), np.zeros(count), np.inf
+    states, angles, before, earlier = np.repeat(state[None], count, axis=0), np.zeros(count), np.inf, np.inf
     normals = np.repeat(normal, count, axis=0)
     for number in range(_ROUNDS):
         ways, across = directed(angles, normals)
@@ -244,11 +247,11 @@ def _settled(state: Array, start: Array, length: float, nodes: _Nodes, led: Led)
         change = max(float(np.abs(turns).max()), float(np.abs(new - states).max()))
         states, angles = new, angles + turns
         # the first round moves states alone, and the second one is the first to turn the slip
-        if not np.isfinite(change) or (number > 1 and change > _STALLED and change > _SLOWEST * before):
+        if not np.isfinite(change) or (number > 2 and change > _STALLED and change > _SLOWEST * max(before, earlier)):
             return None
         if change <= _SETTLED or (change <= _STALLED and change >= before / 2):
             tail = np.abs((nodes.to_series @ states)[-2:]).max()
             resolved = tail <= _RESOLVED * max(1.0, float(np.abs(states).max()))
             return (states, ways) if resolved else None
-        before = change
+        before, earlier = change, before
     return None

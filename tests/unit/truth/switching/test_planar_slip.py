@@ -11,11 +11,13 @@ from scipy.optimize import brentq
 
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
+from proofroll.elements.mechanism.contact.acting import Acting
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.switching.planar_slip import LedValues, begun_slip
 from proofroll_drill.referee.random_contacts import random_contacts
 
 # s: of a ball that starts with 3 m/s in a cylinder, by its own truth
@@ -236,3 +238,25 @@ def test_a_ball_of_unequal_moments_slides_along_an_axis_until_it_rolls(way: tupl
         assert event.time_low <= end <= event.time_high
         place = -2.0 * end + 1.5 * end**2 - (2.0 - 3.0 * end) * (0.4 - end)
         assert found.record.p_WB[-1, 0] @ np.array([*way, 0.0]) == pytest.approx(place, abs=1e-14)
+
+
+def test_a_slip_begins_in_one_go_where_its_pull_turns_with_the_square_of_time() -> None:
+    """First instants are not cut short where friction turns as much as the states changed the round before."""
+    turning, growing, until = 0.5, 0.1, 0.02
+
+    def led(states: np.ndarray, ways: np.ndarray) -> LedValues:
+        """A mass under a pull of an angle w with ẇ proportional to time; states are (u_x, u_y, w, t)."""
+        w, t = states[:, 2], states[:, 3]
+        pull = (1 + growing * t)[:, None] * np.array([np.cos(w), np.sin(w), 0 * w]).T
+        rates = pull - ways
+        slides = np.column_stack([states[:, :2], 0 * t])
+        all_rates = np.column_stack([rates[:, :2], turning * t, np.ones_like(t)])
+        return LedValues(all_rates, np.tile([0.0, 0.0, 1.0], (len(t), 1)), slides, rates)
+
+    mode = (Acting("slip", heading=(1.0, 0.0, 0.0), leads=True),)
+    begun = begun_slip(0.0, np.zeros(4), mode, until, led, 14, "mass")
+    assert begun.end == until
+    way = begun.directions_at(np.array([until]))[0]
+    # behind the pull by the time |u| in which friction turns the slip, times the pull's rate of turning
+    behind = growing * until**2 / 2 * turning * until
+    assert np.arctan2(way[1], way[0]) == pytest.approx(turning * until**2 / 2, abs=2 * behind)
