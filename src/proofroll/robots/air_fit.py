@@ -206,18 +206,18 @@ def _numbers(rows: _Rows, law: ControlLaw) -> Iterator[LayerCause]:
             continue
         change = float(column @ rows.left) / square
         remainder, value = rows.left - change * column, right.get(name, 0.0) + change
-        after, closed = _rms(remainder), rows.shown(column, remainder)
-        bar = _SAFETY * (rows.rounding if closed else max(rows.rounding, after)) / np.sqrt(square) + _ROUND_OFF
-        if not (closed or rows.explained(after)) or abs(change) <= bar or (name != "effort" and value < -bar):
+        distance, closed = _rms(remainder), rows.shown(column, remainder)
+        bar = _SAFETY * (rows.rounding if closed else max(rows.rounding, distance)) / np.sqrt(square) + _ROUND_OFF
+        if not (closed or rows.explained(distance)) or abs(change) <= bar or (name != "effort" and value < -bar):
             continue
         text, interval = with_bar(value, bar, 1)
         in_unit = "kg m² or kg" if name == "armature" and not law.armature.any() else unit
-        yield _cause(name, f"{words} {text} ± {interval} {in_unit}", value, rows, after)
+        yield _cause(name, f"{words} {text} ± {interval} {in_unit}", value, rows, distance)
 
 
-def _cause(name: str, sentence: str, value: float, rows: _Rows, after: float) -> LayerCause:
-    proof = f"forces off by {short(rows.off / rows.size)} of their size, by {short(after / rows.size, 1)} with that"
-    return LayerCause(name, f"{sentence} ({proof})", value, after / rows.size)
+def _cause(name: str, sentence: str, value: float, rows: _Rows, distance: float) -> LayerCause:
+    proof = f"forces off by {short(rows.off / rows.size)} of their size, by {short(distance / rows.size, 1)} with that"
+    return LayerCause(name, f"{sentence} ({proof})", value, distance / rows.size)
 
 
 def _heavier(rows: _Rows, robot: AirRobot) -> Iterator[LayerCause]:
@@ -237,16 +237,17 @@ def _heavier(rows: _Rows, robot: AirRobot) -> Iterator[LayerCause]:
             return rows.left - columns @ _point(numbers)
 
         numbers = least_squares_parameters(left, start, float(np.abs(start).max()) or 1.0)
-        after = _rms(left(numbers))
-        if rows.explained(after) and numbers[0] > 0:
+        distance = _rms(left(numbers))
+        if rows.explained(distance) and numbers[0] > 0:
             place = ", ".join(f"{x:.3g}" for x in (numbers[1:] / numbers[0]).round(4).tolist())
-            found.append((after, body, float(numbers[0]), f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"))
+            words = f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"
+            found.append((distance, body, float(numbers[0]), words))
         elif values[0] > 0:
-            after = _rms(rows.left - columns @ values)
+            distance = _rms(rows.left - columns @ values)
             words = f"mass, centre and inertia of {body} are others, {values[0]:+.3g} kg"
-            found.append((_SAFETY * after, body, float(values[0]), words))
-    for after, _, mass, words in sorted(found)[:1]:
-        yield _cause("payload", words, mass, rows, after)
+            found.append((_SAFETY * distance, body, float(values[0]), words))
+    for distance, _, mass, words in sorted(found)[:1]:
+        yield _cause("payload", words, mass, rows, distance)
 
 
 def _point(numbers: Array) -> Array:

@@ -232,7 +232,7 @@ def _settled(state: Array, start: Array, length: float, nodes: _Nodes, led: Led)
     answer = float(middle / np.linalg.norm(middle) @ (rates[1] - rates[0])) / (2 * _TURN)
     if not abs(answer) > _FREE * float(np.abs(rates).max()) / _TURN:
         return None
-    states, angles, before, earlier = np.repeat(state[None], count, axis=0), np.zeros(count), np.inf, np.inf
+    states, angles, changes = np.repeat(state[None], count, axis=0), np.zeros(count), [np.inf, np.inf]
     normals = np.repeat(normal, count, axis=0)
     for number in range(_ROUNDS):
         ways, across = directed(angles, normals)
@@ -247,11 +247,11 @@ def _settled(state: Array, start: Array, length: float, nodes: _Nodes, led: Led)
         change = max(float(np.abs(turns).max()), float(np.abs(new - states).max()))
         states, angles = new, angles + turns
         # the first round moves states alone, and the second one is the first to turn the slip
-        if not np.isfinite(change) or (number > 2 and change > _STALLED and change > _SLOWEST * max(before, earlier)):
+        if not np.isfinite(change) or (number > 2 and change > _STALLED and change > _SLOWEST * max(changes[-2:])):
             return None
-        if change <= _SETTLED or (change <= _STALLED and change >= before / 2):
+        if change <= _SETTLED or (change <= _STALLED and change >= changes[-1] / 2):
             tail = np.abs((nodes.to_series @ states)[-2:]).max()
             resolved = tail <= _RESOLVED * max(1.0, float(np.abs(states).max()))
             return (states, ways) if resolved else None
-        before, earlier = change, before
+        changes.append(change)
     return None
