@@ -11,7 +11,7 @@ from proofroll.report.comparison.scores import closest, furthest_off, scores
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, off_by, unjudged, with_caveat
-from proofroll.report.page.answer import ReaderQuestion, of_column, take_words
+from proofroll.report.page.answer import ReaderQuestion, of_column, told
 from proofroll.report.page.candidates import Candidate
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
 
@@ -54,8 +54,7 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
         asked = ReaderQuestion(FIRST_TOLERANCE, not choice.unjudged[True].issuperset(column.studies))
         taken = of_column(choice, column, asked).taken
         if taken is not None:
-            name = ", ".join(filter(None, (take_words(choice, taken), taken.setting)))
-            text += f" To hold {asked.words}, the cheapest is {name}: {taken.cell.text} real time."
+            text += f" To hold {asked.words}, the cheapest is {told(choice, taken)}: {taken.cell.text} real time."
     return text
 
 

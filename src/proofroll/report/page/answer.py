@@ -22,6 +22,8 @@ LENGTHS = {
 _SILENT = {Verdict.AGREES, Verdict.NOT_JUDGED, Verdict.ILL_POSED, Verdict.ANOTHER_SCENE, NO_RUN, CANNOT}
 # States of what fails, the gravest first.
 _STATES = (Verdict.FAILED, Verdict.DIFFERS, Verdict.CONVERGES, Verdict.REFUSED)
+# Text in place of a choice where nothing has a result.
+NOT_REACHED = "no run could be judged, for lack of time or of a truth"
 # Most reasons on a card.
 _REASONS = 2
 
@@ -113,12 +115,21 @@ class Chip:
 
 @dataclass(frozen=True)
 class FirstAnswer:
-    """FirstAnswer to a question: for each kind of scenes, and for each scene."""
+    """FirstAnswer to a question: for each column of the matrix, a kind of scenes or one scene."""
 
     question: ReaderQuestion
-    kinds: list[ColumnAnswer]
-    scenes: list[ColumnAnswer]
+    columns: list[ColumnAnswer]
     chips: list[Chip]
+
+    @property
+    def kinds(self) -> list[ColumnAnswer]:
+        """Answers for kinds of scenes."""
+        return [item for item in self.columns if item.column.whole]
+
+    @property
+    def scenes(self) -> list[ColumnAnswer]:
+        """Answers for single scenes."""
+        return [item for item in self.columns if not item.column.whole]
 
     @property
     def sentence(self) -> str:
@@ -132,10 +143,8 @@ class FirstAnswer:
 def answer(matrix: ChoiceMatrix, tolerance: float, forces: bool, engines: Collection[str] | None = None) -> FirstAnswer:
     """FirstAnswer of a matrix to a question; ``engines``: of these alone."""
     asked = ReaderQuestion(tolerance, forces)
-    by_key = {item.key: of_column(matrix, item, asked, engines) for item in matrix.columns}
-    kinds = [item for (_, _, whole), item in by_key.items() if whole]
-    scenes = [item for (_, _, whole), item in by_key.items() if not whole]
-    return FirstAnswer(asked, kinds, scenes, _chips(matrix, kinds))
+    columns = [of_column(matrix, item, asked, engines) for item in matrix.columns]
+    return FirstAnswer(asked, columns, _chips(matrix, [item for item in columns if item.column.whole]))
 
 
 def of_column(
@@ -230,6 +239,11 @@ def take_words(matrix: ChoiceMatrix, taken: EngineStanding | ChoiceRow) -> str:
     return f"{matrix.title(taken.engine)} {taken.formulation.replace('_', ' ')}".strip()
 
 
+def told(matrix: ChoiceMatrix, taken: EngineStanding) -> str:
+    """Engine, formulation, setting and step for a reader."""
+    return ", ".join(filter(None, (take_words(matrix, taken), taken.setting)))
+
+
 def next_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
     """The next engine and what it costs relative to the one to take; or what it does not do."""
     second, best = item.next, item.taken
@@ -245,8 +259,11 @@ def closest_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
     """Text in place of a choice where nothing holds the tolerance."""
     if not item.judged:
         return "not judged"
-    if not item.standings:
+    ran = [standing for standing in item.standings if standing.cell.state != NO_RUN]
+    if not ran:
         return "no engine was run"
+    if all(standing.cell.state == Verdict.NOT_JUDGED for standing in ran):
+        return NOT_REACHED
     best = item.standings[0]
     if best.cell.state == PARTLY:
         held = [

@@ -36,7 +36,6 @@ class ChoiceCell(NamedTuple):
         cost: of the slowest scene; infinite unless the tolerance is held in all and costs were measured.
         clean: True if clean runs measured the cost; else it is known to a factor of about two.
         name: setting and step; for several scenes the ones that they share, or empty.
-        slowest: the scene whose cost it is and its setting and step, where scenes need different ones; else empty.
         why: short reason why the tolerance is not held; empty: it is.
         scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
         absent: number of the latter without a run of it, as it may be unable to represent them; others were left out.
@@ -49,7 +48,6 @@ class ChoiceCell(NamedTuple):
     cost: float = math.inf
     clean: bool = False
     name: str = ""
-    slowest: tuple[str, str] = ("", "")
     why: str = ""
     scenes: int = 1
     lacking: int = 0
@@ -128,7 +126,7 @@ def joined(cells: Mapping[str, ChoiceCell], titles: Mapping[str, str], *, counte
 
     ``counted``: where some hold it and others do not, their number stands in place of the least error.
     """
-    study, worst = max(cells.items(), key=lambda item: (SEVERITY.index(item[1].state), item[1].cost))
+    worst = max(cells.values(), key=lambda item: (SEVERITY.index(item.state), item.cost))
     if len(cells) == 1:
         return worst
     title = "; ".join(f"{titles[name]}: {cell.title}" for name, cell in cells.items())
@@ -136,7 +134,7 @@ def joined(cells: Mapping[str, ChoiceCell], titles: Mapping[str, str], *, counte
     shared = len({cell.name for cell in cells.values()}) == 1
     worst = worst._replace(title=title, name=worst.name if shared else "")
     if held == len(cells):
-        return worst if shared else worst._replace(slowest=(titles[study], cells[study].name))
+        return worst
     if not counted:
         return worst._replace(cost=math.inf)
     why = f"{worst.why}; holds {held} of {len(cells)}"

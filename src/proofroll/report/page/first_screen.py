@@ -201,9 +201,7 @@ class FirstScreen:
     def best(self, answered: FirstAnswer) -> list[int]:
         """Number of the row of each column's engine to take; -1 where nothing holds the tolerance."""
         place = {row.name: number for number, row in enumerate(self.rows) if row.level == "engine"}
-        both = (*answered.kinds, *answered.scenes)
-        answers = {item.column.key: item for item in both}
-        taken = (answers[column.key].taken for column in self.matrix.columns)
+        taken = (item.taken for item in answered.columns)
         return [-1 if item is None else place[item.engine] for item in taken]
 
     def uses(self, answered: FirstAnswer) -> Iterator[tuple[ColumnAnswer, str, str]]:

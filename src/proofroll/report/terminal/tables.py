@@ -23,7 +23,7 @@ from proofroll.report.labels import (
     unjudged,
     verdict_text,
 )
-from proofroll.report.page.answer import answer, closest_words, forces_words, next_words, take_words
+from proofroll.report.page.answer import answer, closest_words, forces_words, next_words, told
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
 from proofroll.running.case import Status, host_sentences
@@ -251,8 +251,8 @@ def _one_line(text: str) -> str:
 
 def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes: bool = False) -> Table:
     """The answer of the first screen: for each kind of scenes, or each scene, what to take, its speed, and the next."""
-    answered = answer(matrix, tolerance, forces)
-    with_forces = None if forces else answer(matrix, tolerance, True)
+    answered, with_forces = (answer(matrix, tolerance, need) for need in (forces, True))
+    columns, both = (found.scenes if scenes else found.kinds for found in (answered, with_forces))
     table = plain_table(
         Column("scene" if scenes else "kind of scene", min_width=_WORD),
         Column("take", min_width=_WORD),
@@ -261,19 +261,13 @@ def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes
         *([] if forces else [Column("if forces count", min_width=_WORD)]),
         title=f"The cheapest that holds {answered.question.words}",
     )
-    for index, item in enumerate(answered.scenes if scenes else answered.kinds):
+    for item, item_with_forces in zip(columns, both, strict=True):
         taken = item.taken
-        take = ", ".join(filter(None, (take_words(matrix, taken), taken.setting))) if taken else ""
-        both = (
-            []
-            if with_forces is None
-            else [forces_words(matrix, item, (with_forces.scenes if scenes else with_forces.kinds)[index])]
-        )
         table.add_row(
             Text(item.column.title),
-            Text(take if taken else closest_words(matrix, item)),
+            Text(told(matrix, taken) if taken else closest_words(matrix, item)),
             Text(f"{taken.cell.text}{taken.cell.share}" if taken else "–"),
             Text(next_words(matrix, item)),
-            *map(Text, both),
+            *([] if forces else [Text(forces_words(matrix, item, item_with_forces))]),
         )
     return table

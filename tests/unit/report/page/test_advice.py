@@ -21,29 +21,11 @@ def said(lines: list[TableLine], tolerance: float, forces: bool = False) -> list
     return [item.sentence for item in advice(choice_matrix(lines, STUDIES), tolerance, forces)]
 
 
-def test_each_engine_is_told_beside_the_cheapest() -> None:
-    """The choice with its step, another with how many times its cost, and those that never get there with why."""
-    one = said([*ARM, BETA, WRONG, MUTE], 1e-3)[0]
-    assert one == (
-        "Trees to 1e-3: take alpha joints, default, dt 1e-3 s (100× real time); "
-        "beta joints, default, dt 1e-3 s costs 50 times that; "
-        "gamma joints does not get there (off by 0.02, its limit of small steps is another); "
-        "delta joints does not get there (refused). "
-        "If forces count, too, take alpha joints, tuned, dt 1e-3 s (5× real time)."
-    )
-
-
-def test_of_a_group_the_scene_that_costs_most_is_told_with_its_setting() -> None:
-    """Where scenes need different settings, the cost is that of a named one; one that serves all is told."""
-    exact = replace(FORCE, error=1e-9)
-    fine = {"study": "chain", "scene": "chain", "setting": "tuned", "preset": "tuned", "step": 5e-4, "cost": 0.04}
-    group = said([LINE, exact, replace(LINE, **fine), replace(exact, **fine), BETA], 1e-3)[0]
-    assert group.startswith(
-        "Trees to 1e-3: take alpha joints (25× real time; chain needs most: tuned at dt 5e-4 s); beta"
-    )
-    chain = replace(LINE, study="chain", scene="chain", cost=0.04)
-    assert said([LINE, chain], 1e-3)[0].startswith(
-        "Trees to 1e-3: take alpha joints, default, dt 1e-3 s (25× real time)."
+def test_the_sentence_has_the_words_of_the_answer() -> None:
+    """The choice with its step and speed, the next engine with how many times its cost, and the choice with forces."""
+    assert said([*ARM, BETA, WRONG, MUTE], 1e-3)[0] == (
+        "Trees to 1e-3: take alpha joints, default, dt 1e-3 s (100× real time); next: beta joints, 50× the cost; "
+        "if forces count: alpha joints, 5×."
     )
 
 
@@ -56,30 +38,19 @@ def test_the_choice_is_told_apart_from_its_sentence() -> None:
 
 def test_where_nothing_holds_it_the_closest_is_named() -> None:
     """Nothing is advised; what comes closest says by how much it misses."""
-    one = said([LINE, FORCE], 1e-5)[0]
-    assert one.startswith("Trees to 1e-5: nothing that was run and timed holds it; alpha joints does not get there")
-    assert "off by 5e-4, finer steps come closer" in one
-    assert one.endswith("If forces count, too, nothing that was run and timed holds it.")
+    assert said([LINE, FORCE], 1e-5)[0] == (
+        "Trees to 1e-5: none; closest alpha joints: off by 5e-4, finer steps come closer."
+    )
 
 
 def test_forces_are_told_where_they_change_nothing_or_are_never_given() -> None:
     """The same choice, or none of whom forces are known."""
     exact = replace(FORCE, error=1e-9)
-    assert said([LINE, exact], 1e-3)[0].endswith("It holds the forces, too.")
-    assert said([LINE], 1e-3)[0].endswith("Forces are not judged there.")
+    assert said([LINE, exact], 1e-3)[0].endswith("if forces count: ✓ the same choice.")
+    assert said([LINE], 1e-3)[0].endswith("if forces count: not judged.")
     alone = "Trees: forces are not judged; for motion alone to 1e-3: take alpha joints, default, dt 1e-3 s"
-    assert said([LINE], 1e-3, forces=True)[0] == f"{alone} (100× real time)."
-    assert "with forces" in said([LINE, exact], 1e-3, forces=True)[0]
-
-
-def test_of_a_group_only_scenes_with_judged_forces_are_told() -> None:
-    """Where one scene of two has no forces that are judged, the other is named, and costs are not compared."""
-    exact = replace(FORCE, error=1e-9)
-    chain = replace(LINE, study="chain", scene="chain")
-    group = said([LINE, exact, chain], 1e-3)[0]
-    assert group.endswith(
-        "In arm, where forces are judged, take alpha joints, default, dt 1e-3 s (100× real time) for both."
-    )
+    assert said([LINE], 1e-3, forces=True)[0] == f"{alone} (100× real time); next: no other engine holds it."
+    assert "Trees to 1e-3 with forces: take" in said([LINE, exact], 1e-3, forces=True)[0]
 
 
 def test_over_all_few_formulations_cover_what_can_be_covered() -> None:
@@ -112,4 +83,3 @@ def test_what_was_left_out_is_not_told_to_fail() -> None:
     assert said([late], 1e-3) == [
         f"Trees to 1e-3: {reason}", f"chain (A chain) to 1e-3: {reason}", f"Over all: {reason}",
     ]  # fmt: skip
-    assert "beta joints was not judged" in said([*ARM, replace(beta, study="arm", scene="arm")], 1e-3)[0]

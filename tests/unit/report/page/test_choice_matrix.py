@@ -276,7 +276,8 @@ def test_what_holds_all_scenes_comes_before_what_is_cheaper_in_some() -> None:
     )
     unfinished = choice_matrix([*both, line(engine="beta", row=3, error=1e-9, cost=0.1), late], STUDIES)
     assert unfinished.standings(unfinished.kinds[0], 1e-4, False)[0].engine == "beta", "lack of time is no failure"
-    assert "beta joints, default, dt 1e-3 s in 1 of 2 scenes" in advice(unfinished, 1e-4, False)[0].sentence
+    sentence = advice(unfinished, 1e-4, False)[0].sentence
+    assert "beta joints, default, dt 1e-3 s (10× real time in 1 of 2 scenes)" in sentence
 
 
 def test_a_scene_of_two_kinds_has_two_columns() -> None:
