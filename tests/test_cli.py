@@ -46,7 +46,7 @@ def rk4(dt: str) -> list[str]:
 
 BAD = {
     "unknown scene": ([*RUN[:1], "sphere_in_cone", *RUN[2:]], 2, ["scene = 'sphere_in_cone'", "sphere_in_cylinder"]),
-    "unknown engine": (with_option("--engine", "adams"), 2, ["engine = 'adams'", "projection", "truth"]),
+    "unknown engine": (with_option("--engine", "adams"), 2, ["engine = 'adams'", "choose one of", "truth"]),
     "engine of another form": (with_option("--engine", "oracle[dt"), 2, ["engine = 'oracle[dt'", "name[key=value"]),
     "unknown parameter": (with_option("--set", "wheels=4"), 2, ["wheels = '4'", "choose from radius"]),
     "parameter of another form": (with_option("--set", "speed"), 2, ["--set = 'speed'", "parameter=value"]),
@@ -110,8 +110,16 @@ BAD = {
         ["run", "pendulum", "--engine", "truth", "--set", "speed=1e300", "--until", "0.1"], 2, ["its cube overflows"]
     ),
     "a setting as an option": (["run", "pendulum", "--dt", "1e-3"], 2, ["--engine 'NAME[dt=…]'"]),
+    "a parameter as an option": (["run", "pendulum", "--angle", "60 deg"], 2, ["--set 'angle=…'"]),
+    "a misspelt option": (["run", "pendulum", "--engin", "truth"], 2, ["did you mean --engine?"]),
+    "a misspelt engine": (["run", "pendulum", "--engine", "mujco"], 2, ["there is no such engine", "mujoco"]),
+    "a misspelt scene": (["run", "pendullum", "--engine", "truth"], 2, ["choose one of pendulum, "]),
+    "truth among engines": (["compare", "pendulum", "--engine", "truth"], 2, ["engines are held against it"]),
+    "a line that is no TOML": (
+        ["check", str(Path(__file__).parent / "plugins" / "broken.toml")], 2, ["at line 2, column 8): mass = = 1"]
+    ),
     "a version in a name": (["engines", "add", "mujoco==99"], 2, ["add mujoco --requirement mujoco==VERSION"]),
-    "no version": (["engines", "add", "mujoco"], 2, ["--requirement = 'nothing'", "mujoco==VERSION"]),
+    "no version": (["engines", "add", "mujoco"], 2, ["--requirement is missing", "mujoco==VERSION"]),
     "a scene for a map": (["tradeoff", "/dev/null/scene.toml"], 2, ["scene.toml", "cannot be read"]),
     "orientation of an engine without": (with_option("--ask", "orientation"), 3, ["needs the ball's orientation"]),
     "ladder of nothing": (["ladder", "sphere_in_cylinder", "--quantity", "height"], 2, ["quantity = 'height'"]),

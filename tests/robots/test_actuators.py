@@ -31,17 +31,21 @@ ACTUATORS = {
 }
 
 
+@pytest.mark.parametrize("keyframe", [0, 1])
 @pytest.mark.parametrize("actuators", ACTUATORS.values(), ids=ACTUATORS)
-def test_efforts_are_those_of_the_file(tmp_path, actuators):
-    """Each actuator has the effort that MuJoCo gives it in the pose of release, its control at zero."""
+def test_efforts_are_those_of_the_file(tmp_path, actuators, keyframe):
+    """Each actuator has the effort that MuJoCo gives it in the pose of release, at zero and at a keyframe's control."""
     text = mjcf(actuator=actuators, joint='actuatorfrcrange="-50 50"').replace("<worldbody>", DEFAULTS + "<worldbody>")
+    controls = " ".join(["0.7", "0"][: actuators.count("joint=")])
+    text = text.replace("</mujoco>", f'<keyframe><key ctrl="{controls}"/></keyframe></mujoco>')
     path = tmp_path / "arm.xml"
     path.write_text(text)
-    made = load_scene(str(path), actuators=1).elements[0].mechanism
+    made = load_scene(str(path), actuators=1, keyframe=keyframe).elements[0].mechanism
     q, v = made.start()
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = q, v
+    data.ctrl[:] = keyframe * model.key_ctrl[0]
     mujoco.mj_forward(model, data)
     found = np.zeros(2)
     for actuator, effort in zip(made.actuators, JointCoordinates(made).efforts(0.0, q, v), strict=True):

@@ -138,7 +138,7 @@ def test_a_reader_that_hangs(proofroll: Proofroll, install_readers: Install, arm
     [
         (["--engine", "nothing"], "reads no robot files"),
         (["--engine", "mujoco[nothing=true]"], "there is no such option; it has fusestatic"),
-        (["--engine", "mujoco[fusestatic=2]"], "write true or false"),
+        (["--engine", "mujoco[fusestatic=2]"], "is true or false"),
         (["--base", "loose"], "choose one of fixed, free"),
         (["--states", "0"], "0"),
     ],

@@ -91,7 +91,7 @@ def test_targets_are_formulas_numbers_or_tables(tmp_path: Path) -> None:
         (("kp = 8", "kp = true"), "gains.1.kp = True: this is not a number; give one in N m/rad"),
         (("limit = 2.7", "limit = 0"), "gains.0.limit = 0.0: must be above 0"),
         (("kd = 0.5", "kq = 0.5"), "gains.1.kq = 0.5: there is no such key here; the keys are joints, kp, kd"),
-        (('joints = "*"', ""), "gains.0.joints = 'nothing': name the joints"),
+        (('joints = "*"', ""), "gains.0.joints is missing: name the joints"),
         (("call =", "cal ="), "policy.cal = 'package.module:make': there is no such key here; the keys are call"),
         (("[policy]", "[targets]\nL_HIP = 1\n[policy]"), "targets = 'L_HIP': a policy sets all targets"),
         (("0.32, 1, 0, 0, 0", "0.32, 1, 1, 0, 0"), "a quaternion of length 1, scalar first"),

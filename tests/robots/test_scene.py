@@ -258,3 +258,33 @@ def test_commands_say_what_is_not_in_the_answer(robot):
         answered = CliRunner().invoke(app, arguments)
         assert answered.exit_code == 0, answered.output
         assert "Not in the answer: 2 joint ranges (limits=1), contacts." in answered.output
+
+
+def test_rotors_of_transmissions_are_armatures(tmp_path: Path) -> None:
+    """Drake's rotor inertia times its gear ratio squared is a joint's armature, or left out and said."""
+    path = tmp_path / "arm.urdf"
+    part = '<drake:{} xmlns:drake="http://drake.mit.edu" value="{}"/>'
+    actuator = f'<actuator name="a">{part.format("rotor_inertia", "1e-4")}{part.format("gear_ratio", "160")}</actuator>'
+    text = urdf(extra=f'<transmission name="t"><joint name="j1"/>{actuator}</transmission>')
+    path.write_text(text)
+    armatures = {joint.name: joint.armature for joint in load_scene(str(path)).elements[0].mechanism.joints}
+    assert armatures == pytest.approx({"j1": 2.56, "j2": 0, "j3": 0}, rel=1e-15)
+    assert "armature of joints (armature=1)" in load_scene(str(path), armature=0).omitted
+    path.write_text(text.replace('"1e-4"', '"-1e-4"'))
+    with pytest.raises(InputError, match=r"<drake:rotor_inertia value> = -0\.0001: it must be at least 0"):
+        load_scene(str(path))
+
+
+def test_controls_of_a_keyframe(tmp_path: Path) -> None:
+    """A file's keyframe gives controls; what is not taken of it is said, and a wrong number of them refused."""
+    path = tmp_path / "arm.xml"
+    key = '<keyframe><key/><key ctrl="{}"/></keyframe></mujoco>'
+    text = mjcf(actuator='<position name="m" joint="k1" kp="20"/>').replace("</mujoco>", key)
+    path.write_text(text.format("0.4"))
+    assert "controls of 2 keyframes (keyframe=1)" in load_scene(str(path), actuators=1).omitted
+    taken = load_scene(str(path), actuators=1, keyframe=2)
+    assert taken.elements[0].mechanism.actuators[0].target == 0.4
+    assert taken.omitted == ("contacts",)
+    path.write_text(text.format("0.4 1"))
+    with pytest.raises(InputError, match="this keyframe has 2 controls, and the file 1 actuators"):
+        load_scene(str(path), actuators=1, keyframe=2)

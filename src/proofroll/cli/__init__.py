@@ -6,6 +6,8 @@ import re
 import signal
 import sys
 import warnings
+from collections.abc import Sequence
+from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import EntryPoint
 from typing import Annotated, Any
@@ -41,6 +43,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+_ALIKE = 0.7  # least likeness, of 1, of an option that a wrong one may mean
 _STUDIES = (compare, report, tradeoff, recommend, ladder, stability, versions)
 for _command in (scenes, run, judge, plot, replay, export, findings, cite, *_STUDIES):
     app.command()(_command)
@@ -100,8 +103,8 @@ def _usage_message(error: typer.TyperException) -> str:
         return origin(unknown[1]) or message
     context = getattr(error, "ctx", None)
     options_here = [name for item in (context.command.params if context else ()) for name in item.opts]
-    if (unknown := re.match(r"No such option: --([\w-]+)", message)) and "--engine" in options_here:
-        return f"{message}; a setting of an engine goes into brackets: --engine 'NAME[{unknown[1]}=…]'"
+    if unknown := re.match(r"No such option: --([\w-]+)", message):
+        return _unknown_option(unknown[1], options_here)
     problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
     option = re.search(r"'([^']+)'", message)
     if not problems or option is None:
@@ -109,6 +112,20 @@ def _usage_message(error: typer.TyperException) -> str:
     from proofroll.core.validation import advice
 
     return f"{option[1]} = {problems[0]['input']!r}: {advice(problems[0]['type'], problems[0]['msg'])}"
+
+
+def _unknown_option(name: str, options_here: Sequence[str]) -> str:
+    """Message about an option that a command lacks: the one that is meant, or another way to write the value."""
+    message = f"No such option: --{name}"
+    words = [known.removeprefix("--") for known in options_here]
+    begun = [word for word in words if word.startswith(name)]
+    if meant := begun or get_close_matches(name, words, 1, _ALIKE):
+        return f"{message}; did you mean --{' or --'.join(meant)}?"
+    ways = {
+        "--set": f"a parameter of the scene is --set '{name}=…'",
+        "--engine": f"a setting of an engine goes into brackets: --engine 'NAME[{name}=…]'",
+    }
+    return "; ".join([message, *(words for known, words in ways.items() if known in options_here)])
 
 
 # Signals that have interrupted this process.

@@ -88,7 +88,7 @@ def _judge_record(
 
     if robot is None or control is None:
         lacking, present = ("--robot", control) if robot is None else ("--control", robot)
-        raise InputError(lacking, "nothing", f"a record needs the robot and its controller; {present} is one of both")
+        raise InputError(lacking, None, f"a record needs the robot and its controller; {present} is one of both")
     source = source_of(str(robot))
     if source is None or not isinstance(source[0], JudgesRecords):
         raise InputError("--robot", robot, "give the path of a robot file, .urdf or .xml")

@@ -87,7 +87,9 @@ Control = Annotated[
     Path | None,
     typer.Option("--control", help="TOML file of the controller of a robot file: gains, targets or policy, start."),
 ]
-Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")]
+Set = Annotated[
+    list[str] | None, typer.Option("--set", help="parameter=value, in SI units or as '30 deg', '2 mm'; repeat.")
+]
 
 
 def controlled(scene: str, control: Path | None) -> str:

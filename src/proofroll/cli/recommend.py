@@ -280,6 +280,6 @@ def _stored_study(
         measure_first = typer.confirm(f"{why}. Measure now (some minutes)?", err=True)
     if not measure_first:
         advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
-        raise InputError("stored curves", "none", advice)
+        raise InputError("stored study", None, advice)
     over = ranges if ranges is not None else (claims.over if claims else {})
     return measure(question, Extent(engines, over), claims, options.new_runner(out, False, jobs), out)[0]

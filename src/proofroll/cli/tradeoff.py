@@ -30,6 +30,7 @@ def tradeoff(
         list[str] | None, typer.Option(help="Observable to show; repeat. The first decides how far curves go.")
     ] = None,
     settings: options.Set = None,
+    control: options.Control = None,
     engine: Annotated[
         list[str] | None, typer.Option(help="Engine, or name[key=value,…]; repeat. All by default.")
     ] = None,
@@ -52,6 +53,7 @@ def tradeoff(
     from proofroll.running.store import write_text
     from proofroll.studies.tradeoff.tradeoff import Extent
 
+    scene = options.controlled(scene, control)
     claims, question = question_of(scene, settings, quantity, until)
     require_observables(question, quantity or [])
     ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})

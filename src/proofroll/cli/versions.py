@@ -87,7 +87,7 @@ def _spelled(engine: str, old: str, new: str, subject: str) -> tuple[str, str, s
             )
         old, new, subject = place_of(engine), old, new
     if not new:
-        raise InputError("new", "nothing", f"name two versions: proofroll versions {name} {old} VERSION")
+        raise InputError("new", None, f"name two versions: proofroll versions {name} {old} VERSION")
     old, new = (place_of(text) if plain_name(text) == name and "@" in text else text for text in (old, new))
     return name, old, new, subject
 

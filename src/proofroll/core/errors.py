@@ -10,6 +10,7 @@ from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
 _ENGINES = _PACKAGE / "engines"
+_SHOWN = 20  # names of a list in a message
 _LONGEST_FIELD = 300  # characters: a path and the keys that lead to a value; a key itself may have any length
 
 
@@ -22,7 +23,7 @@ class InputError(ProofrollError):
 
     Attributes:
         field: name of the offending field as the user writes it, e.g. ``radius``.
-        value: the value that was given.
+        value: the value that was given; None: there is none.
         advice: the mistake and its remedy.
     """
 
@@ -30,7 +31,8 @@ class InputError(ProofrollError):
         self.field = _short(field, _LONGEST_FIELD)
         self.value = value
         self.advice = advice
-        super().__init__(f"{self.field} = {_shown(value)}: {advice}")
+        head = f"{self.field} is missing" if value is None else f"{self.field} = {_shown(value)}"
+        super().__init__(f"{head}: {advice}")
 
     def within(self, field: str, value: object) -> InputError:
         """The same error, reported for a larger field that contains this one."""
@@ -96,7 +98,7 @@ def no_such_key(field: str, value: object, keys: Iterable[str]) -> InputError:
 def require_known(
     field: str, name: object, names_allowed: Iterable[str], advice: str = "choose one of", value: object = None
 ) -> None:
-    """Raises an error that lists the first twenty known names, unless ``name`` is known.
+    """Raises an error that lists known names and the one that is probably meant, unless ``name`` is known.
 
     Args:
         field: for the message.
@@ -110,7 +112,9 @@ def require_known(
     """
     names = list(names_allowed)
     if name not in names:
-        raise InputError(field, name if value is None else value, f"{advice} {choices(names, name)}")
+        meant = get_close_matches(str(name), names, 1) if len(names) <= _SHOWN else ()
+        hint = f"; did you mean {meant[0]}?" if meant else ""
+        raise InputError(field, name if value is None else value, f"{advice} {choices(names, name)}{hint}")
 
 
 def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str, str]]) -> None:
@@ -154,10 +158,10 @@ def lack_behind(error: BaseException) -> BaseException | None:
 
 def choices(names: Iterable[str], wrong: object = "") -> str:
     """List of names to choose from; of more than twenty those that resemble a wrong one, or the first twenty."""
-    shown = list(names)
-    if len(shown) > 20 and (near := get_close_matches(str(wrong), shown)):
+    shown = list(dict.fromkeys(names))
+    if len(shown) > _SHOWN and (near := get_close_matches(str(wrong), shown)):
         return ", ".join([*near, "…"])
-    return ", ".join(shown[:20] + ["…"] * (len(shown) > 20)) or "none"
+    return ", ".join(shown[:_SHOWN] + ["…"] * (len(shown) > _SHOWN)) or "(there are none)"
 
 
 def _shown(value: object) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +12,11 @@ from proofroll.core.bounds import require_usable
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.expressions import evaluated
 from proofroll.core.quantity import OR, Quantity, powers_of
+from proofroll.core.unit_conversion import in_proportion, in_si, is_known
 
 # Unit of a number, or of each number of a list; "": not checked. Several that are allowed are joined by OR.
 Unit = str | tuple[str, ...]
-_DEGREES = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*deg(/s(?:\^2)?)?\s*")
+_MEASURED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_][^=$]*|°(?:/s)?)\s*")
 _NUMBERED = re.compile(r"\{([^{}]*)\}")
 
 
@@ -36,8 +36,8 @@ class Parameters:
         """Content of a table with its parameters and formulas replaced by numbers, each checked for its unit.
 
         Args:
-            content: of a file: ``"$name"`` is a parameter, ``"= ..."`` a formula, ``"30 deg"`` an angle, and ``{i}`` in
-                a text a number.
+            content: of a file: ``"$name"`` is a parameter, ``"= ..."`` a formula, ``"30 deg"`` and ``"2 mm"`` numbers
+                in another unit, and ``{i}`` in a text a number.
             place: location in the file, for messages.
             units: key -> unit of its number.
             unit: of the content itself, if it is a number or a list of numbers.
@@ -63,7 +63,7 @@ class Parameters:
         return content
 
     def _of_text(self, text: str, place: str, unit: str) -> Any:
-        """Number of a parameter, a formula or an angle in degrees; otherwise the text with its numbers filled in."""
+        """Number of a parameter, a formula or a text with a unit; otherwise the text with its numbers filled in."""
         if text.startswith("$"):
             require_known(place, text[1:], self.values, "there is no such parameter; choose from", text)
             asked_unit = self.units.get(text[1:], "")
@@ -75,10 +75,10 @@ class Parameters:
             require_usable(place, value)
             return value
         if unit:
-            radians = in_radians(place, text, unit)
-            if radians is None:
+            number = measured(place, text, unit)
+            if number is None:
                 raise _no_number(place, text, unit)
-            return radians
+            return number
         return _NUMBERED.sub(lambda index: f"{evaluated(place, index[1], self.quantities):g}", text)
 
     def beside(self, name: str, value: float) -> Parameters:
@@ -99,18 +99,26 @@ def _no_number(place: str, content: object, unit: str) -> InputError:
     return InputError(place, content, "this is not a number; give one" + (f" in {unit}" if unit != "1" else ""))
 
 
-def in_radians(field: str, text: str, unit: str) -> float | None:
-    """Number in radians of a text in degrees, ``30 deg`` or ``30 deg/s``; None for other texts.
+def measured(field: str, text: str, unit: str) -> float | None:
+    """Number in the unit of its place of a text with a unit, ``30 deg`` or ``2 mm``; None for other texts.
+
+    Args:
+        field: of the text, for messages.
+        text: a number and a unit, or anything else.
+        unit: of the place; several that are allowed are joined by OR.
 
     Raises:
-        InputError: a number of this place is no angle, or not of this unit.
+        InputError: the number of this place has another unit.
     """
-    match = _DEGREES.fullmatch(text)
+    match = _MEASURED.fullmatch(text)
     if match is None:
         return None
-    if f"rad{match[2] or ''}" not in unit.split(OR):
-        raise InputError(field, text, f"this number is in {unit}, and not in deg{match[2] or ''}")
-    return math.radians(float(match[1]))
+    si, factor = in_si(match[2])
+    if si in unit.split(OR):
+        return in_proportion(float(match[1]), factor)
+    if not is_known(match[2]):
+        return None
+    raise InputError(field, text, f"this number is in {unit}, and not in {match[2].strip()}")
 
 
 def unit_at(unit: Unit, index: int) -> str:

@@ -131,7 +131,8 @@ def _entry_point(name: str) -> EntryPoint:
     for point in announced(GROUP):
         if point.name == name:
             return point
-    raise InputError("engine", name, f"there is no such engine; choose one of {', '.join([*engine_names(), 'truth'])}")
+    require_known("engine", name, ["truth", *engine_names()], "there is no such engine; choose one of")
+    raise InputError("engine", name, "engines are held against it; name an engine")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,6 +18,7 @@ _SPELT: Mapping[str, str] = {
 _CONVERTED: Mapping[str, tuple[str, float]] = {
     "deg": ("rad", math.pi / 180),
     "deg/s": ("rad/s", math.pi / 180),
+    "deg/s^2": ("rad/s^2", math.pi / 180),
     "rpm": ("rad/s", math.pi / 30),
     "km": ("m", 1e3),
     "cm": ("m", 1e-2),
@@ -43,6 +44,18 @@ def in_si(unit: str) -> tuple[str, float]:
     """SI unit of a unit as another program writes it, and the factor on its numbers; an unknown unit is unchanged."""
     plain = _SPELT.get(unit.strip(), unit.strip())
     return _CONVERTED.get(plain, (plain, 1.0))
+
+
+def is_known(unit: str) -> bool:
+    """True if a text is a unit that is converted, or one that others are converted to."""
+    plain = _SPELT.get(unit.strip(), unit.strip())
+    return plain in _CONVERTED or any(plain == si for si, _ in _CONVERTED.values())
+
+
+def in_proportion(number: float, factor: float) -> float:
+    """Product of a number and a factor, correctly rounded where the factor is one over a whole number."""
+    divisor = round(1 / factor)
+    return number / divisor if divisor and float(1 / divisor) == factor else number * factor
 
 
 def name_and_unit(text: str) -> tuple[str, str | None]:

@@ -120,7 +120,7 @@ def _first_problem(
     if problem["type"] in _UNKNOWN:
         return no_such_key(f"{place}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], keys))
     if absent:
-        return InputError(f"{place}: {location}", "nothing", "this key is required; add it")
+        return InputError(f"{place}: {location}", None, "this key is required; add it")
     error_found = problem.get("ctx", {}).get("error")
     if isinstance(error_found, OutOfBounds):
         location = ".".join(filter(None, [location, error_found.field]))
@@ -128,7 +128,7 @@ def _first_problem(
     if problem["type"] in {"union_tag_invalid", "union_tag_not_found"}:
         key = problem["ctx"]["discriminator"].strip("'")
         if problem["type"] == "union_tag_not_found":
-            return InputError(f"{place}: {location}.{key}", "nothing", "this key is required; add it")
+            return InputError(f"{place}: {location}.{key}", None, "this key is required; add it")
         return InputError(
             f"{place}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
         )

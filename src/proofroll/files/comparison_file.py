@@ -81,8 +81,7 @@ def _checked(path: Path, content: dict[str, Any]) -> Comparison:
     bands = {name: _band(f"{place}: tolerances.{name}", table) for name, table in tolerances.items()}
     tables = content.get("rows")
     if not isinstance(tables, list) or not tables:
-        shown = "nothing" if tables is None else tables
-        raise InputError(f"{place}: rows", shown, "give at least one engine; write [[rows]] before each")
+        raise InputError(f"{place}: rows", tables, "give at least one engine; write [[rows]] before each")
     content["rows"] = [_prepared(f"{place}: rows.{index}", row) for index, row in enumerate(tables)]
     program: dict[str, object] = {"left_out": 0, "budget": None, "spent": 0.0, "absent": {}}  # no file may have these
     comparison = validated(Comparison, content, place, name=path.stem, bands=bands, **program)
@@ -133,7 +132,7 @@ def _band(place: str, content: object) -> Band:
     table = _table(place, content)
     because = table.pop("because", "")
     if not (isinstance(because, str) and because):
-        raise InputError(f"{place}.because", because or "nothing", "every tolerance needs its reason; add it")
+        raise InputError(f"{place}.because", because or None, "every tolerance needs its reason; add it")
     return Band(because, {name: Tolerance.parse(f"{place}.{name}", text) for name, text in table.items()})
 
 
@@ -196,7 +195,7 @@ def _check_expectations(place: str, row: Row) -> None:
             advice = "that holds for any engine; say with except_at where it agrees and where it differs"
             raise InputError(f"{place}.expect", " or ".join(claim), advice)
     if {*itertools.chain.from_iterable(claims)} - {Verdict.AGREES} and not row.because:
-        raise InputError(f"{place}.because", "nothing", "an expectation other than agreement needs its reason; add it")
+        raise InputError(f"{place}.because", None, "an expectation other than agreement needs its reason; add it")
 
 
 def _check_points(place: str, comparison: Comparison, chosen: Mapping[str, list[float]]) -> None:

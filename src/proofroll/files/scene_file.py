@@ -22,7 +22,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import LATEST
 from proofroll.core.validation import strict, units_of, validated
 from proofroll.files.data_folders import data_folder
-from proofroll.files.scene_parameters import Parameter, angles_read, check_parameters, values_of
+from proofroll.files.scene_parameters import Parameter, check_parameters, units_read, values_of
 from proofroll.files.scene_sources import source_of, stem_of
 from proofroll.files.toml import named_file, read_toml
 
@@ -73,7 +73,7 @@ _OWN = frozenset(item.name for item in dataclasses.fields(SceneFile)) - {"tables
 
 @cache
 def _units() -> tuple[str, ...]:
-    """All units that a number of a scene may have; nothing is converted."""
+    """All units that a number of a scene may have."""
     kinds = (kind.units.values() for kind in load_element_kinds())
     return tuple(dict.fromkeys([*units_of(Gravity).values(), *itertools.chain.from_iterable(kinds), "s", "N"]))
 
@@ -267,6 +267,6 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
         if Path(own_file).name != own_file or not (path.parent / own_file).is_file():
             advice = "there is no such file in the folder of the scene; copy it there, or take out its name"
             raise InputError(f"{path}: files", own_file, advice)
-    file = dataclasses.replace(file, parameters=angles_read(file.parameters, str(path)))
+    file = dataclasses.replace(file, parameters=units_read(file.parameters, str(path)))
     check_parameters(file.parameters, _units(), path)
     return file

@@ -12,7 +12,7 @@ from typing import Any
 from proofroll.core.bounds import require_usable
 from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.number_format import spaced
-from proofroll.core.parameters import in_radians
+from proofroll.core.parameters import measured
 
 _LONGEST_NAME = 200  # characters
 
@@ -22,8 +22,8 @@ class Parameter:
     """A number that a user may set by name.
 
     Attributes:
-        value: default, ``"30 deg"`` for one in rad, or the name of the parameter whose value is the default.
-        unit: of the value; nothing is converted.
+        value: default, perhaps with another unit, ``"30 deg"`` or ``"2 mm"``, or the name of the parameter that has it.
+        unit: of the value, an SI unit.
         symbol: as equations write it.
         meaning: description in one line, used in messages.
         source: origin of the number.
@@ -47,26 +47,26 @@ class Parameter:
     integer: bool = False
 
 
-def angles_read(parameters: Mapping[str, Parameter], place: str) -> dict[str, Parameter]:
-    """Parameters whose values and bounds in degrees, ``"30 deg"``, are in radians.
+def units_read(parameters: Mapping[str, Parameter], place: str) -> dict[str, Parameter]:
+    """Parameters whose values and bounds with another unit, ``"30 deg"`` or ``"2 mm"``, are in their own.
 
     Args:
         parameters: as a file declares them.
         place: name of the file, for messages.
 
     Raises:
-        InputError: a number in degrees is not in rad.
+        InputError: a number has a unit that is not converted to that of its parameter.
     """
     read = {}
     for name, parameter in parameters.items():
         changes: dict[str, Any] = {}
         for key in ("value", "above", "at_least", "below", "at_most"):
             text = getattr(parameter, key)
-            radians = (
-                in_radians(f"{place}: parameters.{name}.{key}", text, parameter.unit) if isinstance(text, str) else None
+            number = (
+                measured(f"{place}: parameters.{name}.{key}", text, parameter.unit) if isinstance(text, str) else None
             )
-            if radians is not None:
-                changes[key] = radians
+            if number is not None:
+                changes[key] = number
         read[name] = replace(parameter, **changes)
     return read
 
@@ -83,7 +83,7 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
         if len(name) > _LONGEST_NAME or not name.isprintable():
             advice = f"a name is one line of at most {_LONGEST_NAME} printable characters"
             raise InputError(f"{path}: parameters", name, advice)
-        advice = "this unit is not known, and nothing is converted; write the value in"
+        advice = "this unit is not known; write the value in"
         require_known(f"{place}.unit", parameter.unit, known_units, advice)
         for key in ("value", "above", "at_least", "below", "at_most"):
             end = getattr(parameter, key)
@@ -141,8 +141,8 @@ def _number(name: str, value: object, parameter: Parameter) -> float:
     try:
         if isinstance(value, str) and "_" in value:  # which Python would ignore
             raise ValueError
-        radians = in_radians(name, value, parameter.unit) if isinstance(value, str) else None
-        number = float(value) if radians is None else radians
+        converted = measured(name, value, parameter.unit) if isinstance(value, str) else None
+        number = float(value) if converted is None else converted
     except (ValueError, OverflowError):
         raise InputError(name, value, f"this is not a number; give one in {parameter.unit}") from None
     if math.isnan(number) or (math.isinf(number) and not (parameter.unbounded and number > 0)):

@@ -1,5 +1,6 @@
 """TOML files: reading them with one clear line about the first mistake, and finding those of a study."""
 
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +12,7 @@ from proofroll.files.data_folders import study_folders
 # Limits on a file's size and nesting, far above those of real files: beyond them reading is slow or recurses too deep.
 _MOST_BYTES = 1 << 18
 _DEEPEST = 16
+_LONGEST_LINE = 80  # characters that a message shows of a file's line
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -22,11 +24,12 @@ def read_toml(path: Path) -> dict[str, Any]:
             text = file.read(_MOST_BYTES + 1)
         if len(text) > _MOST_BYTES:
             raise InputError("file", path, f"the file is larger than {_MOST_BYTES >> 10} kB; shorten it")
-        content = tomllib.loads(text.decode("utf-8-sig"))  # some editors begin with a byte-order mark
+        lines = text.decode("utf-8-sig")  # some editors begin with a byte-order mark
+        content = tomllib.loads(lines)
     except UnicodeDecodeError:
         raise InputError("file", path, "the file is broken: it is no text in UTF-8") from None
     except ValueError as error:  # no TOML, or an integer of thousands of digits
-        raise InputError("file", path, f"the file is broken: {error}") from None
+        raise InputError("file", path, f"the file is broken: {error}{_line_of(error, lines)}") from None
     except RecursionError:
         raise _too_deep(path) from None
     except OSError as error:
@@ -38,6 +41,15 @@ def read_toml(path: Path) -> dict[str, Any]:
     if level:
         raise _too_deep(path)
     return content
+
+
+def _line_of(error: ValueError, text: str) -> str:
+    """Clause with the line of a text that an error names; empty if it names none."""
+    number = re.search(r"\(at line (\d+)", str(error))
+    if number is None:
+        return ""
+    line = text.splitlines()[int(number[1]) - 1].strip()
+    return f": {line if len(line) <= _LONGEST_LINE else f'{line[:_LONGEST_LINE]}…'}"
 
 
 def _too_deep(path: Path) -> InputError:
@@ -68,7 +80,7 @@ def study_content(path: Path, study: str) -> dict[str, Any]:
         InputError: the file is broken, or belongs to another study.
     """
     content = read_toml(path)
-    kind = content.pop("study", "nothing")
+    kind = content.pop("study", None)
     if kind != study:
         raise InputError(f"{path}: study", kind, f'only a file with study = "{study}" can be used here')
     return content

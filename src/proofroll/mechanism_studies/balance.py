@@ -262,6 +262,8 @@ def _asked(
             engine_spectrum = spectrum(place, _STEP)
         except Refused:
             return _judged(EngineBalance(engine=text, efforts=efforts, reactions=force), tolerance, 0.0)
+    except InputError:
+        raise
     except ProofrollError as error:
         return EngineBalance(engine=text, refused=str(error))
     size = float(np.abs(truth.eigenvalues).max(initial=0.0))

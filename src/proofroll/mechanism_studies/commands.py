@@ -24,6 +24,7 @@ def balance(
     settings: options.Set = None,
     engine: options.Engines = None,
     hold: Annotated[list[str] | None, typer.Option(help="Joint that is held where it starts; repeat.")] = None,
+    control: options.Control = None,
     tolerance: Annotated[float, typer.Option(help="Relative difference up to which an engine agrees.")] = 1e-3,
     as_json: options.Json = False,
 ) -> None:
@@ -35,6 +36,7 @@ def balance(
     """
     from proofroll.mechanism_studies.balance import balance as found
 
+    scene = options.controlled(scene, control)
     with options.spinner(scene) as says:
         study = found(
             scene,

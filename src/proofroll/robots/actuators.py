@@ -1,9 +1,11 @@
-"""Actuators of an MJCF as tables of a scene, with their controls at zero."""
+"""Actuators of an MJCF as tables of a scene, with constant controls."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element
 
+from proofroll.core.errors import InputError
+from proofroll.core.number_format import counted
 from proofroll.robots.mjcf.defaults import class_of, with_classes
 from proofroll.robots.model import Robot
 from proofroll.robots.robot_file import floats
@@ -13,15 +15,31 @@ _PLAIN = {"motor", "position", "velocity", "general"}
 _OTHER = {"dyntype": "none", "gaintype": "fixed", "timeconst": "0", "dampratio": "0", "actlimited": "false"}
 
 
-def scene_actuators(root: Element, robot: Robot) -> tuple[list[dict[str, Any]], list[str]]:
-    """Tables of the actuators that a scene can represent, and a clause for each other one."""
+def scene_actuators(
+    root: Element, robot: Robot, controls: Sequence[float] = ()
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Tables of the actuators that a scene can represent, and a clause for each other one.
+
+    Args:
+        root: of the MJCF.
+        robot: the robot of the file.
+        controls: of its actuators, in their order; empty: all are zero.
+
+    Raises:
+        InputError: there are more or fewer controls than actuators.
+    """
+    elements = [item for part in root.findall("actuator") for item in part]
+    if controls and len(controls) != len(elements):
+        advice = f"this keyframe has {counted(len(controls), 'controls')}, and the file {len(elements)} actuators"
+        raise InputError("<key ctrl>", list(controls), advice)
     single = {joint.name for joint in robot.moving if joint.dofs == 1}
     actuators: list[dict[str, Any]] = []
     clauses = []
-    for number, element in enumerate(item for part in root.findall("actuator") for item in part):
+    for number, element in enumerate(elements):
         name = element.get("name") or f"actuator{number}"
         attributes = _given(root, element)
-        table = _table(element.tag, attributes) if attributes.get("joint") in single else None
+        control = controls[number] if controls else 0.0
+        table = _table(element.tag, attributes, control) if attributes.get("joint") in single else None
         rival = next((row for row in actuators if row["joint"] == attributes.get("joint")), None)
         if table is None or (rival is not None and (merged := _merged(rival, table)) is None):
             clauses.append(f"the actuator {element.tag} {name}")
@@ -47,15 +65,16 @@ def _given(root: Element, element: Element) -> dict[str, str]:
         if tag != element.tag:
             kp, kv = of_class.pop("kp", None), of_class.pop("kv", None)
             if element.tag == "general" and (kp or kv):
-                of_class |= {"biastype": "affine", "biasprm": f"0 {-float(kp or 0)} {-float(kv or 0)}"}
+                bias = f"0 {-float(kp or 0)} {-float(kv or 0)}"
+                of_class |= {"gainprm": str(kp or kv), "biastype": "affine", "biasprm": bias}
             if element.tag == "position" and "gainprm" in of_class:
                 of_class["kp"] = of_class["gainprm"].split()[0]
         attributes |= of_class
     return attributes | element.attrib
 
 
-def _table(tag: str, attributes: Mapping[str, str]) -> dict[str, Any] | None:
-    """Kind, gains, gear, target and limit of an actuator; None: a scene cannot represent it."""
+def _table(tag: str, attributes: Mapping[str, str], control: float) -> dict[str, Any] | None:
+    """Kind, gains, gear, target and limit of an actuator with this control; None: a scene cannot represent it."""
     if tag not in _PLAIN or any(attributes.get(key, plain) != plain for key, plain in _OTHER.items()):
         return None
     kp, kd = _gains(tag, attributes)
@@ -66,9 +85,10 @@ def _table(tag: str, attributes: Mapping[str, str]) -> dict[str, Any] | None:
         return None
     actuator: dict[str, Any] = {"kind": "position" if kp else "velocity" if kd else "torque", "gear": gear}
     actuator |= {name: value for name, value in (("kp", kp), ("kd", kd)) if value}
-    target = min(max(0.0, low), high) if (low, high) != (0.0, 0.0) else 0.0
+    target = min(max(control, low), high) if (low, high) != (0.0, 0.0) else control
     if target and tag == "general":
-        return None  # its gain need not be that of its bias
+        gain = (floats(attributes.get("gainprm", "")) or [1.0])[0]
+        target *= gain / (kp or kd or 1.0)
     return actuator | {"target": target} | ({"limit": force[1] * abs(gear)} if force else {})
 
 

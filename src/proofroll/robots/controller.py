@@ -308,7 +308,7 @@ def _gains(name: str, row: Any) -> dict[str, Any]:
     """Table of gains; a single pattern stands for a list of one."""
     _require_table(name, row)
     if "joints" not in row:
-        raise InputError(f"{name}.joints", "nothing", "name the joints, or a pattern as *_HAA")
+        raise InputError(f"{name}.joints", None, "name the joints, or a pattern as *_HAA")
     patterns = [row["joints"]] if isinstance(row["joints"], str) else row["joints"]
     filled: dict[str, Any] = _NO_NUMBERS.filled({**row, "joints": patterns}, name, units_of(Gains))
     return filled

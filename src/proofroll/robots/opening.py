@@ -38,24 +38,26 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
 
 
 def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> RobotFile:
-    root, driven = read_xml(path), dict[str, float]()
+    root, driven, rotors = read_xml(path), dict[str, float](), dict[str, float]()
+    controls: tuple[tuple[float, ...], ...] = ()
     if root.tag == "robot":
         _require_plain(root, path)
         if base == "free":
             urdf.rename_world(root)
         contained = names_files_inside(root, path.resolve().parent, inside)
-        driven = urdf.driven_joints(root)
+        driven, rotors = urdf.driven_joints(root), urdf.rotor_inertias(root)
         kind, (root, remarks), body = "urdf", urdf.neutral_urdf(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
-        kind, (root, remarks, contained), body = "mjcf", neutral_mjcf(root, path, inside, expand), "body"
+        kind, (root, remarks, contained, controls), body = "mjcf", neutral_mjcf(root, path, inside, expand), "body"
     else:
         raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
     count = sum(1 for _ in root.iter(body))
     if count > MOST_BODIES:
         raise InputError("file", path, f"it has {count} {body}s; at most {MOST_BODIES} are checked")
     return RobotFile(
-        path=path, kind=kind, root=root, base=base, remarks=tuple(remarks), contained=contained, driven=driven
-    )
+        path=path, kind=kind, root=root, base=base, remarks=tuple(remarks), contained=contained, driven=driven,
+        rotors=rotors, controls=controls,
+    )  # fmt: skip
 
 
 def _require_plain(root: Element, path: Path) -> None:

@@ -208,7 +208,9 @@ def options_of(written: Mapping[str, Any], engine: str) -> dict[str, bool]:
     options = {}
     for key, value in written.items():
         if str(value).lower() not in {"true", "false"}:
-            raise InputError(f"{engine}: {key}", value, "write true or false")
+            raise InputError(
+                f"{engine}: {key}", value, "nothing is run here; an option of an importer is true or false"
+            )
         options[key] = str(value).lower() == "true"
     return options
 

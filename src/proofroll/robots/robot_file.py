@@ -43,6 +43,8 @@ class RobotFile:
         contained: True if all files that it names, textures included, lie in the folder that files are read from.
         driven: joints to which transmissions of a URDF lead, with their reductions (turns of the motor per turn of the
             joint); empty: it has none, and says nothing of drives.
+        rotors: joint -> inertia of the rotors in its transmissions, reflected to the joint [kg m² or kg].
+        controls: for each keyframe of an MJCF the controls of its actuators, in their order; empty: it gives none.
     """
 
     path: Path
@@ -52,6 +54,8 @@ class RobotFile:
     remarks: tuple[LintRemark, ...] = ()
     contained: bool = True
     driven: Mapping[str, float] = dataclasses.field(default_factory=dict, hash=False)
+    rotors: Mapping[str, float] = dataclasses.field(default_factory=dict, hash=False)
+    controls: tuple[tuple[float, ...], ...] = ()
 
 
 # Function: name -> content of a file (first) and of the files that it attaches -> content with macros written out.

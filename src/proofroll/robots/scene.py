@@ -51,6 +51,9 @@ class RobotScenes:
         if any(len(part) for part in file.root.findall("actuator")):
             words = "whether the file's actuators act, with their controls at zero (1), or not (0)"
             parameters["actuators"] = (0, "1", words, SWITCH)
+        if any(map(any, file.controls)):
+            words = "number of the file's keyframe whose controls the actuators have (0: they are zero)"
+            parameters["keyframe"] = (0, "1", words, {"at_least": 0, "at_most": len(file.controls), "integer": True})
         return {
             "title": f"{robot.name}, released from a random pose",
             "reason": "How engines move this robot",
@@ -65,7 +68,8 @@ class RobotScenes:
             InputError: nothing in the file moves, or a link has an impossible inertia.
         """
         file, robot = read_robot(path, BASES[int(values.get("free_base", 0))])
-        acting, silent = scene_actuators(file.root, robot) if values.get("actuators") else ([], [])
+        controls = ((), *file.controls)[int(values.get("keyframe", 0))]
+        acting, silent = scene_actuators(file.root, robot, controls) if values.get("actuators") else ([], [])
         clauses = [f"{what} (actuators=0 leaves all out)" for what in silent]
         start = random_states(robot, 1, int(values["seed"]))
         start = held_start(robot, start) if values["couplings"] else start

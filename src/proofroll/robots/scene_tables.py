@@ -127,6 +127,8 @@ def _omitted(file: RobotFile, robot: Robot, values: Mapping[str, float]) -> Iter
     actuators = sum(len(part) for part in file.root.findall("actuator"))
     if actuators and values.get("actuators") == 0:
         yield f"{counted(actuators, 'actuators')} (actuators=1)"
+    if values.get("actuators") and values.get("keyframe") == 0:
+        yield f"controls of {counted(len(file.controls), 'keyframes')} (keyframe=1)"
     for law in _FACTORS:
         if values.get(law) == 0 and any(getattr(joint, law) for joint in robot.moving):
             yield f"{law} of joints ({law}=1)"
@@ -141,9 +143,12 @@ def _omitted(file: RobotFile, robot: Robot, values: Mapping[str, float]) -> Iter
 
 
 def read_robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
-    """File of a robot, and the robot that it describes."""
+    """File of a robot, and the robot that it describes, with the rotors of its transmissions as armatures."""
     file = opened(path, base)
-    return file, robot_of_text(file.path, file.kind, base, tostring(file.root, "utf-8"))
+    robot = robot_of_text(file.path, file.kind, base, tostring(file.root, "utf-8"))
+    rotors = file.rotors
+    joints = (replace(joint, armature=joint.armature + rotors.get(joint.name, 0.0)) for joint in robot.joints)
+    return file, robot.change(joints=tuple(joints)) if rotors else robot
 
 
 def _names(robot: Robot) -> dict[str, str]:

@@ -69,6 +69,30 @@ def driven_joints(root: Element) -> dict[str, float]:
     return reductions
 
 
+def rotor_inertias(root: Element) -> dict[str, float]:
+    """Joint -> inertia of the rotors of its transmissions times the squares of their gear ratios, as Drake reads them.
+
+    Raises:
+        InputError: an inertia or a ratio is no number, or negative.
+    """
+    inertias: dict[str, float] = {}
+    for item in root.findall("transmission"):
+        inertia, ratio = _of_actuator(item, "rotor_inertia", "0"), _of_actuator(item, "gear_ratio", "1")
+        for joint in item.findall("joint") if inertia and ratio else ():
+            name = joint.get("name", "")
+            inertias[name] = inertias.get(name, 0.0) + inertia * ratio**2
+    return inertias
+
+
+def _of_actuator(transmission: Element, key: str, default: str) -> float:
+    """Number in an element of Drake's below the actuator of a transmission."""
+    elements = (item for item in transmission.iter() if str(item.tag).rpartition("}")[2] in {key, f"drake:{key}"})
+    value = next((numbers(item, "value", default, 1)[0] for item in elements), float(default))
+    if value < 0:
+        raise InputError(f"<drake:{key} value>", value, "it must be at least 0")
+    return value
+
+
 def _reduction(element: Element) -> float:
     try:
         return float(element.text or "") or 1.0

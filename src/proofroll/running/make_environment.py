@@ -55,7 +55,7 @@ def add(
         raise InputError("engine", name, advice)
     if not requirements:
         raise InputError(
-            "--requirement", "nothing", f"say what to install, e.g. --requirement {package_of(name) or name}==VERSION"
+            "--requirement", None, f"say what to install, e.g. --requirement {package_of(name) or name}==VERSION"
         )
     for text in requirements:
         if text.lstrip().startswith("-"):

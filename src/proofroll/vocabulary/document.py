@@ -138,11 +138,11 @@ Parameter = value of the scene; parameter = values at whose every combination th
 INTRODUCTION = """# The vocabulary of scenes and comparisons
 
 Written from what reads the files; `proofroll vocabulary WORD` prints a part of it. `proofroll check NAME` says
-whether a file is sound, and an unknown key is an error. SI units, angles in rad; nothing is converted. In a scene
+whether a file is sound, and an unknown key is an error. SI units, angles in rad. In a scene
 `"$name"` is the value of a parameter, and `"= mass*length^2/12"` is a formula of parameters with `+ - * / ^ ( )`,
-`pi`, `sin`, `cos`, `tan`, `asin`, `acos`, `atan`, `atan2`, `sqrt`, `hypot` and `abs`; `"30 deg"` is an angle in rad.
-They must have the unit of their place; a bare number takes the unit of what it is added to, and has none in a
-product.
+`pi`, `sin`, `cos`, `tan`, `asin`, `acos`, `atan`, `atan2`, `sqrt`, `hypot` and `abs`; `"30 deg"` and `"2 mm"` are
+converted. They must have the unit of their place; a bare number takes the unit of what it is added to, and has none
+in a product.
 """
 
 

@@ -152,7 +152,7 @@ def test_engines_of_other_packages_are_found(install_engines: Callable[[Mapping[
 def test_unknown_engine() -> None:
     """An engine that nobody announces is answered with those that exist."""
     with pytest.raises(
-        InputError, match=r"engine = 'adams': there is no such engine; choose one of .*projection.*truth"
+        InputError, match=r"engine = 'adams': there is no such engine; choose one of truth, .*projection"
     ):
         load_engine("adams")
 

@@ -1,5 +1,6 @@
 """Equilibria, efforts that hold them, and eigenvalues, against closed forms; and in engines."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -126,3 +127,21 @@ def test_every_engine_finds_the_balance_of_an_arm_under_servos() -> None:
         assert item.efforts is not None
         assert item.eigenvalues is not None
         assert max(item.efforts, item.eigenvalues) < 1e-6
+
+
+def test_a_robot_is_balanced_under_its_controller(tmp_path: Path) -> None:
+    """An arm of 2 kg at 0.25 m sinks from its target of 45 degrees until 20 (target - q) = m g l cos(q)."""
+    inertia = '<inertia ixx="0.002" iyy="0.02" izz="0.02"/>'
+    (tmp_path / "arm.urdf").write_text(
+        f'<robot name="arm"><link name="base"/><link name="upper"><inertial><origin xyz="0.25 0 0"/><mass value="2"/>'
+        f'{inertia}</inertial></link><joint name="j1" type="continuous"><parent link="base"/><child link="upper"/>'
+        f'<axis xyz="0 -1 0"/></joint></robot>'
+    )
+    control = tmp_path / "hold.toml"
+    control.write_text('[[gains]]\njoints = "*"\nkp = 20\nkd = 2.75\n[targets]\nj1 = "45 deg"\n')
+    arguments = [str(tmp_path / "arm.urdf"), "--control", str(control), "--engine", "projection", "--json"]
+    answer = CliRunner().invoke(app, ["balance", *arguments])
+    assert answer.exit_code == 0, answer.output
+    values = {item["name"]: item["value"] for item in json.loads(answer.stdout)["values"]}
+    assert values["q.j1"] == pytest.approx(0.580295411627, abs=1e-11)
+    assert values["effort.j1"] == pytest.approx(2 * 9.81 * 0.25 * np.cos(values["q.j1"]), rel=1e-12)

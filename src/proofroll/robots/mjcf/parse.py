@@ -11,7 +11,15 @@ from xml.etree.ElementTree import Element
 from proofroll.core.errors import InputError
 from proofroll.robots.mjcf.defaults import classed
 from proofroll.robots.mjcf.meshes import remove_height_fields, remove_meshes
-from proofroll.robots.robot_file import MOST_ELEMENTS, Expand, LintRemark, names_files_inside, read_xml, required_file
+from proofroll.robots.robot_file import (
+    MOST_ELEMENTS,
+    Expand,
+    LintRemark,
+    names_files_inside,
+    numbers,
+    read_xml,
+    required_file,
+)
 
 # Largest depth of includes.
 _DEEPEST = 8
@@ -26,7 +34,6 @@ _LOOKS = {
     "skin",
     "hfield",
     "sensor",
-    "keyframe",
     "contact",
     "custom",
 }
@@ -39,8 +46,8 @@ _MACROS = {"replicate", "attach", "composite"}
 
 def neutral_mjcf(
     root: Element, path: Path, inside: Path, expand: Expand | None = None
-) -> tuple[Element, list[LintRemark], bool]:
-    """Copy of an MJCF, remarks on omissions, and True if all files that the MJCF names lie in ``inside``.
+) -> tuple[Element, list[LintRemark], bool, tuple[tuple[float, ...], ...]]:
+    """Copy of an MJCF, remarks on omissions, True if all its files lie in ``inside``, and controls of its keyframes.
 
     The only files that the copy names are meshes that exist in that folder.
 
@@ -50,6 +57,9 @@ def neutral_mjcf(
     parts: dict[str, Element] = {}
     remarks, contained = _add(root, path, path.resolve(), inside, parts)
     root = next(iter(parts.values()))
+    controls = _controls_of_keyframes(root)
+    for part in parts.values():
+        part[:] = [child for child in part if child.tag != "keyframe"]
     macros = [name for name in sorted(_MACROS) if any(part.find(f".//{name}") is not None for part in parts.values())]
     if macros:
         names = ", ".join(f"<{name}>" for name in macros)
@@ -60,7 +70,13 @@ def neutral_mjcf(
         root = expand(parts)
         remarks.append(LintRemark("note", names, "written out by the engine that defines the format, to six digits"))
     name_all(root)
-    return root, remarks, contained
+    return root, remarks, contained, controls
+
+
+def _controls_of_keyframes(root: Element) -> tuple[tuple[float, ...], ...]:
+    """Controls of each keyframe, which may be none."""
+    keys = [key for part in root.findall("keyframe") for key in part.findall("key")]
+    return tuple(tuple(numbers(key, "ctrl", "", len(key.get("ctrl", "").split()))) for key in keys)
 
 
 def _written_out(element: Element) -> float:

@@ -187,7 +187,7 @@ def _check(place: str, file: StabilityFile) -> None:
     scene = load_scene(file.scene)
     for index, axis in enumerate(file.axes):
         if not axis.values:
-            raise InputError(f"{place}: axes.{index}.values", "nothing", "an axis needs its values; add them")
+            raise InputError(f"{place}: axes.{index}.values", None, "an axis needs its values; add them")
         for value in axis.values:
             # a parameter may be infinite, but not the length of a run
             if not value > -math.inf or (axis.horizon and not (math.isfinite(value) and value > 0)):
@@ -199,7 +199,7 @@ def _check(place: str, file: StabilityFile) -> None:
     for index, claim in enumerate(file.claims):
         claim_place = f"{place}: claims.{index}"
         if not claim.because:
-            raise InputError(f"{claim_place}.because", "nothing", "every claim needs its reason; add it")
+            raise InputError(f"{claim_place}.because", None, "every claim needs its reason; add it")
         with error_location(claim_place):
             parse_engine(claim.engine)
         for name in claim.axes:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
@@ -130,6 +131,9 @@ def stability(
     for curve in (curve for curve in curves if curve.facts.resolution is None):
         absent[curve.engine] = "has neither step nor tolerance: exact at any time, it has no boundary to look for"
     curves = [curve for curve in curves if curve.facts.resolution is not None]
+    for curve in (curve for curve in curves if curve.fixed):
+        advice = f"a map looks for the largest {curve.facts.resolution} itself; leave it out"
+        raise InputError("engine", curve.engine, advice)
     curves = _matched(curves) if effort.matched else curves
     asked = axis_values(scene, axes, effort)
     values = [axis_value for axis_value in asked if isinstance(axis_value, AxisValue)]

@@ -245,12 +245,12 @@ def _check(place: str, file: TradeoffClaims) -> None:
     unit = file.swept.loaded.observable(file.quantity, f"{place}: quantity").unit
     if not (file.cheapest or file.holds or file.converges):
         advice = "the file claims nothing; add [[cheapest]] with tolerance, engine and because"
-        raise InputError(f"{place}: cheapest", "nothing", advice)
+        raise InputError(f"{place}: cheapest", None, advice)
     for kind in ("cheapest", "holds", "converges"):
         for index, claim in enumerate(getattr(file, kind)):
             claim_place = f"{place}: {kind}.{index}"
             if not claim.because:
-                raise InputError(f"{claim_place}.because", "nothing", "every claim needs its reason; add it")
+                raise InputError(f"{claim_place}.because", None, "every claim needs its reason; add it")
             for text in claim.engine if kind == "cheapest" else [claim.engine]:
                 with error_location(claim_place):
                     parse_engine(text)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,7 +14,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, Vectors, largest_difference
 from proofroll.core.convergence import envelope, is_floor
 from proofroll.core.dataset import BETWEEN, off_impacts
+from proofroll.core.engine import whole_steps
 from proofroll.core.limits import STUDY_TIME_LIMIT
+from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
@@ -46,17 +49,19 @@ class Question:
         parameters: its parameters that differ from the defaults.
         until: length of every run [s].
         quantity: observable that decides how far the sweep goes.
+        samples: sampling intervals per run, an even number.
     """
 
     scene: str
     parameters: dict[str, float]
     until: float
     quantity: str
+    samples: int = SAMPLES
 
     @property
     def every(self) -> float:
         """Sampling interval [s]."""
-        return float(f"{self.until / SAMPLES:.12g}")
+        return float(f"{self.until / self.samples:.12g}")
 
     @property
     def sparse(self) -> float:
@@ -66,6 +71,19 @@ class Question:
     def step(self, factor: float) -> float:
         """Step of ``factor`` sampling intervals [s], rounded to 12 digits (0.005 instead of 0.005000000000000001)."""
         return float(f"{self.every * factor:.12g}")
+
+    def sampled_for(self, curves: Iterable[Curve]) -> Question:
+        """The same, with an interval of whole steps of each curve that has one step, or a part of such a step.
+
+        Raises:
+            InputError: the step of a curve does not divide the length of the runs.
+        """
+        steps = [curve.facts.step for curve in curves if curve.fixed and curve.facts.step is not None]
+        counts = [whole_steps(0.0, self.until, step) for step in steps]
+        common = math.gcd(*counts)
+        divisors = (number for number in range(self.samples, 2 * self.samples, 2) if common % number == 0)
+        together = math.lcm(2, *counts)
+        return replace(self, samples=next(divisors, together * math.ceil(self.samples / together)))
 
     @cached_property
     def loaded(self) -> Scene:
@@ -166,6 +184,12 @@ class Curve:
     def fixed_step(self) -> bool:
         """True if the curve is swept over steps; False: over tolerances."""
         return self.facts.resolution == "dt"
+
+    @property
+    def fixed(self) -> bool:
+        """True if the curve is one point: nothing can be refined, or the user gave the step or the tolerance."""
+        resolution = self.facts.resolution
+        return resolution is None or resolution in parse_engine(self.engine).options
 
     def setting(self, facts: EngineFacts) -> dict[str, Any]:
         """Values of the fields of :class:`SweptSetting` with the facts of one of its runs."""

@@ -150,8 +150,10 @@ def sweep(
 
 def _first(question: Question, curve: Curve) -> list[float]:
     if curve.facts.resolution is None:
-        return [0.0]  # a closed form has nothing to refine: one point
+        return [0.0]  # a closed form
     usual = float(curve.facts.settings[curve.facts.resolution])
+    if curve.fixed:
+        return [usual]
     if curve.fixed_step:
         return [question.step(factor) for factor in _STEPS]
     return list(dict.fromkeys([*_TOLERANCES, usual]))
@@ -168,7 +170,7 @@ def _further(
 
     Refinement ends at the truth's error bar, or at the round-off of double precision.
     """
-    if curve.facts.resolution is None or not curve.points:
+    if curve.fixed or not curve.points:
         return []
     values = []
     scale = references[question.every].scale(question.quantity) or 1.0

@@ -125,6 +125,7 @@ def tradeoff(question: Question, runner: Runner, extent: Extent, progress: Progr
     curves, absent = curves_of(extent.engines, runner.workers, scene.requires)
     if not curves:
         raise Missing("there is no engine to measure: " + "; ".join(f"{name}: {why}" for name, why in absent.items()))
+    question = question.sampled_for(curves)
     tell = progress or (lambda _: None)
 
     def arrived(case: Case, _: Result) -> None:

@@ -65,7 +65,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
         for table, items in tables.items():
             made[table] += items
     if not made["bodies"]:
-        raise InputError("bodies", "none", "a mechanism needs a body; add a [[bodies]] table")
+        raise InputError("bodies", None, "a mechanism needs a body; add a [[bodies]] table")
     parts: dict[str, Any] = {kind: tuple(items) for kind, items in made.items()}
     law, control = content.get("impacts", IN_ANY_ORDER), made_control(content.get("control"), numbers)
     mechanism = Mechanism(

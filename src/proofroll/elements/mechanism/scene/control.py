@@ -85,7 +85,7 @@ def made_control(table: Any, numbers: Parameters) -> Control | None:
             raise no_such_key(f"control.{key}", table[key], _KEYS)
     for key in ("rate", "actuators"):
         if key not in table:
-            raise InputError(f"control.{key}", "nothing", "this key is required; add it")
+            raise InputError(f"control.{key}", None, "this key is required; add it")
     filled = numbers.filled(dict(table), "control", {"rate": "Hz", "scale": "rad or m", "pose": "rad or m"})
     call = filled.pop("call", None)
     if call is not None and not isinstance(call, str):

@@ -149,7 +149,7 @@ class Coupling:
             return
         for key in ("joint_a", "joint_b"):
             if not getattr(self, key):
-                raise InputError(f"{place}.{key}", "nothing", "name it; or give joints and coefficients")
+                raise InputError(f"{place}.{key}", None, "name it; or give joints and coefficients")
         if not self.ratio:
             raise InputError(
                 f"{place}.ratio", 0.0, "it would hold joint_b and leave joint_a free; fix the joint instead"

@@ -13,7 +13,7 @@ from simpleeval import InvalidExpression, SimpleEval
 from proofroll.core.errors import InputError, no_such_key, require_known
 from proofroll.core.expressions import CONSTANTS, LONGEST, evaluated, evaluator
 from proofroll.core.expressions import FUNCTIONS as OF_PARAMETERS
-from proofroll.core.parameters import Parameters, in_radians
+from proofroll.core.parameters import Parameters, measured
 from proofroll.core.quantity import Quantity
 from proofroll.elements.mechanism.scene import checks
 from proofroll.elements.mechanism.scene.kinks import KINKED, beside, functions_of, kinks_in
@@ -246,7 +246,7 @@ def read_signal(field: str, entry: Any, numbers: Parameters, unit: str = "") -> 
                 raise InputError("hold", hold, "give true (each value holds until the next) or false")
             filled = {key: numbers.filled(entry.get(key, []), key, {}, axes[key]) for key in axes}
             return Table(**filled, hold=hold)
-        if isinstance(entry, str) and not entry.startswith(("=", "$")) and in_radians(field, entry, unit) is None:
+        if isinstance(entry, str) and not entry.startswith(("=", "$")) and measured(field, entry, unit) is None:
             raise InputError(
                 field, entry, "give a number, a formula that begins with =, or a table of times and values"
             )

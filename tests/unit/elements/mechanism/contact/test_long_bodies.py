@@ -110,7 +110,7 @@ def test_a_cylinder_lands_on_its_end_and_stands() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"length": None}, "geometries.log.length = 'nothing': a capsule needs it; add it"),
+        ({"length": None}, "geometries.log.length is missing: a capsule needs it; add it"),
         ({"length": 0.0}, "geometries.log.length = 0.0: give one above 0; without it this is a sphere or a circle"),
         ({"length": -1.0}, "geometries.log.length = -1.0: must be at least 0"),
         ({"length": float("nan")}, "geometries.log.length = nan: must be finite"),

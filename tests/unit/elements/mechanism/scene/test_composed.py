@@ -26,7 +26,7 @@ def of_truth(mechanism: Mechanism) -> Any:
 @pytest.mark.parametrize(
     ("kind", "lines", "words"),
     [
-        ("screw", "", "joints.0.lead = 'nothing': this key is required"),
+        ("screw", "", "joints.0.lead is missing: this key is required"),
         ("screw", "lead = 0", "joints.j.lead = 0.0: a screw without lead is a revolute joint"),
         ("screw", "led = 0.1", "joints.0.led"),
         ("screw", 'lead = "3 mm"', "joints.0.lead"),

@@ -176,7 +176,7 @@ def test_efforts_go_through_the_gear_and_the_limit_is_at_the_joint(more: dict[st
             '[[couplings]]\nname = "g"\njoints = ["j", "k"]\ncoefficients = [1, 2]\njoint_a = "j"',
             "couplings.g.joints = ['j', 'k']: give these, or joint_a, joint_b and ratio; not both",
         ),
-        ('[[couplings]]\nname = "g"\njoint_a = "j"\nratio = 1', "couplings.g.joint_b = 'nothing': name it"),
+        ('[[couplings]]\nname = "g"\njoint_a = "j"\nratio = 1', "couplings.g.joint_b is missing: name it"),
         (
             '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = 1\noffset = 0.1',
             "couplings.g = 'j to k': q0 of k is -0.1 rad (or m) off",

@@ -109,7 +109,7 @@ class Geometry:
             if not asked and value != usual.get(key):
                 raise InputError(f"{where}.{key}", value, f"{_a(self.kind)} has none; it has {_key_list(self.kind)}")
             if asked and value is None:
-                raise InputError(f"{where}.{key}", "nothing", f"{_a(self.kind)} needs it; add it")
+                raise InputError(f"{where}.{key}", None, f"{_a(self.kind)} needs it; add it")
         if self.radius is not None:
             radius = checks.number(f"{where}.radius", self.radius, at_least=0)
             if self.kind != "sphere" and not radius:

@@ -46,7 +46,7 @@ def made(
         ({**STONE, "axes": [1, 1, 0]}, "geometries.stone.axes = (1.0, 1.0, 0.0): each must be above 0"),
         ({**STONE, "axes": [0.2, 0.1, 1e-6]}, "geometries.stone.axes = (0.2, 0.1, 1e-06): the largest may be at most"),
         ({**BALL, "kind": "circle", "radius": 0}, "geometries.ball.radius = 0.0: a circle has a radius above 0"),
-        ({"name": "box", "body": "b", "kind": "box"}, "geometries.box.size = 'nothing': a box needs it; add it"),
+        ({"name": "box", "body": "b", "kind": "box"}, "geometries.box.size is missing: a box needs it; add it"),
         ({**PLANE, "normal": [0, 0, 0]}, "geometries.floor.normal"),
         ({**STONE, "radius": 1}, "geometries.stone.radius = 1.0: an ellipsoid has none; it has axes and orientation"),
         ({**PLANE}, "geometries.floor.name = 'floor': this name is used twice"),
