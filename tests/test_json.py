@@ -31,8 +31,8 @@ from proofroll.report.comparison.records import (
     WorstJudgement,
 )
 from proofroll.report.ladder.ladder import Absence, KnownTruth, LadderContent, RungFound, SideFound, TermFound
-from proofroll.robots.explain import RobotCause
-from proofroll.robots.records import (
+from proofroll.robots.check.explain import RobotCause
+from proofroll.robots.check.records import (
     DrawnBody,
     DrawnJoint,
     DrawnRobot,
@@ -42,7 +42,7 @@ from proofroll.robots.records import (
     UnlikeValue,
     UsedTruth,
 )
-from proofroll.robots.robot_file import LintRemark
+from proofroll.robots.files.robot_file import LintRemark
 from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.ladder.models import Ran
 from proofroll.studies.stability.axes import Axis

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
-from proofroll.elements.mechanism.bookkeeping.mistakes import orders
+from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.bookkeeping.mistakes import orders
 
 
 def planted(law: ControlLaw) -> dict[str, tuple[str, str, ControlLaw]]:

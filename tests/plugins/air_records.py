@@ -6,9 +6,9 @@ import numpy as np
 from air_robots import start_of
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.bookkeeping.air import AirRobot, Scheme, run_in_air
-from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
-from proofroll.robots.control_record import ControlRecord, record_of
+from proofroll.robots.control.bookkeeping.air import AirRobot, Scheme, run_in_air
+from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.record import ControlRecord, record_of
 
 
 def recorded(

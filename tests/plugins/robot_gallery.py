@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.robots.records import ImporterRow
+from proofroll.robots.check.records import ImporterRow
 
 FILE = Path(__file__).resolve().parents[1] / "robots" / "gallery.toml"
 

@@ -20,11 +20,11 @@ from proofroll.core.events import events_of
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
-from proofroll.robots.meaning import meaning
-from proofroll.robots.opening import open_robot
-from proofroll.robots.reading import write
+from proofroll.robots.check.two_formulations import world_jacobians
+from proofroll.robots.files.meaning import meaning
+from proofroll.robots.files.opening import open_robot
+from proofroll.robots.files.reading import write
 from proofroll.robots.states import random_states
-from proofroll.robots.two_formulations import world_jacobians
 from proofroll.truth.bodies import maximal_taylor
 
 EVERY_KIND = """<mujoco model="mobile"><worldbody>

@@ -34,9 +34,18 @@ MAY: dict[str, set[str]] = {
     "ball_studies": HARNESS | {"elements", "truth", "ball_studies"},  # as a package of somebody else would be
     "mechanism_studies": HARNESS | {"elements", "truth", "ball_studies", "mechanism_studies"},
     "vocabulary": HARNESS | {"elements", "ball_studies", "vocabulary"},
-    "engines": {"core", "elements", "engines", "robots"},  # the protocol of robot readers
-    "robots": {"core", "files", "running", "studies", "report", "cli", "robots", "elements"},  # a mechanism to be run
+    "engines": {"core", "elements", "engines"},
+    # A plug-in: scenes of mechanisms to be run, and the engines' own importers of robot files.
+    "robots": {"core", "files", "running", "studies", "report", "cli", "robots", "elements", "engines"},
 }
+# Rooms of robots -> those that each builds on, beside the robot as data.
+ROOMS_OF_ROBOTS: dict[str, set[str]] = {
+    "files": set(),
+    "importers": set(),
+    "check": {"files"},
+    "control": {"files"},
+}
+AS_DATA = {"model", "states", "protocol"}
 # What a kind adds to the report stands on the harness, as a plug-in of somebody else would.
 PLUGIN_PARTS = {"report"}
 
@@ -128,6 +137,7 @@ def test_imports_lead_one_way(folder: str) -> None:
         ("studies/a.py", "import proofroll_drill.row\n", 1),
         ("engines/a.py", 'import_module("blajer_2006.study")\n', 1),
         ("a.py", "from proofroll.elements import mechanism\n", 1),
+        ("engines/a.py", "from proofroll.robots.protocol import Reading\n", 1),
     ],
 )
 def test_each_way_of_importing_is_seen(tmp_path: Path, place: str, text: str, line: int) -> None:
@@ -275,6 +285,28 @@ def test_no_modules_import_each_other() -> None:
 def test_no_folders_of_studies_import_each_other() -> None:
     """A study of one folder builds on another's, and never the other way round as well."""
     assert circle(folders_of(leading(ROOT), "proofroll.studies")) == []
+
+
+def test_nothing_imports_robots() -> None:
+    """Robots are a plug-in, found by entry points: no module outside their folder imports one of it."""
+    wrong = [
+        f"{file.relative_to(ROOT)}:{line} imports {name}"
+        for file in _files(ROOT)
+        if ROOT / "robots" not in file.parents
+        for line, name in _imported(file)
+        if name.split(".")[1:2] == ["robots"]
+    ]
+    assert wrong == []
+
+
+def test_rooms_of_robots_build_on_files_and_data_alone() -> None:
+    """Checks and controllers of robots know nothing of each other, nor files and importers of them."""
+    folders = folders_of(leading(ROOT), "proofroll.robots")
+    wrong = {
+        room: folders[room] - may - AS_DATA for room, may in ROOMS_OF_ROBOTS.items() if folders[room] - may - AS_DATA
+    }
+    assert wrong == {}
+    assert {name for module in AS_DATA for name in folders[module]} <= AS_DATA
 
 
 @pytest.mark.parametrize("folder", MAY)

@@ -18,7 +18,8 @@ BARE = frozenset({
 # Largest part of a folder's functions with such a name, and of folders that are worse; lower these as they fall.
 LEAST = 0.1
 MOST = {
-    "elements/mechanism/bookkeeping": 0.33,
+    "robots/control/bookkeeping": 0.33,
+    "robots/control": 0.25,
     "truth/switching": 0.28,
     "engines/exudyn/contact": 0.19,
     "truth/bodies": 0.19,

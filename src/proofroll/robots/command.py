@@ -49,9 +49,9 @@ def check(
         return
     if plot is not None:
         raise InputError("--plot", plot, "this is for scenes; --out FOLDER writes a page about a robot file")
-    from proofroll.robots.check import check as checked
-    from proofroll.robots.meaning import CheckSettings
-    from proofroll.robots.terminal import WIDTH, check_parts
+    from proofroll.robots.check.check import check as checked
+    from proofroll.robots.check.terminal import WIDTH, check_parts
+    from proofroll.robots.files.meaning import CheckSettings
 
     how = CheckSettings(base=base, root=root, states=states, seed=seed, time_limit=time_limit)
     if against is None:
@@ -61,13 +61,13 @@ def check(
             accepted = [name.strip() for name in ",".join(accept or ()).split(",") if name.strip()]
             content = checked(file, engine or (), how, accept=accepted, progress=advance)
     else:
-        from proofroll.robots.two_files import against as compared
+        from proofroll.robots.check.two_files import against as compared
 
         if engine:
             raise InputError("--engine", ", ".join(engine), "--against compares two files and asks no engine; drop one")
         content = compared(file, against, _partners(names or ()), how)
     if out is not None:
-        from proofroll.robots.page import page
+        from proofroll.robots.check.page import page
         from proofroll.running.store import write_text
 
         write_text(out / "check.html", page(content))

@@ -60,7 +60,7 @@ class Reading:
         position, rotation: joint -> frame of its child in the world, shapes (states, 3) and (states, 3, 3).
         coupled: joints that the engine couples to another as the file's mimic says.
         M, g, h: mass matrix, torque of gravity, torque of gravity and velocities (see
-            :class:`proofroll.robots.two_formulations.Dynamics`).
+            :class:`proofroll.robots.check.two_formulations.Dynamics`).
         inverse: torque for the accelerations asked, without damping, friction and springs, shape (states, n); None: not
             offered.
         forward: acceleration for the torques asked, with all of them, shape (states, n); None: not offered.

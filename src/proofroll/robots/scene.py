@@ -9,12 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from proofroll.robots.actuators import scene_actuators
-from proofroll.robots.controlled import ControlledScenes
-from proofroll.robots.model import Robot
-from proofroll.robots.opening import BASES
-from proofroll.robots.robot_file import RobotFile
-from proofroll.robots.scene_tables import (
+from proofroll.robots.control.controlled import ControlledScenes
+from proofroll.robots.files.actuators import scene_actuators
+from proofroll.robots.files.opening import BASES
+from proofroll.robots.files.robot_file import RobotFile
+from proofroll.robots.files.scene_tables import (
     ENDINGS,
     SWITCH,
     ParameterRow,
@@ -24,6 +23,7 @@ from proofroll.robots.scene_tables import (
     read_robot,
     tables_of,
 )
+from proofroll.robots.model import Robot
 from proofroll.robots.states import random_states
 
 _DURATION = 1.0  # s: an arm falls through much of its reach, and few are chaotic so early
@@ -81,7 +81,7 @@ class RobotScenes:
         record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None, layout: str = ""
     ) -> Any:
         """See :class:`proofroll.files.scene_sources.JudgesRecords`."""
-        from proofroll.robots.control_judge import judge_record
+        from proofroll.robots.control.judge import judge_record
 
         return judge_record(record, robot, control, names, layout)
 

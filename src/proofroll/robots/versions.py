@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from proofroll.core.plugins import plain_name
-from proofroll.robots.check import check
-from proofroll.robots.records import ImporterRow
-from proofroll.robots.terminal import amount
+from proofroll.robots.check.check import check
+from proofroll.robots.check.records import ImporterRow
+from proofroll.robots.check.terminal import amount
 from proofroll.running.engine_questions import describe
 from proofroll.studies.versions.versions import EngineVersion, VersionsStudy
 
@@ -35,7 +35,7 @@ def robot_versions(file: str, old: str, new: str) -> VersionsStudy:
     """Content of `proofroll versions` for a robot file: two versions, given as ``NAME`` or ``NAME@PLACE``.
 
     Raises:
-        InputError, Missing: see :func:`proofroll.robots.check.check`.
+        InputError, Missing: see :func:`proofroll.robots.check.check.check`.
     """
     rows = check(Path(file), [old, new]).engines
     layers, changes = [], []

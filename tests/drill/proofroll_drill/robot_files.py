@@ -10,9 +10,9 @@ from pathlib import Path
 from rich.table import Table
 
 from proofroll.core.errors import InputError
-from proofroll.robots.check import check
-from proofroll.robots.meaning import CheckSettings
-from proofroll.robots.records import RobotCheck
+from proofroll.robots.check.check import check
+from proofroll.robots.check.records import RobotCheck
+from proofroll.robots.files.meaning import CheckSettings
 from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
 

@@ -1,14 +1,15 @@
 """Diagnosis of a mechanism: hypotheses of wrongly reported motion, and of wrong motion."""
 
-from typing import Any
+from functools import cache
 
 import numpy as np
 
+from proofroll.core.diagnosis import Hypothesis
 from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.core.diagnosis.lines import built_otherwise
+from proofroll.core.entry_points import loaded
 from proofroll.elements.mechanism.diagnosis import contacts
 from proofroll.elements.mechanism.diagnosis.applied_forces import of_applied_forces
-from proofroll.elements.mechanism.diagnosis.bookkeeping import of_bookkeeping
 from proofroll.elements.mechanism.diagnosis.bushings import of_bushings
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import at_start
 from proofroll.elements.mechanism.diagnosis.equations import Change
@@ -38,7 +39,9 @@ GRAVITY = any_gravity(
     lambda element, gravity: Change(element.mechanism, gravity=gravity),
 )
 BUILT = built_otherwise([name for name in GIVEN if name != "joint axes"], COVERED)
-HYPOTHESES: tuple[Any, ...] = (
+# Entry points of hypotheses about mechanisms that other packages test, each a :class:`Hypothesis`.
+GROUP = "proofroll.mechanism_hypotheses"
+_OF_WHOLE_RUNS: tuple[Hypothesis, ...] = (
     start_not_taken,
     *REPORTING_ERRORS,
     reactions,
@@ -54,7 +57,8 @@ HYPOTHESES: tuple[Any, ...] = (
     of_motions,
     of_applied_forces,
     of_bushings,
-    of_bookkeeping,
+)
+_OF_PARTS: tuple[Hypothesis, ...] = (
     of_actuators,
     of_couplings,
     soft_couplings,
@@ -66,3 +70,9 @@ HYPOTHESES: tuple[Any, ...] = (
     loop_lacks_row,
     GRAVITY,
 )
+
+
+@cache
+def hypotheses() -> tuple[Hypothesis, ...]:
+    """All hypotheses. Of two causes with equal proof the earlier is named, so announced ones precede single parts."""
+    return (*_OF_WHOLE_RUNS, *(item for _, item in loaded(GROUP, of=Hypothesis)), *_OF_PARTS)

@@ -151,6 +151,6 @@ class MechanismKind:
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:
         """See :class:`proofroll.core.diagnosis.ExplainsRuns`."""
-        from proofroll.elements.mechanism.diagnosis import HYPOTHESES
+        from proofroll.elements.mechanism.diagnosis import hypotheses
 
-        return HYPOTHESES
+        return hypotheses()

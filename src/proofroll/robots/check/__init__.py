@@ -1,0 +1,1 @@
+"""Check of robot files: what each engine's importer makes of them, and the causes of differences."""

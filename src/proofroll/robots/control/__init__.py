@@ -1,0 +1,1 @@
+"""Robots under controllers: scenes, records from any simulator, and mistakes of bookkeeping in them."""

@@ -1,0 +1,251 @@
+"""Robot in the air under a control law, moved by the steps of an engine: semi-implicit Euler or RK4."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.engine import whole_steps
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.policy import Observation
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.robots.control.bookkeeping.law import ControlLaw, RobotState
+
+Scheme = Literal["explicit", "implicit", "explicit_base", "implicit_base", "rk4"]
+SCHEMES: Mapping[Scheme, str] = {
+    "explicit": "semi-implicit Euler with kd at the state before the step",
+    "implicit": "semi-implicit Euler with kd at the velocity after the step",
+    "explicit_base": "the same, whose floating base has its velocity along its own axes",
+    "implicit_base": "the same with kd at the velocity after the step",
+    "rk4": "RK4",
+}
+_STOP = 1e6  # rad/s or m/s: a run that is faster has blown up
+
+
+class AirRobot:
+    """Equations of a robot without its servos, and the places of joints in its coordinates.
+
+    Attributes:
+        mechanism: without actuators, with the armature of the law.
+        equations: of it.
+        joints: all joints with one coordinate, in the mechanism's order.
+    """
+
+    def __init__(self, mechanism: Mechanism, law: ControlLaw, rank: int | None = None) -> None:
+        armature = dict(zip(law.joints, law.armature.tolist(), strict=True))
+        self.mechanism = replace(
+            mechanism,
+            actuators=tuple(item for item in mechanism.actuators if item.joint not in armature),
+            control=None,
+            joints=tuple(
+                replace(joint, armature=armature.get(joint.name, joint.armature)) for joint in mechanism.joints
+            ),
+            gravity=tuple(law.gravity * np.array(mechanism.gravity)),
+        )
+        self.equations = JointCoordinates(self.mechanism, rank)
+        self.joints = tuple(joint.name for joint in mechanism.joints if joint.nq == 1)
+        self.places = np.array([mechanism.place_of(name) for name in self.joints]).reshape(-1, 2)
+        self.driven = np.array([mechanism.place_of(name) for name in law.joints])
+        base = [k for k, joint in enumerate(mechanism.joints) if joint.kind == JointKind.FREE][:1]
+        self.base = (mechanism.q_slices[base[0]], mechanism.v_slices[base[0]]) if base else None
+
+    def coordinates(self, q: Array, v: Array, base: Array | None) -> tuple[Array, Array]:
+        """Coordinates and velocities of the mechanism.
+
+        Args:
+            q: coordinates of :attr:`joints`.
+            v: their rates.
+            base: place, quaternion, velocity and angular velocity in world axes, shape (13,); None: it is fixed.
+        """
+        whole_q, whole_v = np.zeros(self.mechanism.nq), np.zeros(self.mechanism.nv)
+        whole_q[self.places[:, 0]], whole_v[self.places[:, 1]] = q, v
+        if self.base is not None and base is not None:
+            R = Rotation.from_quat(base[3:7], scalar_first=True).as_matrix()
+            whole_q[self.base[0]] = base[:7]
+            whole_v[self.base[1]] = np.concatenate([R.T @ base[7:10], R.T @ base[10:13]])
+        return whole_q, whole_v
+
+    def state(self, time: float, q: Array, v: Array) -> RobotState:
+        """State of the driven joints and of the base, which is the world if it is fixed."""
+        p, quaternion, velocity, spin = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3)
+        if self.base is not None:
+            p, quaternion = q[self.base[0]][:3], q[self.base[0]][3:]
+            R = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+            velocity, spin = R @ v[self.base[1]][:3], R @ v[self.base[1]][3:]
+        return RobotState(
+            time=time,
+            q=q[self.driven[:, 0]],
+            v=v[self.driven[:, 1]],
+            p_WB=p,
+            q_WB=quaternion,
+            v_WB=velocity,
+            w_WB=spin,
+        )
+
+    def load(self, efforts: Array) -> Array:
+        """Efforts of the driven joints along all velocities, (nv)."""
+        load = np.zeros(self.mechanism.nv)
+        load[self.driven[:, 1]] = efforts
+        return load
+
+
+@dataclass(frozen=True)
+class AirRun:
+    """Motion in the air.
+
+    Attributes:
+        time: of the samples [s].
+        q, v: coordinates and velocities of the mechanism, (times, nq) and (times, nv).
+        efforts: of the driven joints, (times, n); those that act from each sample on.
+        targets: of the driven joints, (times, n).
+        actions: of the policy, (times, n); zeros without a policy.
+        observations: one for each instant; with its time.
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    efforts: Array
+    targets: Array
+    actions: Array
+    observations: tuple[Observation, ...]
+
+
+@dataclass(frozen=True)
+class AirStep:
+    """Instant between two steps of a motion in the air; see :class:`AirRun` for its arrays at one time.
+
+    Attributes:
+        observation: of the policy, at an instant of the controller; None between.
+    """
+
+    q: Array
+    v: Array
+    efforts: Array
+    target: Array
+    action: Array
+    observation: Observation | None
+
+
+def run_in_air(
+    robot: AirRobot, law: ControlLaw, start: tuple[Array, Array], step: float, count: int, scheme: Scheme
+) -> AirRun:
+    """Motion of a robot in the air over ``count`` steps [s], sampled after each.
+
+    Raises:
+        InputError: the step does not divide the time between instants.
+        Diverged: the motion blows up.
+    """
+    steps = [*itertools.islice(steps_in_air(robot, law, start, step, scheme), count + 1)]
+    names = ("q", "v", "efforts", "target", "action")
+    q, v, efforts, targets, actions = (np.array([getattr(each, name) for each in steps]) for name in names)
+    time = np.asarray(step * np.arange(count + 1), float)
+    seen = tuple(each.observation for each in steps if each.observation is not None)
+    return AirRun(time=time, q=q, v=v, efforts=efforts, targets=targets, actions=actions, observations=seen)
+
+
+def steps_in_air(
+    robot: AirRobot, law: ControlLaw, start: tuple[Array, Array], step: float, scheme: Scheme
+) -> Iterator[AirStep]:
+    """Motion of a robot in the air without an end, at the first instant and after each step [s].
+
+    Raises:
+        InputError: the step does not divide the time between instants.
+        Diverged: the motion blows up.
+    """
+    q, v = start
+    period = max(1, whole_steps(0.0, 1 / law.rate, step) + law.extra_steps)
+    answer, (last, waiting) = law.answer(), law.waiting()
+    target, states, counts = law.pose.copy(), [robot.state(law.begins, q, v)], last
+    efforts = np.zeros(len(law.joints))
+    for k in itertools.count():
+        time = law.begins + k * step
+        state, observation = robot.state(time, q, v), None
+        if k % period == 0:
+            observation = law.observed(state, last)
+            action = None if answer is None else answer(observation)
+            last = last if action is None else action
+            counts = counts if action is None else law.smoothed(action, counts)
+            waiting.append(law.target(None if action is None else counts, time))
+            target = waiting.pop(0)
+        servo = states[-law.lag] if law.lag and len(states) >= law.lag else state
+        if not law.hold_effort or k % period == 0:
+            efforts = law.effort(target, servo.q, servo.v)
+        yield AirStep(q=q, v=v, efforts=efforts, target=target, action=last, observation=observation)
+        q, v = _stepped(robot, law, (q, v), (efforts, target), step, scheme)
+        if not np.abs(v).max() < _STOP:
+            raise Diverged(f"the motion blows up at t = {time:.4g} s")
+        states = [*states[-1:], state]
+
+
+def _stepped(
+    robot: AirRobot, law: ControlLaw, at: tuple[Array, Array], acting: tuple[Array, Array], h: float, scheme: Scheme
+) -> tuple[Array, Array]:
+    """Coordinates and velocities after a step of ``h`` [s], for efforts at its begin and targets."""
+    q, v = at
+    efforts, target = acting
+    if scheme == "rk4":
+        return _rk4(robot, law, at, (efforts, target), h)
+    acceleration = robot.equations.solve(q, v, load=robot.load(efforts)).acceleration
+    if scheme.startswith("implicit"):
+        # What is clamped or held does not follow the velocity.
+        free = (np.abs(efforts) < law.limit) & (not law.hold_effort)
+        damping = robot.load(np.where(free, law.kd, 0.0))
+        M = robot.equations.inertial(robot.equations.tree.at(q, v))[1]
+        acceleration = np.asarray(np.linalg.solve(M + h * np.diag(damping), M @ acceleration), float)
+    return _moved(robot, q, v, acceleration, h, along_base=scheme.endswith("_base"))
+
+
+def _moved(
+    robot: AirRobot, q: Array, v: Array, acceleration: Array, h: float, *, along_base: bool
+) -> tuple[Array, Array]:
+    """State after a step of semi-implicit Euler, whose base has its velocity in world axes, or in its own."""
+    new_v = v + h * acceleration
+    new_q = robot.equations.tree.moved(q, h * new_v)
+    if robot.base is not None:
+        at_q, at_v = robot.base
+        p, turned = q[at_q][:3], Rotation.from_quat(q[at_q][3:], scalar_first=True)
+        R = turned.as_matrix()
+        spin = new_v[at_v][3:]
+        attitude = turned * Rotation.from_rotvec(h * spin)
+        if along_base:  # it moves on a screw
+            way = h * new_v[at_v][:3]
+            turn = np.cross(h * spin, way)
+            way = way + turn / 2 + np.cross(h * spin, turn) / 6
+            new_q[at_q] = np.concatenate([p + R @ way, attitude.as_quat(scalar_first=True)])
+            return new_q, new_v
+        rate = acceleration[at_v][:3] + np.cross(v[at_v][3:], v[at_v][:3])
+        velocity = R @ (v[at_v][:3] + h * rate)
+        new_q[at_q] = np.concatenate([p + h * velocity, attitude.as_quat(scalar_first=True)])
+        new_v[at_v] = np.concatenate([attitude.as_matrix().T @ velocity, spin])
+    return new_q, new_v
+
+
+def _rk4(
+    robot: AirRobot, law: ControlLaw, at: tuple[Array, Array], acting: tuple[Array, Array], h: float
+) -> tuple[Array, Array]:
+    """State after a step of RK4, with targets held, or efforts."""
+    held, target = acting
+    nq = len(at[0])
+
+    def rates(y: Array) -> Array:
+        q, v = y[:nq], y[nq:]
+        moving = law.effort(target, q[robot.driven[:, 0]], v[robot.driven[:, 1]])
+        efforts = held if law.hold_effort else moving
+        solution = robot.equations.solve(q, v, load=robot.load(efforts))
+        return np.concatenate([robot.equations.tree.rate(q, v), solution.acceleration])
+
+    y = np.concatenate(at)
+    k1 = rates(y)
+    k2 = rates(y + h / 2 * k1)
+    k3 = rates(y + h / 2 * k2)
+    y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(y + h * k3))
+    return robot.equations.tree.normalised(y[:nq]), y[nq:]

@@ -1,0 +1,104 @@
+"""Hypotheses of mistakes in the bookkeeping of a controller: orders, poses, gains, limits, delays, frames, signs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis.samples import run_and_truth
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
+from proofroll.elements.mechanism.diagnosis.residuals import COVERED
+from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, LAYERS
+from proofroll.robots.control.bookkeeping.search import (
+    MistakeSearch,
+    MistakesFound,
+    explained,
+    explained_start,
+)
+from proofroll.robots.control.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
+
+# Names of hypotheses that look at the same number by other means.
+_SAME: Mapping[str, str] = {
+    "kp": "actuators: kp", "kd": "actuators: kd", "clamp": "actuators: the limits", "clamp_missing": "actuators: limit",
+}  # fmt: skip
+
+
+@hypothesis(
+    "bookkeeping",
+    "a motion from the true start under the scene's controller with that mistake, at the engine's step and with one of "
+    "the usual treatments of gains, is the motion of the run; without the mistake none is",
+)
+def of_bookkeeping(evidence: Evidence) -> Iterator[Cause]:
+    """Hypotheses: mistakes between a policy and the efforts of its servos, in a robot in the air."""
+    asked = evidence.asked
+    if asked is None or not _in_air(asked.mechanism):
+        return
+    try:
+        law = ControlLaw.of(asked.mechanism)
+        search = _at_start(evidence, law) if evidence.run is None else _of_run(evidence, law)
+    except InputError:  # motors with gears
+        return
+    if search is None:
+        return
+    yield from (_cause(item, search.before, of_run=evidence.run is not None) for item in search.explanations[:2])
+    if search.imitated:
+        yield Cause(
+            id="bookkeeping: implicit kd",
+            says=IMPLICIT,
+            quantity="motion",
+            unit="rad or m",
+            before=search.explicit,
+            after=search.before,
+            remedy="run it at a second step, and look at its armatures and at its integrator",
+            covers=("motion", *COVERED, "effort"),
+        )
+
+
+def _at_start(evidence: Evidence, law: ControlLaw) -> MistakeSearch | None:
+    """Mistakes that explain the accelerations of the certificate; None: it has none."""
+    start = of_start(evidence)
+    return None if start is None else explained_start(evidence.asked.mechanism, law, start.v_rates[0])
+
+
+def _of_run(evidence: Evidence, law: ControlLaw) -> MistakeSearch | None:
+    """Mistakes that explain a run; None: no motion of steps can be held against it."""
+    pair = run_and_truth(evidence)
+    if pair is None or evidence.by_step or not is_motion(pair[0]):
+        return None
+    mechanism, time = evidence.asked.mechanism, pair[0]["time"].to_numpy()
+    every = float(time[1] - time[0])
+    step = evidence.step or every
+    whole = all(abs(x / step - round(x / step)) < WHOLE for x in (every, 1 / law.rate))
+    if not whole or float(np.ptp(np.diff(time))) > WHOLE * every:
+        return None
+    q, v = placed_of(mechanism, pair[0]).of_tree()
+    return explained(mechanism, law, SeenMotion(time, q, v).until(SHOWN), step, depth="a pair")
+
+
+def _in_air(mechanism: Mechanism) -> bool:
+    """True if the mechanism has a controller, and nothing acts on its bodies but joints and gravity."""
+    others = (mechanism.loops, mechanism.springs, mechanism.contacts, mechanism.forces, mechanism.bushings)
+    moved = [joint for joint in mechanism.joints if joint.motion is not None]
+    return mechanism.control is not None and bool(mechanism.control.actuators) and not any((*others, moved))
+
+
+def _cause(item: MistakesFound, before: float, *, of_run: bool) -> Cause:
+    first_mistake = item.mistakes[0]
+    sized = [abs(size - 1) for mistake, size in zip(item.mistakes, item.sizes, strict=True) if mistake.sized]
+    return Cause(
+        id=_SAME.get(first_mistake.id, f"bookkeeping: {first_mistake.id}"),
+        says=f"it moves as if {item.sentence}",
+        quantity="motion" if of_run else "accelerations at time 0",
+        unit="rad or m" if of_run else "1/s^2",
+        before=before,
+        after=item.after,
+        remedy=f"look at the {first_mistake.layer} ({LAYERS[first_mistake.layer]}) in the program around the engine",
+        fitted=item.fitted,
+        covers=("motion", *COVERED, "effort"),
+        change=max(sized) if sized else np.inf,
+    )

@@ -1,0 +1,230 @@
+"""Bookkeeping of a controller as data: what it observes, what its actions mean, and the efforts that follow."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.scene.control import EFFORT
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.policy import Observation, PolicySource
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.signal import Signal, value_at
+
+VECTORS = ("p_WB", "v_WB_W", "w_WB_B", "gravity_B")  # of an observation, shape (3,) each
+SCALED = ("q", "v", "v_WB_W", "w_WB_B", "last")  # parts of an observation that programs scale
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """State of a robot at a time, SI units; W is the world, B the frame of the base.
+
+    Attributes:
+        time: [s].
+        q, v: coordinates and rates of the driven joints, in the controller's order.
+        p_WB: origin of the base [m], shape (3,).
+        q_WB: its quaternion, scalar first, shape (4,).
+        v_WB: velocity of its origin in world axes [m/s], shape (3,).
+        w_WB: its angular velocity in world axes [rad/s], shape (3,).
+    """
+
+    time: float
+    q: Array
+    v: Array
+    p_WB: Array
+    q_WB: Array
+    v_WB: Array
+    w_WB: Array
+
+
+@dataclass(frozen=True)
+class ControlLaw:
+    """Controller of a robot, with the conventions in which bookkeeping goes wrong; the defaults are right.
+
+    Attributes:
+        joints: driven joints, in the order of arrays, of length n.
+        rate: instants per second [Hz].
+        delay: whole instants until a target acts.
+        scale: of an action [rad or m].
+        pose, kp, kd, limit, armature: of each joint, shape (n,).
+        policy: None: ``targets`` hold.
+        targets: signal of each joint.
+        down: unit vector along gravity in world axes, shape (3,).
+        gravity: acceleration of gravity in parts of the right one.
+        action_order: joint that each entry of an action is for.
+        observed_order: joint that each entry of the observed coordinates and rates is of.
+        signs: sign of each joint's target, shape (n,).
+        scalar_last: True if a quaternion with its scalar last is read as one with its scalar first.
+        turned_back: True if the rotation of the base is used the other way around.
+        gravity_sign: of the observed direction of gravity.
+        velocity_turns: times that the observed velocity of the base is turned from the world's axes to the base's.
+        spin_turns: the same of its angular velocity, right being 1.
+        centre: centre of mass of the base from its origin, in its own axes [m], shape (3,).
+        at_centre: True if the velocity of the base is observed there.
+        factors: on observed q, v, linear velocity, angular velocity and last action, shape (5,).
+        pose_observed: part of the pose that is added to observed coordinates; -1: they are relative to it.
+        clip: largest size of an action.
+        smoothing: part of an action that counts, beside what counted at the instant before; 1: all.
+        hold_effort: True if efforts hold between instants, False if they follow the state.
+        reductions: turns of each joint's motor per turn of the joint, shape (n,).
+        effort_factor: on what a servo's effort is before it acts, shape (n,).
+        lag: steps by which the state of the servos is late.
+        extra_steps: steps by which the time between two instants is longer.
+        begins: time of the first instant of a motion [s].
+        earlier: actions at the instants before it, the last one last.
+    """
+
+    joints: tuple[str, ...]
+    rate: float
+    delay: int
+    scale: float
+    pose: Array
+    kp: Array
+    kd: Array
+    limit: Array
+    armature: Array
+    policy: PolicySource | None
+    targets: tuple[Signal, ...]
+    down: Array
+    gravity: float = 1.0
+    action_order: tuple[int, ...] = ()
+    observed_order: tuple[int, ...] = ()
+    signs: Array = dataclasses.field(default_factory=lambda: np.ones(1))
+    scalar_last: bool = False
+    turned_back: bool = False
+    gravity_sign: float = 1.0
+    velocity_turns: int = 0
+    spin_turns: int = 1
+    centre: Array = dataclasses.field(default_factory=lambda: np.zeros(3))
+    at_centre: bool = False
+    factors: tuple[float, ...] = (1.0,) * len(SCALED)
+    pose_observed: float = 0.0
+    clip: float = math.inf
+    smoothing: float = 1.0
+    hold_effort: bool = False
+    reductions: Array = dataclasses.field(default_factory=lambda: np.ones(1))
+    effort_factor: Array = dataclasses.field(default_factory=lambda: np.ones(1))
+    lag: int = 0
+    extra_steps: int = 0
+    begins: float = 0.0
+    earlier: tuple[Array, ...] = ()
+
+    @classmethod
+    def of(cls, mechanism: Mechanism) -> ControlLaw:
+        """Law of a mechanism's controller.
+
+        Raises:
+            InputError: the mechanism has no controller with a rate, or its motors have gears.
+        """
+        control = mechanism.control
+        if control is None or not control.actuators:
+            advice = "mistakes of bookkeeping are found at a controller's instants; give the rate and the gains"
+            raise InputError("rate", None, advice)
+        by_name = {item.name: item for item in mechanism.actuators}
+        servos = [by_name[name] for name in control.actuators]
+        geared = next((item for item in servos if item.gear != 1), None)
+        if geared is not None:
+            raise InputError(f"actuators.{geared.name}.gear", geared.gear, "give gains and targets at the joint")
+        joints = tuple(item.joint for item in servos)
+        of_joint = {joint.name: joint.armature for joint in mechanism.joints}
+        size = float(np.linalg.norm(mechanism.gravity))
+        base = next((joint.child for joint in mechanism.joints if joint.kind == JointKind.FREE), None)
+        centre = np.zeros(3) if base is None else np.array(mechanism.bodies[mechanism.body_index[base]].com)
+        return cls(
+            joints=joints,
+            rate=control.rate,
+            delay=control.delay,
+            scale=control.scale,
+            pose=np.array(control.pose),
+            kp=np.array([item.kp for item in servos]),
+            kd=np.array([item.kd for item in servos]),
+            limit=np.array([item.bound for item in servos]),
+            armature=np.array([of_joint[joint] for joint in joints]),
+            policy=control.policy,
+            targets=tuple(item.target for item in servos),
+            down=np.array(mechanism.gravity) / (size or 1.0),
+            signs=np.ones(len(joints)),
+            centre=centre,
+            hold_effort=control.held == EFFORT,
+        )
+
+    def change(self, **changes: object) -> ControlLaw:
+        """The law with some attributes replaced."""
+        return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
+
+    @cached_property
+    def _entries(self) -> tuple[list[int], list[int]]:
+        """Orders of actions and of observations as indices."""
+        usual = range(len(self.joints))
+        return list(self.action_order or usual), list(self.observed_order or usual)
+
+    def answer(self) -> Callable[[Observation], Any] | None:
+        """Policy before its first observation; None: there is none."""
+        return None if self.policy is None else self.policy.made(self.joints)
+
+    def observed(self, state: RobotState, last: Array) -> Observation:
+        """Observation of a state, ``last`` being the action before."""
+        quaternion = np.roll(state.q_WB, -1) if self.scalar_last else state.q_WB
+        R = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+        R = R.T if self.turned_back else R
+        body = Rotation.from_quat(state.q_WB, scalar_first=True).as_matrix()
+        order = self._entries[1]
+        q, v, velocity, spin, before = self.factors
+        moving = state.v_WB + self.at_centre * np.cross(state.w_WB, body @ self.centre)
+        return Observation(
+            time=state.time,
+            q=q * (state.q + self.pose_observed * self.pose)[order],
+            v=v * state.v[order],
+            p_WB=state.p_WB,
+            R_WB=R,
+            v_WB_W=velocity * (_turned(body, self.velocity_turns) @ moving),
+            w_WB_B=spin * (_turned(body, self.spin_turns) @ state.w_WB),
+            gravity_B=self.gravity_sign * (R.T @ self.down),
+            last=before * last,
+        )
+
+    @property
+    def observing(self) -> tuple[object, ...]:
+        """Settings on which :meth:`observed` depends besides a state."""
+        turns = (self.scalar_last, self.turned_back, self.gravity_sign, self.velocity_turns, self.spin_turns)
+        return (*turns, self.observed_order, self.factors, self.pose_observed, self.at_centre)
+
+    def smoothed(self, action: Array, before: Array) -> Array:
+        """Part of an action that counts, clipped, beside what counted at the instant ``before``."""
+        clipped = np.clip(action, -self.clip, self.clip)
+        return np.asarray(clipped if self.smoothing == 1 else before + self.smoothing * (clipped - before), float)
+
+    def target(self, action: Array | None, time: float) -> Array:
+        """Targets of the joints for an action, shape (n,), before any delay; without a policy those of ``time``."""
+        if action is None:
+            targets = np.array([float(value_at(signal, time)) for signal in self.targets])
+        else:
+            targets = np.empty(len(self.joints))
+            targets[self._entries[0]] = action
+            targets = self.pose + self.scale * targets
+        return np.asarray(self.signs * targets, float)
+
+    def waiting(self) -> tuple[Array, list[Array]]:
+        """Action before the first instant, (n), and the targets that wait then, the next to act first."""
+        last = self.earlier[-1] if self.earlier else np.zeros(len(self.joints))
+        late = [self.target(action, self.begins) for action in self.earlier[len(self.earlier) - self.delay :]]
+        return last, [self.pose.copy()] * (self.delay - len(late)) + late
+
+    def effort(self, target: Array, q: Array, v: Array) -> Array:
+        """Efforts of the servos [N m or N], clamped; arrays have the joints last."""
+        unclamped = self.kp * (target - q) - self.kd * v
+        return np.asarray(self.effort_factor * np.clip(unclamped, -self.limit, self.limit))
+
+
+def _turned(body: Array, turns: int) -> Array:
+    """Matrix that turns a vector so many times from the world's axes to those of the body, or back."""
+    return np.linalg.matrix_power(body.T if turns > 0 else body, abs(turns))

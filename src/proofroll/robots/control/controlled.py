@@ -1,0 +1,269 @@
+"""Scene of a robot under a controller: its actuators, their targets, and its start, in the air."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.errors import InputError, error_location
+from proofroll.core.parameters import Parameters
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.run.reader import made_mechanism
+from proofroll.elements.mechanism.scene.control import TARGET, Control
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.policy import PolicySource
+from proofroll.robots.control.controller import Controller, Gains, read_controller
+from proofroll.robots.files.actuators import scene_actuators
+from proofroll.robots.files.robot_file import RobotFile
+from proofroll.robots.files.scene_tables import ENDINGS, ParameterRow, described, laws, read_robot, tables_of
+from proofroll.robots.model import Robot
+from proofroll.robots.states import RobotStates
+
+_DURATION = 0.1  # s: what is wrong with the bookkeeping of a controller shows in the air within it
+_GRID, _STEP = 4e-3, 5e-4  # s: sampling of a first look, and its longest step
+_LADDER, _FINER = 4, 2  # a ladder's coarsest step has so many of the finest; steps are at most so many times finer
+_NEXT = (
+    "a robot on its feet comes next; leave [ground] out: in the air the truth is exact, and gains, orders, frames and "
+    "limits show there"
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class RecordedRobot:
+    """Robot of a record.
+
+    Attributes:
+        mechanism: with its servos and its controller.
+        grounded: True if the controller has it stand on the ground.
+        reductions: joint -> turns of its motor per turn of the joint, of the transmissions in its file.
+        speeds: joint -> largest velocity of its drive, of its file [rad/s or m/s].
+    """
+
+    mechanism: Mechanism
+    grounded: bool
+    reductions: Mapping[str, float]
+    speeds: Mapping[str, float]
+
+
+class ControlledScenes:
+    """Scenes of robot files under the controller of a file; see :class:`proofroll.files.scene_sources.SceneSource`."""
+
+    endings: ClassVar[tuple[str, ...]] = ENDINGS
+
+    def __init__(self, control: Path) -> None:
+        self._path = control
+
+    def content(self, path: Path) -> dict[str, Any]:
+        """Title, source and parameters of the scene."""
+        controller = self._controller()
+        file, robot = self._robot(path, controller, "fixed" if controller.start.base is None else "free")
+        gravity = float(np.linalg.norm(robot.gravity))
+        parameters: dict[str, ParameterRow] = {
+            "gravity": (gravity, "m/s^2", "acceleration of gravity", {"at_least": 0}),
+        }
+        reason = f"How engines move this robot in the air under {self._path.name}"
+        times = _times(controller)
+        return {"title": f"{robot.name} under {self._path.stem}", "reason": reason, **times} | described(
+            file, parameters | laws(robot)
+        )
+
+    def tables(self, path: Path, values: Mapping[str, float]) -> dict[str, Any]:
+        """Tables of the scene for these values of its parameters.
+
+        Raises:
+            InputError: the controller does not fit the robot, or the robot cannot be moved.
+        """
+        controller = self._controller()
+        base = "fixed" if controller.start.base is None else "free"
+        return self._tables(*self._robot(path, controller, base), controller, values)
+
+    def of_record(self, path: Path, *, free: bool) -> RecordedRobot:
+        """Robot that a record is of, wherever it stands.
+
+        Args:
+            path: of the robot file.
+            free: True if nothing holds the root of a URDF.
+
+        Raises:
+            InputError: the controller has no rate, does not fit the robot, or the robot cannot be moved.
+        """
+        controller = read_controller(self._path)
+        if controller.rate is None:
+            advice = "mistakes of bookkeeping are found at a controller's instants; give the rate in Hz"
+            raise InputError(f"{self._path}: rate", None, advice)
+        if controller.start.base is not None:
+            start = dataclasses.replace(controller.start, base=None, base_velocity=(0.0,) * 6)
+            controller = dataclasses.replace(controller, start=start)
+        file, robot = self._robot(path, controller, "free" if free else "fixed")
+        values = {name: row["value"] for name, row in described(file, laws(robot))["parameters"].items()}
+        values["gravity"] = float(np.linalg.norm(robot.gravity))
+        tables = dict(self._tables(file, robot, controller, values, always=True))
+        if left_out := tables.pop("unmodelled"):
+            raise InputError("robot", path, f"it has {left_out[0]}, which no equations here have")
+        x, y, z = robot.gravity.tolist()
+        del tables["gravity"]
+        return RecordedRobot(
+            mechanism=made_mechanism(tables, (x, y, z), Parameters({}, {})),
+            grounded=controller.ground is not None,
+            reductions=file.driven,
+            speeds={joint.name: joint.speed for joint in robot.moving if joint.speed},
+        )
+
+    def _tables(
+        self,
+        file: RobotFile,
+        robot: Robot,
+        controller: Controller,
+        values: Mapping[str, float],
+        *,
+        always: bool = False,
+    ) -> dict[str, Any]:
+        """Tables of the scene; ``always``: with a controller, even if its targets never change."""
+        with error_location(str(self._path)):
+            followers = {mimic.joint for mimic in robot.mimics} if values.get("couplings") else set()
+            single = [joint.name for joint in robot.moving if joint.dofs == 1 and joint.name not in followers]
+            of_file = _servos_of_file(file, robot)
+            controller.require_joints(single, {joint.name: joint.kind for joint in robot.moving}, _positions(of_file))
+            actuators = _actuators(robot, controller, single, of_file, file.driven)
+            names = [row["name"] for row in actuators]
+            if controller.policy is not None and not actuators:
+                advice = "it has nothing to drive: no joint has gains; give [[gains]] with kp and kd"
+                raise InputError("policy.call", controller.policy.call, advice)
+            control = self._control(controller, names, actuators, always)
+        tables = tables_of(file, robot, start_of(robot, controller), values)
+        return tables | {"actuators": actuators, **({} if control is None else {"control": control})}
+
+    def _controller(self) -> Controller:
+        controller = read_controller(self._path)
+        if controller.ground is not None:
+            raise InputError(f"{self._path}: ground", dataclasses.asdict(controller.ground), _NEXT)
+        return controller
+
+    def _robot(self, path: Path, controller: Controller, base: str) -> tuple[RobotFile, Robot]:
+        """Robot whose joints have the controller's armatures; ``base``: ``fixed`` or ``free``, of a URDF's root."""
+        file, robot = read_robot(path, base)
+        if controller.start.base is not None and not any(joint.kind == JointKind.FREE for joint in robot.moving):
+            advice = "this robot's root is fixed in its file; leave it out, or give the root a free joint"
+            raise InputError(f"{self._path}: start.base", list(controller.start.base), advice)
+        servos = {joint.name: controller.servo(joint.name) for joint in robot.moving if joint.dofs == 1}
+        armature = {name: gains.armature for name, gains in servos.items() if gains and gains.armature is not None}
+        joints = (
+            dataclasses.replace(joint, armature=armature.get(joint.name, joint.armature)) for joint in robot.joints
+        )
+        return file, robot.change(joints=tuple(joints))
+
+    def _control(
+        self, controller: Controller, names: list[str], actuators: list[dict[str, Any]], always: bool
+    ) -> Control | None:
+        """Controller of the scene; None: its targets change continuously, or never (unless ``always``)."""
+        if controller.rate is None or not names:
+            return None
+        moves = controller.policy is not None or any(not isinstance(row["target"], float) for row in actuators)
+        if not (moves or always) and controller.held == TARGET and not controller.delay:
+            return None
+        call = controller.policy
+        return Control(
+            rate=controller.rate,
+            actuators=tuple(names),
+            policy=None if call is None else PolicySource(call.call, self._path.parent),
+            scale=1.0 if call is None else call.scale,
+            pose=tuple(controller.poses(names).tolist()),
+            delay=controller.delay,
+            held=controller.held,
+        )
+
+
+def start_of(robot: Robot, controller: Controller) -> RobotStates:
+    """State of a robot at time 0: the controller's start, else its pose, else 0."""
+    start = controller.start
+    q = {**controller.pose, **start.q}
+    single = [joint for joint in robot.moving if joint.dofs == 1]
+    angle = {joint.name: np.array([q.get(joint.name, 0.0)]) for joint in single}
+    velocity = {joint.name: np.array([[start.v.get(joint.name, 0.0)]]) for joint in single}
+    for mimic in robot.mimics:
+        angle[mimic.joint] = mimic.multiplier * angle[mimic.other] + mimic.offset
+        velocity[mimic.joint] = mimic.multiplier * velocity[mimic.other]
+    rotation, position = dict[str, Any](), dict[str, Any]()
+    for joint in robot.moving:
+        if joint.dofs == 1:
+            continue
+        R, p = (joint.rotation if joint.kind == JointKind.FREE else np.eye(3)), joint.position
+        rates = np.zeros(joint.dofs)
+        if joint.kind == JointKind.FREE and not position:
+            if start.base is not None:
+                R = np.asarray(Rotation.from_quat(start.base[3:], scalar_first=True).as_matrix())
+                p = np.array(start.base[:3])
+            spin = R @ np.array(start.base_velocity[3:])
+            rates = np.concatenate([start.base_velocity[:3], spin])
+        rotation[joint.name], velocity[joint.name] = R[None], rates[None]
+        if joint.kind == JointKind.FREE:
+            position[joint.name] = p[None]
+    rest = {name: np.zeros_like(rates) for name, rates in velocity.items()}
+    return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=rest)
+
+
+def _servos_of_file(file: RobotFile, robot: Robot) -> dict[str, dict[str, Any]]:
+    """Joint -> table of its position actuator in the file, or of another one that has a limit."""
+    rows = scene_actuators(file.root, robot)[0]
+    return {row["joint"]: row for row in rows if row["kind"] == "position" or "limit" in row}
+
+
+def _actuators(
+    robot: Robot,
+    controller: Controller,
+    single: list[str],
+    of_file: Mapping[str, Mapping[str, Any]],
+    driven: Collection[str],
+) -> list[dict[str, Any]]:
+    """Tables of the servos, in the order of a policy's arrays: of the controller's gains, else of the file.
+
+    Where transmissions of the file name its drives, ``driven``, a pattern with ``*`` or ``?`` means these joints.
+    """
+    drives = [joint for joint in single if not driven or joint in driven or controller.names(joint)]
+    servos = {joint: gains for joint in drives if (gains := _servo(controller, of_file, joint)) is not None}
+    joints = {joint.name: joint for joint in robot.moving}
+    rows = []
+    for name in controller.order or servos:
+        gains, row = servos[name], of_file.get(name, {})
+        limit = gains.limit or row.get("limit") or joints[name].effort
+        target = controller.targets.get(name, controller.pose.get(name, 0.0))
+        rows.append(
+            {"name": name, "joint": name, "kind": "position", "target": target, "kp": gains.kp, "kd": gains.kd}
+            | ({} if limit is None else {"limit": limit})
+        )
+    return rows
+
+
+def _positions(of_file: Mapping[str, Mapping[str, Any]]) -> set[str]:
+    return {name for name, row in of_file.items() if row["kind"] == "position"}
+
+
+def _servo(controller: Controller, of_file: Mapping[str, Mapping[str, Any]], joint: str) -> Gains | None:
+    """Gains at a joint: the controller's, else those of a position actuator in the file, through its gear."""
+    gains, row = controller.servo(joint), of_file.get(joint, {})
+    if gains is not None and gains.kp:
+        return gains
+    if row.get("kind") != "position":
+        return None
+    square = row["gear"] ** 2
+    return Gains((joint,), kp=square * row["kp"], kd=square * row.get("kd", 0.0))
+
+
+def _times(controller: Controller) -> dict[str, float]:
+    """Duration, step and, where the usual ones do not fit the instants, sampling interval [s]."""
+    if controller.period is None:
+        return {"duration": _DURATION}
+    least = _LADDER * math.ceil(controller.period / _STEP / _LADDER - 1e-9)
+    for count in range(least, _FINER * least, _LADDER):
+        coarsest = _LADDER * controller.period / count
+        if abs(_GRID / coarsest - round(_GRID / coarsest)) < 1e-9:
+            return {"duration": _DURATION, "dt": coarsest / _LADDER}
+    coarsest = _LADDER * controller.period / least
+    every = coarsest * max(1, round(_GRID / coarsest))
+    return {"duration": every * math.ceil(_DURATION / every - 1e-9), "dt": coarsest / _LADDER, "every": every}

@@ -1,0 +1,173 @@
+"""Judgement of a record of a robot under a controller, from any simulator or a real robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from proofroll.core.errors import InputError
+from proofroll.core.number_format import counted, error
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.run.step_limits import servo_steps
+from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
+from proofroll.robots.control.controlled import ControlledScenes
+from proofroll.robots.control.layers import record_layers
+from proofroll.robots.control.record import ControlRecord, read_record, record_of
+from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
+from proofroll.robots.control.record_layer import Layer
+
+
+@dataclass(frozen=True)
+class RecordJudgement:
+    """Layers of a record.
+
+    Attributes:
+        record, robot, control: files.
+        base: ``free`` or ``fixed``, as the record has columns of a base or not.
+        rows: number of times.
+        step: mean interval between them [s].
+        layers: in their order.
+        remarks: sentences on limits of the robot file that the record passes.
+        step_bound: clause on the longest stable step of explicit servos, if the rows are farther apart; else empty.
+    """
+
+    record: str
+    robot: str
+    control: str
+    base: str
+    rows: int
+    step: float
+    layers: Sequence[Layer]
+    remarks: Sequence[str] = ()
+    step_bound: str = ""
+
+    @property
+    def agrees(self) -> bool:
+        """True if every layer that was looked at holds."""
+        return all(layer.holds for layer in self.layers)
+
+    @property
+    def looked_at(self) -> bool:
+        """True if at least one layer was looked at."""
+        return any(layer.residual is not None for layer in self.layers)
+
+    def lines(self) -> Iterator[str]:
+        """Lines of text: a headline, one for each layer, and the causes at the first that does not hold."""
+        first = next((layer for layer in self.layers if not layer.holds), None)
+        rows = f"{counted(self.rows, 'rows')} every {self.step:.4g} s, {self.base} base"
+        if self.step_bound:
+            yield f"{self.step_bound}."
+        if not self.looked_at:
+            yield f"{self.record} ({rows}): no layer could be looked at"
+        elif first is None:
+            yield f"{self.record} ({rows}): every layer that was looked at holds"
+        else:
+            yield f"{self.record} ({rows}): the {first.name} is the first layer that does not hold"
+        for layer in self.layers:
+            yield f"  {_mark(layer)} {layer.name} ({LAYERS[layer.name]}): {_found(layer)}"
+            if not layer.holds and (layer is first or layer.causes):
+                yield from (f"       {cause.sentence}" for cause in layer.causes[:3])
+                if not layer.causes:
+                    yield f"       {_unexplained(layer)}"
+        yield from self.remarks
+
+
+def _unexplained(layer: Layer) -> str:
+    if layer.tried >= layer.known:
+        return f"none of {counted(layer.tried, 'known mistakes')} explains it"
+    return (
+        f"none of {layer.tried} of {counted(layer.known, 'known mistakes')} explains it; the search ended after "
+        f"{SEARCH_TIME:.0f} s of processor time"
+    )
+
+
+def _mark(layer: Layer) -> str:
+    return "–" if layer.residual is None else "✓" if layer.holds else "✗"
+
+
+def _found(layer: Layer) -> str:
+    if layer.residual is None:
+        return layer.reason
+    place = "" if layer.holds else f", most in {layer.column}"
+    place += f" at {layer.time:.4g} s" if place and np.isfinite(layer.time) else ""
+    remark = f"; {layer.reason}" if layer.reason else ""
+    return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{place}{remark}"
+
+
+def judge_record(
+    record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None, layout: str = ""
+) -> RecordJudgement:
+    """Judges a record by layers, without a simulation; a robot whose record has columns of a base is free.
+
+    Args:
+        record: file of the record.
+        robot: file of the robot.
+        control: file of its controller.
+        names: column of the record -> its name here, perhaps with its unit, ``q.hip[deg]``.
+        layout: program whose arrays the record has (:data:`.LAYOUTS`); empty: it has columns.
+
+    Raises:
+        InputError: a file is wrong, or they do not fit.
+    """
+    if layout:
+        if names:
+            raise InputError("--map", ", ".join(names), f"--as {layout} names the arrays; leave one of both out")
+        arrays, scenes = read_arrays(record), ControlledScenes(control)
+        held = scenes.of_record(robot, free=False).mechanism
+        free = floats(arrays, layout, sum(joint.nq == 1 for joint in held.joints))
+        model = scenes.of_record(robot, free=free)
+        driven = ControlLaw.of(model.mechanism).joints
+        time, columns = columns_of(record, arrays, layout, model.mechanism, driven)
+        eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
+        digits = max(eps, default=0.0) / 2
+        read = record_of(time, columns, record, digits=digits)
+    else:
+        if record.suffix in ARRAYS:
+            raise InputError("--as", "", f"say whose arrays these are: {', '.join(LAYOUTS)}")
+        read = read_record(record, names or {})
+        free = any(name.startswith("q_WB.") for name in read.columns)
+        model = ControlledScenes(control).of_record(robot, free=free)
+    law = ControlLaw.of(model.mechanism)
+    law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
+    layers = record_layers(read, law, model.mechanism, grounded=model.grounded)
+    return RecordJudgement(
+        record=str(record),
+        robot=str(robot),
+        control=str(control),
+        base="free" if free else "fixed",
+        rows=len(read.time),
+        step=_step(read),
+        layers=layers,
+        remarks=[*_too_fast(read, model.speeds)],
+        step_bound=_step_bound(model.mechanism, _step(read)),
+    )
+
+
+def _step_bound(mechanism: Mechanism, step: float) -> str:
+    """Clause on the longest stable step of explicit servos, if rows are farther apart [s]; else empty."""
+    bounds = servo_steps(JointCoordinates(mechanism))
+    if bounds is None or step <= bounds.explicit:
+        return ""
+    rows = f"rows are {step:.4g} s apart, {step / bounds.explicit:.2g} times that"
+    return f"{bounds.sentence(())}; {rows}: too much if the program steps so"
+
+
+def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[str]:
+    """A sentence for each joint that passes the velocity limit of its drive."""
+    for joint, limit in speeds.items():
+        sizes = np.abs(record.columns.get(f"v.{joint}", np.zeros(1)))
+        if sizes.max() > limit:
+            at = record.time[int(np.argmax(sizes > limit))]
+            yield (
+                f"v.{joint} passes the velocity limit {limit:.4g} of the robot's file at {at:.4g} s; a program that "
+                "clamps velocities moves it otherwise"
+            )
+
+
+def _step(record: ControlRecord) -> float:
+    return float(record.time[-1] - record.time[0]) / (len(record.time) - 1)

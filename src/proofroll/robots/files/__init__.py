@@ -1,0 +1,1 @@
+"""Robot files: safe reading, their meaning, and the tables of a scene that they give."""

@@ -1,0 +1,119 @@
+"""MJCF files compiled by MuJoCo in a separate process."""
+
+import contextlib
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from proofroll.core.errors import InputError, Missing, Refused
+from proofroll.files.json_data import plain
+from proofroll.robots.files.reading import call, load_reader, reader_names, robot_from, words_of
+from proofroll.robots.files.robot_file import RobotFile
+from proofroll.robots.model import Robot
+from proofroll.running.process import Worker
+
+
+class Compiler(NamedTuple):
+    """Name and version of the engine that defines a format and compiled a file."""
+
+    engine: str
+    version: str
+
+
+def compile_robot(path: str, original: str | None) -> dict[str, Any]:
+    """Worker's side of :func:`compiled_robot`: the file's robot as plain data.
+
+    ``original`` is the path of the file whose copy this is; None: not to be opened.
+    """
+
+    def answer(reader: Any) -> dict[str, Any]:
+        try:
+            return {"robot": plain(reader.compiled(Path(path)))}
+        except Refused:
+            raise
+        except Exception as error:
+            if original is None:
+                raise
+            reader.compiled(Path(original))  # its error says more of the file than that of the copy
+            message = f"it is read, but not its copy without looks and contacts; please report this: {words_of(error)}"
+            raise Refused(message) from None
+
+    return _defined(Path(path), answer)
+
+
+def expand_robot(path: str) -> dict[str, Any]:
+    """Worker's side of :func:`expand`: the file's text with macros written out."""
+    return _defined(Path(path), lambda reader: {"text": reader.expanded(Path(path))})
+
+
+def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+    """Answer of the engine that defines MJCF, with its name as ``by``; or the reason of failure.
+
+    The reason is ``uncovered`` (the check does not cover something in the file) or ``message``.
+    """
+    for name in reader_names():
+        try:
+            reader = load_reader(name)
+        except Missing:
+            continue
+        if getattr(reader, "defines", None) == "mjcf":
+            by = Compiler(name, reader.version())
+            try:
+                with contextlib.chdir(path.parent):  # where an engine may leave its log
+                    return answer(reader) | {"by": by}
+            except Refused as error:
+                return {"uncovered": str(error)}
+            except Exception as error:
+                return {"message": f"{' '.join(by)} refuses it: {words_of(error)}"}
+    return {"message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"}
+
+
+def compiled_robot(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
+    """Robot of an MJCF, and the engine that compiled it.
+
+    Raises:
+        InputError: the engine that defines the format cannot compile it, or is not installed.
+        WorkerDied: the compiler crashed or took too long.
+    """
+    original = str(file.path.resolve()) if file.contained else None
+    answer = worker.request(call(compile_robot, path=str(written), original=original), time_limit)
+    if "uncovered" in answer:
+        raise InputError("file", file.path, answer["uncovered"])
+    if "robot" not in answer:
+        raise InputError("file", file.path, f"it has no meaning: {answer['message']}")
+    robot = robot_from(answer["robot"])
+    joints = ((item.name, item) for item in robot.joints)
+    for name, part in (*robot.bodies.items(), *joints, *((item.joint, item) for item in robot.mimics)):
+        for key, value in vars(part).items():
+            endless = not isinstance(value, str) and not np.isfinite(np.nan if value is None else value).all()
+            if endless and key not in {"lower", "upper", "effort", "speed"}:  # most joints have no limits
+                raise InputError(f"{file.path}: {key} of {name}", "nan", "numbers must be finite")
+    return robot, Compiler(*answer["by"])
+
+
+def expand(worker: Worker, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
+    """Root of an MJCF with macros written out, and the engine that did so.
+
+    Args:
+        worker: process of the engine.
+        path: path of the user's file, for messages.
+        parts: name -> content of the file (first) and of the files that it attaches.
+        time_limit: limit for the answer [s].
+
+    Raises:
+        InputError: the engine that defines the format cannot expand the file, or is not installed.
+        WorkerDied: the engine crashed or took too long.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for part, content in parts.items():
+            (folder / part).write_bytes(ElementTree.tostring(content, encoding="utf-8"))
+        answer = worker.request(call(expand_robot, path=str(folder / next(iter(parts)))), time_limit)
+    if "text" not in answer:
+        raise InputError("file", path, f"its macros cannot be written out: {answer['message']}")
+    return ElementTree.fromstring(answer["text"]), Compiler(*answer["by"])

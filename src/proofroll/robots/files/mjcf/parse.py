@@ -1,0 +1,205 @@
+"""Copy of an MJCF for every engine: includes inserted, everything named, without looks, contacts and missing meshes."""
+
+import contextlib
+import copy
+import itertools
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from proofroll.core.errors import InputError
+from proofroll.robots.files.mjcf.defaults import classed
+from proofroll.robots.files.mjcf.meshes import remove_height_fields, remove_meshes
+from proofroll.robots.files.robot_file import (
+    MOST_ELEMENTS,
+    Expand,
+    LintRemark,
+    names_files_inside,
+    numbers,
+    read_xml,
+    required_file,
+)
+
+# Largest depth of includes.
+_DEEPEST = 8
+_MOST_MODELS = 32
+# Elements that change neither masses nor torques without contacts.
+_LOOKS = {
+    "visual",
+    "statistic",
+    "size",
+    "texture",
+    "material",
+    "skin",
+    "hfield",
+    "sensor",
+    "contact",
+    "custom",
+}
+# Elements that change masses or motion in a way that the check does not cover.
+_UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
+COMPENSATION = "its gravity compensation is left out, as actuators are; all engines read it without"
+# Macros, which the engine that defines the format writes out.
+_MACROS = {"replicate", "attach", "composite"}
+
+
+def neutral_mjcf(
+    root: Element, path: Path, inside: Path, expand: Expand | None = None
+) -> tuple[Element, list[LintRemark], bool, tuple[tuple[float, ...], ...]]:
+    """Copy of an MJCF, remarks on omissions, True if all its files lie in ``inside``, and controls of its keyframes.
+
+    The only files that the copy names are meshes that exist in that folder.
+
+    Raises:
+        InputError: the MJCF includes a file outside the folder, or has an element that the check does not cover.
+    """
+    parts: dict[str, Element] = {}
+    remarks, contained = _add(root, path, path.resolve(), inside, parts)
+    root = next(iter(parts.values()))
+    controls = _controls_of_keyframes(root)
+    for part in parts.values():
+        part[:] = [child for child in part if child.tag != "keyframe"]
+    macros = [name for name in sorted(_MACROS) if any(part.find(f".//{name}") is not None for part in parts.values())]
+    if macros:
+        names = ", ".join(f"<{name}>" for name in macros)
+        if expand is None:
+            raise InputError("file", path, f"the check does not cover {names}")
+        if sum(map(_written_out, parts.values())) > MOST_ELEMENTS:
+            raise InputError("file", path, f"{names}: written out these are more than {MOST_ELEMENTS} elements")
+        root = expand(parts)
+        remarks.append(LintRemark("note", names, "written out by the engine that defines the format, to six digits"))
+    name_all(root)
+    return root, remarks, contained, controls
+
+
+def _controls_of_keyframes(root: Element) -> tuple[tuple[float, ...], ...]:
+    """Controls of each keyframe, which may be none."""
+    keys = [key for part in root.findall("keyframe") for key in part.findall("key")]
+    return tuple(tuple(numbers(key, "ctrl", "", len(key.get("ctrl", "").split()))) for key in keys)
+
+
+def _written_out(element: Element) -> float:
+    """Approximate number of elements after macros are written out."""
+    inside = 1 + sum(map(_written_out, element))
+    if element.tag not in _MACROS:
+        return inside
+    with contextlib.suppress(ValueError):
+        return inside * math.prod(max(1.0, float(part)) for part in element.get("count", "1").split())
+    return inside  # a wrong count: the engine's own message says so
+
+
+def _add(
+    root: Element, path: Path, file: Path, inside: Path, parts: dict[str, Element]
+) -> tuple[list[LintRemark], bool]:
+    """Adds the stripped copy of a file, and of the files that it attaches, to ``parts`` under unique names.
+
+    Returns:
+        Remarks on omissions, and True if all files that are named lie in the folder ``inside``.
+    """
+    root = copy.deepcopy(root)
+    root.tag = "mujoco"
+    if root.find(".//include") is not None:
+        count = len(root.findall("worldbody"))
+        _include(root, path, file.parent, inside, (file,))
+        _merge_defaults(root)
+        if len(root.findall("worldbody")) > count:
+            _merge_worlds(root)
+    contained = names_files_inside(root, file.parent, inside)
+    for part in ("actuator", "extension"):
+        for element in [*root.iter(part)]:
+            element[:] = [child for child in element if part == "actuator" and child.tag != "plugin"]
+    for element in root.iter():
+        if element.tag in _UNCOVERED:
+            raise InputError("file", path, f"the check does not cover <{element.tag}>")
+    shapes = list(classed(root, "geom"))
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag in _LOOKS:
+                parent.remove(child)
+        parent.attrib.pop("material", None)
+    remove_height_fields(root, shapes)
+    remarks = [*remove_meshes(root, shapes, file.parent, inside), *_gravity_compensations(root)]
+    parts[f"{len(parts)}.xml"] = root
+    for model in root.iter("model"):
+        target = required_file(file.parent, model, inside)
+        if len(parts) >= _MOST_MODELS:
+            raise InputError("<model file>", model.get("file"), f"more than {_MOST_MODELS} models are attached")
+        model.attrib.setdefault("name", target.stem)
+        model.set("file", f"{len(parts)}.xml")
+        noticed, within = _add(read_xml(target), path, target, inside, parts)
+        remarks, contained = [*remarks, *noticed], contained and within
+    return remarks, contained
+
+
+def _include(element: Element, path: Path, folder: Path, inside: Path, open_files: tuple[Path, ...]) -> None:
+    """Replaces each <include> below an element by the content of its file. Raises InputError if that is too much."""
+    for index, child in reversed(list(enumerate(element))):
+        if child.tag != "include":
+            _include(child, path, folder, inside, open_files)
+            continue
+        target = required_file(folder, child, inside)
+        if target in open_files or len(open_files) > _DEEPEST:
+            raise InputError("<include file>", child.get("file", ""), "files include each other, or too deeply")
+        included = read_xml(target)
+        _include(included, path, folder, inside, (*open_files, target))
+        element.remove(child)
+        for offset, part in enumerate(included):
+            element.insert(index + offset, part)
+        if sum(1 for _ in element.iter()) > MOST_ELEMENTS:
+            raise InputError(
+                "<include file>", child.get("file", ""), f"more than {MOST_ELEMENTS} elements are included"
+            )
+
+
+def _merge_defaults(root: Element) -> None:
+    """Merges the <default> elements of included files with that of the file, where that keeps their meaning.
+
+    Pinocchio refuses several in one file. A class inherits only what the class above it has so far, so plain defaults
+    must not follow an inner class.
+    """
+    whole, *others = root.findall("default") or [Element("default")]
+    for included in others:
+        inherits, plain = whole.find("default") is not None, [child for child in included if child.tag != "default"]
+        if included.get("class", "main") != whole.get("class", "main") or (inherits and plain):
+            whole = included
+            continue
+        for child in plain:
+            present = whole.find(child.tag)
+            if present is None or len(present) or len(child):
+                whole.append(child)
+            else:
+                present.attrib |= child.attrib
+        whole.extend(included.findall("default"))
+        root.remove(included)
+
+
+def _merge_worlds(root: Element) -> None:
+    """Merges all <worldbody> elements, those of included files too, into the last one; their meaning stays the same.
+
+    Pinocchio reads a tree twice if there are two worlds, and refuses a class that is defined after its use.
+    """
+    worlds = root.findall("worldbody")
+    worlds[-1][:] = [child for world in worlds for child in world]
+    for world in worlds[:-1]:
+        root.remove(world)
+
+
+def _gravity_compensations(root: Element) -> Iterator[LintRemark]:
+    """Removes compensation of gravity from bodies; yields a remark for each."""
+    for body in root.iter("body"):
+        if body.attrib.pop("gravcomp", "0") not in {"0", "0.0"}:
+            yield LintRemark("note", f"body {body.get('name', '')}", COMPENSATION)
+
+
+def name_all(root: Element) -> None:
+    """Gives names to bodies and joints without one, so that engines can be compared by name."""
+    root.attrib.setdefault("model", "robot")
+    taken = {element.get("name") for element in root.iter()}
+    for world in root.iter("worldbody"):
+        for tag, word in (("body", "body"), ("joint", "joint"), ("freejoint", "joint")):
+            for number, element in enumerate(world.iter(tag)):
+                if not element.get("name"):
+                    free = (f"{word}{filler}{number}" for filler in itertools.accumulate(itertools.repeat(" ")))
+                    element.set("name", next(name for name in free if name not in taken))
+                    taken.add(element.get("name"))

@@ -1,0 +1,1 @@
+"""Importers of robot files that engines bring, as readers that can be checked."""
