@@ -59,3 +59,15 @@ def test_files_that_a_page_names_are_there(name: str) -> None:
     text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
     for found in re.findall(r"`(\.github/[\w./]+|src/[\w./]+|pyproject\.toml|CITATION\.cff)`", text):
         assert (ROOT / found).is_file(), found
+
+
+def test_the_page_about_licences_has_every_package_that_is_installed() -> None:
+    """Each package that the wheel or an extra for users asks for has a row, beside the extra it comes with."""
+    extras = PROJECT["optional-dependencies"]
+    asked = {"proofroll": PROJECT["dependencies"]} | {
+        f"`[{name}]`": packages for name, packages in extras.items() if name not in {"all", "dev"}
+    }
+    text = (ROOT / "docs" / "licences.md").read_text(encoding="utf-8")
+    rows = [tuple(cell.strip() for cell in row.strip("|").split("|")) for row in re.findall(r"^\|.*\|$", text, re.M)]
+    known = {(package.split(" (")[0], row[1]) for row in rows[2:] for package in row[0].split(", ")}
+    assert known == {(re.split(r"[<>=;]", item)[0], extra) for extra, items in asked.items() for item in items}

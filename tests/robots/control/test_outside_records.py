@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -338,3 +339,29 @@ def test_arrays_that_cannot_be_read(
     code, _, err = proofroll("judge", str(tmp_path / "record.npz"), *files, *asked)
     assert code == 2
     assert said in err
+
+
+@pytest.mark.parametrize(
+    ("layout", "changed", "said"),
+    [
+        ("isaacgym", {"root_states": np.ones((9, 12))}, "'root_states': it has 12 columns, and a robot of 6 joints 13"),
+        ("isaacgym", {"root_states": np.ones((9, 7))}, "it has 7 columns, .* 13: place, quaternion, velocity and"),
+        ("isaacgym", {"root_states": np.ones((9, 3))}, "it has 3 columns"),
+        ("isaacgym", {"torques": np.ones((8, 6))}, "'torques': it has 8 rows, and the file 9 times"),
+        ("playground", {"qpos": np.ones((9, 12))}, "'qpos': it has 12 columns, and a robot of 6 joints 6 or 13"),
+        ("playground", {"qvel": np.ones((9, 6))}, "'qvel': it has 6 columns, and a robot of 6 joints 12"),
+    ],
+)
+def test_arrays_of_another_shape(
+    layout: str, changed: dict[str, np.ndarray], said: str, proofroll: Proofroll, tmp_path: Path
+) -> None:
+    """An array with too few columns or rows is one line with its own name and what it should have."""
+    (tmp_path / "legs.urdf").write_text(urdf())
+    (tmp_path / "legs.toml").write_text(CONTROL)
+    gym = {"root_states": np.ones((9, 13)), "dof_pos": np.zeros((9, 6)), "dof_vel": np.zeros((9, 6))}
+    arrays = {"qpos": np.ones((9, 13)), "qvel": np.zeros((9, 12))} if layout == "playground" else gym
+    np.savez(tmp_path / "record.npz", dt=0.01, **(arrays | changed))
+    files = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml"), "--as", layout]
+    code, _, err = proofroll("judge", str(tmp_path / "record.npz"), *files)
+    assert (code, err.count("\n")) == (2, 1), err
+    assert re.search(said, err)

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, choices, require_known
+from proofroll.core.number_format import counted
 from proofroll.elements.mechanism import Mechanism
 from proofroll.robots.model import Array
 
@@ -137,6 +138,7 @@ def columns_of(
     found = _named(arrays, kind)
     times = _times(path, arrays, len(next(iter(found.values()), ())))
     joints = _in_order(mechanism, arrays, by_level=kind.by_level)
+    _require_shapes(path, kind, arrays, found, len(joints), len(times))
     if "qpos" in found and "qvel" in found:
         positions, rates = found.pop("qpos"), found.pop("qvel")
         if positions.shape[1] == len(joints) + _POSE:
@@ -162,6 +164,25 @@ def columns_of(
             raise InputError(str(path), "quaternion of the base", "it is zero in a row, which is no orientation")
         columns |= _base(found["base"], kind, mechanism)
     return times, columns
+
+
+def _require_shapes(
+    path: Path, layout: Layout, arrays: Mapping[str, Array], found: Mapping[str, Array], joints: int, rows: int
+) -> None:
+    """Raises InputError for an array with another number of rows than times, or of columns than its state has."""
+    widths = {"base": (_POSE + _TWIST,), "qpos": (joints, joints + _POSE), "qvel": (joints, joints + _TWIST)}
+    if "qpos" in found and found["qpos"].shape[1] in widths["qpos"]:
+        floating = found["qpos"].shape[1] == joints + _POSE
+        widths["qvel"] = (joints + _TWIST * floating,)
+    for quantity, values in found.items():
+        name = next(name for name in layout.names[quantity] if name in arrays)
+        if len(values) != rows:
+            raise InputError(str(path), name, f"it has {counted(len(values), 'rows')}, and the file {rows} times")
+        if values.shape[1] not in widths.get(quantity, (values.shape[1],)):
+            meant = " or ".join(map(str, widths[quantity]))
+            advice = f"it has {counted(values.shape[1], 'columns')}, and a robot of {counted(joints, 'joints')} {meant}"
+            what = ": place, quaternion, velocity and angular velocity of its base" if quantity == "base" else ""
+            raise InputError(str(path), name, advice + what)
 
 
 def _named(arrays: Mapping[str, Array], layout: Layout) -> dict[str, Array]:
