@@ -29,7 +29,7 @@ def _run(speed: float, error: float, tolerance: float) -> Any:
     judgement = Judgement(
         observable="N", unit="N", error=error, truth_error_bar=1e-12, tolerance=tolerance, scale=40.0, verdict=verdict
     )
-    return SimpleNamespace(parameters={"speed": speed}, judgements=[judgement])
+    return SimpleNamespace(point=f"speed={speed:g}", judgements=[judgement])
 
 
 def test_the_largest_error_of_a_row_is_that_of_all_its_cases() -> None:

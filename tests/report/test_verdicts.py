@@ -23,7 +23,7 @@ from proofroll.report.comparison.conclusions import conclusions
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.summary import outcome_content
-from proofroll.report.comparison.verdict_matrix import Cell, counted, overview
+from proofroll.report.comparison.verdict_matrix import counted, rows_by_engine, title
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, choice_matrix
 from proofroll.report.page.first_sentences import three_sentences
@@ -53,7 +53,7 @@ def test_another_number_of_events_has_no_bar() -> None:
     times, true = np.array([0.1, 0.2, 0.3]), np.array([0.1, 0.2])
     limit = Limit(times, 9e-13, 1.0)
     item = judged_curve("event_times", "s", times, true, truth_error_bar=0.0, tolerance=1e-3, scale=1.0, limit=limit)
-    assert Cell(item, "").title.endswith("error ∞ ± 0 s, tolerance 1e-3; another limit")
+    assert title(item, "").endswith("error ∞ ± 0 s, tolerance 1e-3; another limit")
 
 
 def with_runs(outcome: Outcome, runs: Mapping[int, list[Run]]) -> Outcome:
@@ -102,8 +102,10 @@ def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -
     assert verdict_text(row) == "refused 1/11 ✓10"
     assert row.reason == "at speed=6: one coefficient only"
     assert "⊘ refused 1/11 ✓10" in printed(content, 100)
-    first = next(iter(overview(content).groups.values()))[0]
-    assert (first.verdict_text, first.cells["z"].judgement.verdict) == ("refused 1/11 ✓10", "agrees")
+    of_row, runs_of_row = next(iter(rows_by_engine(content).values()))[0]
+    assert (verdict_text(of_row, runs_of_row), of_row.observables["z"].verdict) == ("refused 1/11 ✓10", "agrees")
+    ((at_point, run_there),) = next(iter(rows_by_engine(content, "speed=6").values()))[:1]
+    assert (verdict_text(at_point, run_there), len(run_there)) == ("refused", 1)
 
 
 def test_the_price_of_compiling_has_a_column(made: tuple[Outcome, Store]) -> None:
@@ -118,7 +120,7 @@ def test_the_price_of_compiling_has_a_column(made: tuple[Outcome, Store]) -> Non
     assert "s before" in slow
     assert re.search(r" 24 ", slow)
     assert "s before" not in quick
-    pages = [str(templates().get_template("parts.html").module.matrix(overview(one), "", "")) for one in contents]
+    pages = [str(templates().get_template("parts.html").module.matrix(one, None, "", "")) for one in contents]
     assert ["before <small>s</small>" in page for page in pages] == [False, True]
     assert re.search(r'<td class="n">24</td>', pages[1])
 
@@ -176,7 +178,7 @@ def test_a_wrong_limit_within_tolerance_is_marked(outcome: Outcome) -> None:
     row = content.rows[2]
     assert row.verdict == "agrees"
     assert "✓ agrees*" in printed(content, 100)
-    assert "agrees*" in [line.verdict_text for lines in overview(content).groups.values() for line in lines]
+    assert "agrees*" in [verdict_text(*line) for lines in rows_by_engine(content).values() for line in lines]
     (remark,) = row.remarks
     assert "shown not to be the truth: off by 4e-4 ± 1e-7 m, order 2" in remark
     assert f"* beta only: {remark}" in [line.replace(" (dt 1e-3 s)", "") for line in closing_lines(content)]
@@ -358,5 +360,5 @@ def test_a_comparison_that_is_not_timed_shows_its_rough_cost(made: tuple[Outcome
     results[0] = dataclasses.replace(results[0], wall_seconds=0.25, processor={"advance": 0.2})
     runs = [dataclasses.replace(run, result=item) for run, item in zip(outcome.runs, results, strict=True)]
     rows = outcome_content(dataclasses.replace(outcome, runs=runs)).rows
-    assert tables.cost_cell(rows[0], None) == ("≈ 0.2", "of one run beside which others ran: to a factor of about two")
-    assert tables.cost_cell(rows[-1], None) == ("–", "not timed")
+    assert tables.cost_cell(rows[0], []) == ("≈ 0.2", "of one run beside which others ran: to a factor of about two")
+    assert tables.cost_cell(rows[-1], []) == ("–", "not timed")

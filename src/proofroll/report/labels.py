@@ -78,26 +78,21 @@ def unjudged(content: ReportedComparison) -> int:
     return sum(run.verdict not in content.rows[run.row].expected for run in open_runs)
 
 
-def verdict_word(entry: ReportedRow | ReportedRun, runs: Sequence[ReportedRun]) -> str:
-    """Verdict of some runs; ``missing`` where none of those that failed has its engine."""
-    from proofroll.running.case import Status
-
-    failed = [run for run in runs if run.verdict == "failed"]
-    gone = entry.verdict == "failed" and failed and all(run.status == Status.MISSING for run in failed)
-    return "missing" if gone else str(entry.verdict)
-
-
 def verdict_text(row: ReportedRow, runs: Sequence[ReportedRun] = ()) -> str:
     """Verdict of a row with its runs, with the counts of its cases if their verdicts differ: ``failed 1/11 ✗2 ✓8``.
 
-    A star refers to a remark below the table.
+    A star refers to a remark below the table; ``missing``: none of the runs that failed has its engine.
     """
-    star = "*" if row.remarks else ""
+    from proofroll.running.case import Status
+
+    failed = [run.status for run in runs if run.verdict == "failed"]
+    missing = row.verdict == "failed" and set(failed) == {Status.MISSING}
+    words = ["missing" if missing else str(row.verdict)]
     counts = {word: row.verdicts[word] for word in SYMBOLS if row.verdicts.get(word)}
-    if counts.keys() <= {row.verdict}:
-        return f"{verdict_word(row, runs)}{star}"
-    others = [f"{SYMBOLS[word]}{count}" for word, count in reversed(counts.items()) if word != row.verdict]
-    return " ".join([verdict_word(row, runs), f"{counts[row.verdict]}/{sum(counts.values())}", *others]) + star
+    if not counts.keys() <= {row.verdict}:
+        others = [f"{SYMBOLS[word]}{count}" for word, count in reversed(counts.items()) if word != row.verdict]
+        words += [f"{counts[row.verdict]}/{sum(counts.values())}", *others]
+    return " ".join(words) + ("*" if row.remarks else "")
 
 
 def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:

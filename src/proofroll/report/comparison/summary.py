@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from proofroll.core.comparison import Comparison
+from proofroll.core.comparison import Comparison, Row
 from proofroll.core.element_abilities import step_bound
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
@@ -16,6 +16,7 @@ from proofroll.report.comparison.records import (
     ReportedComparison,
     ReportedRow,
     ReportedRun,
+    Setting,
     ShownBand,
     ShownObservable,
     WorstJudgement,
@@ -31,9 +32,12 @@ from proofroll.studies.comparison.outcome import SEVERITY, Outcome, Run
 from proofroll.studies.comparison.planning import at_point, point_name
 
 
-def reported_rows(outcome: Outcome) -> list[ReportedRow]:
-    """Summary of each row of a comparison."""
-    return [_row(runs, outcome.comparison.until) for runs in outcome.rows]
+def reported(outcome: Outcome) -> tuple[list[ReportedRow], list[ReportedRun]]:
+    """Rows of a comparison, and its runs."""
+    until = outcome.comparison.until
+    runs = [[_run(run, number, until) for run in of_row] for number, of_row in enumerate(outcome.rows)]
+    rows = [_row(of_row[0].row, made) for of_row, made in zip(outcome.rows, runs, strict=True)]
+    return rows, [run for made in runs for run in made]
 
 
 def outcome_content(outcome: Outcome) -> ReportedComparison:
@@ -41,6 +45,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
     comparison = outcome.comparison
     scene = next((point.scene for point in outcome.points.values()), outcome.scene)
     steps = {run.facts.step for run in outcome.runs if run.facts is not None and run.facts.step is not None}
+    rows, runs = reported(outcome)
     return ReportedComparison(
         name=comparison.name,
         title=comparison.title,
@@ -66,8 +71,8 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
             name: ShownBand(band.because, {key: in_words(bound) for key, bound in band.bounds.items()})
             for name, band in comparison.bands.items()
         },
-        rows=reported_rows(outcome),
-        runs=[_run(run, number, comparison.until) for number, runs in enumerate(outcome.rows) for run in runs],
+        rows=rows,
+        runs=runs,
         hosts=hosts(run.result for run in outcome.runs),
         spread=[
             spread_of(
@@ -119,43 +124,51 @@ def runs_at(outcome: Outcome, point: str) -> list[tuple[int, Run, StoredTrajecto
     ]
 
 
-def _row(runs: list[Run], until: float) -> ReportedRow:
-    """Summary of a row over the points of the parameters, by the worst verdict and the largest cost."""
-    run_1 = runs[0]
-    # A point where the question is ill-posed or not judged does not count against an engine.
-    judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
-    names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
-    timings = [run.result.seconds_per_second for run in runs if run.result.seconds_per_second is not None]
-    rough = [cost for run in runs if (cost := rough_cost(run.result, until)) is not None]
-    reason, limit = _why(judged)
+def _row(row: Row, runs: list[ReportedRun]) -> ReportedRow:
     return ReportedRow(
-        **settings_of(run_1),
-        verdict=max((run.verdict for run in judged), key=SEVERITY.index),
-        verdicts={verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
-        reason=reason,
-        limit=limit,
-        shared=next((run.shared for run in runs if run.shared), ""),
-        missing=sorted({name for run in runs for name in run.missing}),
-        remarks=_remarks(runs),
-        diagnosis=_diagnosis(runs),
-        expected=run_1.row.expect,
-        expected_for=run_1.row.expect_for,
-        because=run_1.row.because,
-        short=run_1.row.short,
-        tolerance=run_1.row.tolerance,
-        claims=Claims.of(run_1.row),
-        as_expected=not any(run.contradictions for run in runs),
-        observables={name: _worst(judged, name) for name in names},
-        seconds_per_second=max(timings, default=None),
-        rough_cost=max(rough, default=None),
-        message=next((run.result.message for run in runs if run.result.status != Status.DONE), ""),
+        expected=row.expect,
+        expected_for=row.expect_for,
+        because=row.because,
+        short=row.short,
+        tolerance=row.tolerance,
+        claims=Claims.of(row),
+        **_summary(runs),
     )
 
 
-def _why(runs: list[Run]) -> tuple[str, str]:
+def row_at(row: ReportedRow, runs: list[ReportedRun]) -> ReportedRow:
+    """Row over some of its runs, without remarks, which are about all of them."""
+    return dataclasses.replace(row, **_summary(runs) | {"remarks": []})
+
+
+def _summary(runs: list[ReportedRun]) -> dict[str, Any]:
+    """Fields of a row about its runs: the worst verdict of all points and the largest cost."""
+    # A point where the question is ill-posed or not judged does not count against an engine.
+    judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
+    names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
+    reason, limit = _why(judged)
+    return {
+        **{item.name: getattr(runs[0], item.name) for item in dataclasses.fields(Setting)},
+        "verdict": max((run.verdict for run in judged), key=SEVERITY.index),
+        "verdicts": {verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
+        "reason": reason,
+        "limit": limit,
+        "shared": next((run.shared for run in runs if run.shared), ""),
+        "missing": sorted({name for run in runs for name in run.missing}),
+        "remarks": _remarks(runs),
+        "diagnosis": _diagnosis(runs),
+        "as_expected": not any(run.contradictions for run in runs),
+        "observables": {name: _worst(judged, name) for name in names},
+        "seconds_per_second": max((x for run in runs if (x := run.seconds_per_second) is not None), default=None),
+        "rough_cost": max((x for run in runs if (x := run.rough_cost) is not None), default=None),
+        "message": next((run.message for run in runs if run.status != Status.DONE), ""),
+    }
+
+
+def _why(runs: list[ReportedRun]) -> tuple[str, str]:
     """Reason of the worst verdict, empty if everything agrees; and the result of its ladder of steps, ``limit``."""
     worst = max((run.verdict for run in runs), key=SEVERITY.index)
-    guilty: list[tuple[Run, Judgement | None]] = []
+    guilty: list[tuple[ReportedRun, Judgement | None]] = []
     for run in runs:
         if run.verdict == worst:
             guilty += [(run, item) for item in run.judgements] or [(run, None)]
@@ -167,13 +180,13 @@ def _why(runs: list[Run]) -> tuple[str, str]:
     if worst == Verdict.INCOMPLETE:
         return f"agrees, but does not report {', '.join(run.missing)}", limit
     if worst == Verdict.REFUSED:  # the verdict already names a refusal
-        return f"{place.strip()}: {run.result.message}" if place else run.result.message, ""
+        return f"{place.strip()}: {run.message}" if place else run.message, ""
     if judgement is None or worst == Verdict.FAILED:
-        return f"{run.result.status}{place}: {run.result.message}", ""
+        return f"{run.status}{place}: {run.message}", ""
     return f"{judgement.observable}{place}: {judgement.reason}", limit
 
 
-def _remarks(runs: list[Run]) -> list[str]:
+def _remarks(runs: list[ReportedRun]) -> list[str]:
     """Remarks on a row: shared equations; those of the observable with the worst limit; a floor of precision."""
     remarks = list(dict.fromkeys(run.shared for run in runs if run.shared))
     shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
@@ -189,32 +202,32 @@ def _remarks(runs: list[Run]) -> list[str]:
     return remarks
 
 
-def _diagnosis(runs: list[Run]) -> list[CauseAt]:
+def _diagnosis(runs: list[ReportedRun]) -> list[CauseAt]:
     """Proven causes, each once, with the points where it was proven."""
     causes: dict[str, CauseAt] = {}
     for run in runs:
         for item in run.diagnosis:
-            causes.setdefault(item.cause.id, CauseAt(item, [])).points.append(point_name(run.parameters))
+            causes.setdefault(item.cause.id, CauseAt(item, [])).points.append(run.point)
     return list(causes.values())
 
 
-def _furthest(judged: list[tuple[Run, Judgement | None]]) -> tuple[Run, Judgement | None]:
-    """Run and judgement with the worst verdict, of equal ones the one furthest beyond its tolerance."""
+def _furthest(judged: list[tuple[ReportedRun, Judgement | None]]) -> tuple[ReportedRun, Judgement | None]:
+    """ReportedRun and judgement with the worst verdict, of equal ones the one furthest beyond its tolerance."""
 
-    def badness(pair: tuple[Run, Judgement | None]) -> tuple[int, float]:
+    def badness(pair: tuple[ReportedRun, Judgement | None]) -> tuple[int, float]:
         item = pair[1]
         return (SEVERITY.index(item.verdict), item.error / item.tolerance) if item else (-1, 0.0)
 
     return max(judged, key=badness)
 
 
-def _worst(runs: list[Run], name: str) -> WorstJudgement:
+def _worst(runs: list[ReportedRun], name: str) -> WorstJudgement:
     judged = [(run, next((item for item in run.judgements if item.observable == name), None)) for run in runs]
     worst_run, worst = _furthest(judged)
     assert worst is not None  # names are those of judged observables
     largest = max(judgement.error for _, judgement in judged if judgement is not None)
     values = {item.name: getattr(worst, item.name) for item in dataclasses.fields(worst)}
-    return WorstJudgement(**values, point=point_name(worst_run.parameters), largest=largest)
+    return WorstJudgement(**values, point=worst_run.point, largest=largest)
 
 
 def facts_of(run: Run) -> EngineFacts:
@@ -222,50 +235,44 @@ def facts_of(run: Run) -> EngineFacts:
     return run.facts or EngineFacts(run.row.engine.partition("[")[0], version="", code="", settings={})
 
 
-def settings_of(run: Run) -> dict[str, Any]:
-    """Values of the fields of :class:`Setting`."""
-    facts = facts_of(run)
-    return {
-        "engine": run.row.engine,
-        "name": shown_name(facts.name),
-        "formulation": facts.settings.get("formulation"),
-        "preset": facts.settings.get("preset"),
-        "setting": setting_words(run.row.engine, facts),
-        "resolution": facts.resolution,
-        "resolution_value": facts.settings.get(facts.resolution or ""),
-        "declared_order": facts.order,
-        "caveat": facts.caveat,
-        "family": facts.family,
-        "precision": facts.precision,
-        "scheme": facts.scheme,
-    }
-
-
 def _run(run: Run, row: int, until: float) -> ReportedRun:
-    reason, limit = _why([run])
-    return ReportedRun(
+    facts, result = facts_of(run), run.result
+    made = ReportedRun(
+        engine=run.row.engine,
+        name=shown_name(facts.name),
+        formulation=facts.settings.get("formulation"),
+        preset=facts.settings.get("preset"),
+        setting=setting_words(run.row.engine, facts),
+        resolution=facts.resolution,
+        resolution_value=facts.settings.get(facts.resolution or ""),
+        declared_order=facts.order,
+        caveat=facts.caveat,
+        family=facts.family,
+        precision=facts.precision,
+        scheme=facts.scheme,
         row=row,
-        **settings_of(run),
-        settings=run.facts.settings if run.facts else {},
+        settings=facts.settings,
         point=point_name(run.parameters),
         parameters=run.parameters,
-        status=run.result.status,
-        message=run.result.message,
+        status=result.status,
+        message=result.message,
         verdict=run.verdict,
-        reason=reason,
-        limit=limit,
+        reason="",
+        limit="",
         contradictions=run.contradictions,
         missing=run.missing,
         shared=run.shared,
         diagnosis=run.diagnosis,
         judgements=run.judgements,
-        certificate=run.result.certificate,
-        seconds_per_second=run.result.seconds_per_second,
-        rough_cost=rough_cost(run.result, until),
-        build_seconds=run.result.build_seconds,
-        timings=run.result.timings,
-        cost=Cost.of(run.result.timings),
-        versions=run.result.versions,
-        trajectory=run.result.trajectory,
-        host=run.result.host,
+        certificate=result.certificate,
+        seconds_per_second=result.seconds_per_second,
+        rough_cost=rough_cost(result, until),
+        build_seconds=result.build_seconds,
+        timings=result.timings,
+        cost=Cost.of(result.timings),
+        versions=result.versions,
+        trajectory=result.trajectory,
+        host=result.host,
     )
+    reason, limit = _why([made])
+    return dataclasses.replace(made, reason=reason, limit=limit)

@@ -93,13 +93,14 @@ def cost_title(cost: Cost | None) -> str:
     return f"median of {cost.runs} clean runs; {cost_interval(cost)} s/s holds it with {percent}"
 
 
-def cost_cell(of: ReportedRow | ReportedRun, cost: Cost | None) -> tuple[str, str]:
-    """Text of a cost [s/s], rough ones after ``≈``, and a sentence that describes it."""
-    if of.seconds_per_second is not None:
-        return number(of.seconds_per_second), cost_title(cost)
-    if of.rough_cost is None:
+def cost_cell(row: ReportedRow, runs: Sequence[ReportedRun]) -> tuple[str, str]:
+    """Text of the cost of a row's slowest case [s/s], rough ones after ``≈``, and a sentence that describes it."""
+    if row.seconds_per_second is not None:
+        slowest = next(run.cost for run in runs if run.seconds_per_second == row.seconds_per_second)
+        return number(row.seconds_per_second), cost_title(slowest)
+    if row.rough_cost is None:
         return "–", cost_title(None)
-    return f"≈ {number(of.rough_cost)}", "of one run beside which others ran: to a factor of about two"
+    return f"≈ {number(row.rough_cost)}", "of one run beside which others ran: to a factor of about two"
 
 
 def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:

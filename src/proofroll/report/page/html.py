@@ -127,6 +127,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "names": labels.names,
         "step": labels.step,
         "detail": labels.detail,
+        "verdict_text": labels.verdict_text,
         "setting": labels.setting,
         "closing_notes": closing_notes,
         "alone_words": ALONE,

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 from proofroll.files.trajectory_file import StoredTrajectory
-from proofroll.report.comparison.summary import reported_rows, runs_at
+from proofroll.report.comparison.summary import reported, runs_at
 from proofroll.report.labels import names
 from proofroll.report.pages import packed
 from proofroll.report.replay.library import three
@@ -128,7 +128,7 @@ def distance(path: FloatArray, true: FloatArray) -> float:
 
 def _looks(outcome: Outcome, page_engines: Sequence[str]) -> list[tuple[str, int]]:
     """Name and colour of each row, as in the comparison's figures."""
-    rows = reported_rows(outcome)
+    rows, _ = reported(outcome)
     return [(name, style.colour) for name, style in zip(names(rows), styles(rows, page_engines), strict=True)]
 
 
