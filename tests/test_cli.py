@@ -671,8 +671,12 @@ def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
     assert found["claims"]["contradictions"]
     assert {path.suffix for path in (tmp_path / "out" / "stability").glob("sphere*") if path.is_file()} == {
         ".json",
-        ".svg",
+        ".html",
     }
+    (page,) = (tmp_path / "out" / "stability").glob("*.html")
+    text = page.read_text(encoding="utf-8")
+    assert 'class="heat"' in text
+    assert "projection solver rotating_frame default" in text
 
 
 @pytest.mark.drill

@@ -22,7 +22,9 @@ def stability(
     as_json: options.Json = False,
 ) -> None:
     """Map up to which step or tolerance each engine is stable, and right, along axes of extremes."""
-    from proofroll.report.stability.map import svg
+    from proofroll.report.page.html import templates
+    from proofroll.report.pages import rendered
+    from proofroll.report.stability.part import StabilityPart
     from proofroll.report.stability.tables import stability_parts
     from proofroll.running.store import write_text
     from proofroll.studies.stability.axes import chosen
@@ -37,7 +39,8 @@ def stability(
     runner = options.new_runner(out, fresh, jobs, scheduler)
     with options.progress_bar("stability", None) as advance:
         study, path = make_stability(asked, axes, runner, out, engines=engine or [], effort=effort, progress=advance)
-    write_text(path.with_suffix(".svg"), svg(study))
+    entry = StabilityPart(asked, engine or [], study, folder=path.stem).entry()
+    write_text(path.with_suffix(".html"), rendered(templates(), "stability_page.html", entry=entry))
     options.show(study, as_json, lambda: stability_parts(study, path))
     if study.absent and not study.points:
         for name, reason in study.absent.items():

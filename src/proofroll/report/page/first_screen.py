@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -116,48 +116,23 @@ class FirstScreen:
     @cached_property
     def rows(self) -> list[MatrixRow]:
         """Rows of the matrix: engines that may be taken, then witnesses, each with formulations and settings."""
-        rows = []
+        rows: list[MatrixRow] = []
         for engine in self.matrix.engines:
-            witness = engine in self.matrix.witnesses
-            models = self.matrix.formulations(engine)
-            title = self.matrix.title(engine)
+            models, title = self.matrix.formulations(engine), self.matrix.title(engine)
             title = title[:1].upper() + title[1:]
-            rows.append(
-                MatrixRow(
-                    level="engine", engine=engine, name=engine, of="", label=title, count=len(models), witness=witness
-                )
-            )
+            row_of = partial(MatrixRow, engine=engine, witness=engine in self.matrix.witnesses)
+            rows.append(row_of(level="engine", name=engine, of="", label=title, count=len(models)))
             for model in models:
                 settings = [
                     row
                     for row in self.matrix.rows
                     if row.setting and (row.engine, row.formulation) == (model.engine, model.formulation)
                 ]
-                name = f"{engine} {model.formulation}"
-                label = model.formulation.replace("_", " ") or title
-                rows.append(
-                    MatrixRow(
-                        level="formulation",
-                        engine=engine,
-                        name=name,
-                        of=engine,
-                        label=label,
-                        count=len(settings),
-                        witness=witness,
-                        row=model,
-                    )
-                )
+                name, label = f"{engine} {model.formulation}", model.formulation.replace("_", " ") or title
+                count = len(settings)
+                rows.append(row_of(level="formulation", name=name, of=engine, label=label, count=count, row=model))
                 rows += [
-                    MatrixRow(
-                        level="setting",
-                        engine=engine,
-                        name=f"{name} {row.setting}",
-                        of=name,
-                        label=row.setting,
-                        count=0,
-                        witness=witness,
-                        row=row,
-                    )
+                    row_of(level="setting", name=f"{name} {row.setting}", of=name, label=row.setting, count=0, row=row)
                     for row in settings
                 ]
         return rows

@@ -1,23 +1,18 @@
-"""Heat maps of stability as a picture and as a table of a page; each colour has a text."""
+"""Heat map of stability as a table of a page; each colour has a text."""
 
 from __future__ import annotations
 
-import itertools
 import math
 import string
-import textwrap
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from proofroll.core.number_format import counted, number
-from proofroll.report.figure import panels, svg_text
+from proofroll.core.number_format import number
 from proofroll.report.labels import engine_title, name_of, step
 from proofroll.report.pages import slug
 from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, NOT_RUN, REFUSED, TOO_SLOW, WRONG_MODEL
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from proofroll.studies.stability.axes import Axis
     from proofroll.studies.stability.records import BoundaryPoint, StabilityStudy
 
@@ -34,17 +29,6 @@ _LETTERS = {
 # Steps per natural time with the lightest and the darkest colour; tolerances are coloured by their decades.
 _FEWEST, _MOST = 8.0, 1e5
 _TOLERANCE_DECADES = 13
-# Number of letters of the legend on a line above one panel.
-_LETTERS_PER_PANEL = 118
-
-
-def svg(study: StabilityStudy) -> str:
-    """Heat maps as one SVG text; letters stay text, which a page can scale, search and read aloud.
-
-    Raises:
-        Missing: matplotlib is not installed.
-    """
-    return svg_text({"svg.fonttype": "none", "font.size": 8.0}, lambda: _drawn(study))
 
 
 def letters(study: StabilityStudy) -> dict[str, str]:
@@ -61,69 +45,9 @@ def letters(study: StabilityStudy) -> dict[str, str]:
     return letter_of
 
 
-def legend(study: StabilityStudy) -> list[str]:
-    """Legend of the cells, as sentences."""
-    kinds = ", ".join(f"{letter} {kind}" for kind, letter in letters(study).items())
-    sizes = f"{counted(len(study.points), 'points')}, {counted(study.boundaries, 'boundaries')}"
-    return [
-        f"{study.scene}: {sizes}, {study.silent} silent.",
-        "Steps per natural time (or tolerance) that 1 % of the range needs; – no affordable one does; ? no truth.",
-        f"Letter: what is beyond the boundary of stability, or else of 1 % ({kinds}); ! the engine did not say so.",
-    ]
-
-
-def _drawn(study: StabilityStudy) -> Figure:
-    """Figure with a panel for each axis that has points, row by row."""
-    import matplotlib as mpl
-
-    axes = [axis for axis in study.axes if any(point.axis == axis.name for point in study.points)]
-    curves = list(dict.fromkeys(point.curve for point in study.points))
-    figure, drawn, rows, columns = panels(len(axes))
-    figure.set_size_inches(7.2 * columns, rows * (0.9 + 0.24 * len(curves)) + 1.0)
-    for panel, axis in zip(drawn, axes, strict=True):
-        _panel(panel, study, axis, curves, mpl.colormaps["cividis_r"])
-    text = "\n".join(textwrap.fill(sentence, _LETTERS_PER_PANEL * columns) for sentence in legend(study))
-    figure.suptitle(text, fontsize=8, x=0.01, ha="left")
-    return figure
-
-
-def _panel(panel: Any, study: StabilityStudy, axis: Axis, curves: list[str], colours: Any) -> None:
-    points = [point for point in study.points if point.axis == axis.name]
-    values = list(dict.fromkeys(point.value for point in points))
-    names = curve_names(study)
-    for point in points:
-        x, y = values.index(point.value), curves.index(point.curve)
-        text, shade = cell(study, point)
-        face = "#ffffff" if shade is None else colours(shade)
-        hatch = "////" if text.startswith("–") else None
-        panel.add_patch(_rectangle(x, y, face, hatch))
-        dark = shade is not None and shade > 0.5
-        behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0} if hatch else None
-        colour = "white" if dark else "black"
-        panel.text(x, y, text, ha="center", va="center", fontsize="small", color=colour, bbox=behind)
-    panel.set(
-        xlim=(-0.5, len(values) - 0.5),
-        ylim=(len(curves) - 0.5, -0.5),
-        xlabel=f"{axis.name}" + (f" [{axis.unit}]" if axis.unit != "1" else ""),
-    )
-    panel.set_xticks(range(len(values)), [f"{value:g}" for value in values])
-    panel.set_yticks(range(len(curves)), [names[curve] for curve in curves])
-    panel.tick_params(length=0)
-    engines = [curve.partition("[")[0] for curve in curves]
-    for row, (upper, lower) in enumerate(itertools.pairwise(engines)):
-        if upper != lower:
-            panel.axhline(row + 0.5, color="0.2", lw=1.0)
-
-
 def curve_names(study: StabilityStudy) -> dict[str, str]:
     """Engine, formulation and setting of each curve, for readers."""
     return {point.curve: name_of(point) for point in study.points}
-
-
-def _rectangle(x: int, y: int, face: Any, hatch: str | None) -> Any:
-    from matplotlib.patches import Rectangle
-
-    return Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, hatch=hatch, edgecolor="0.8", lw=0.5)
 
 
 def address(point: BoundaryPoint) -> str:

@@ -32,7 +32,7 @@ def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
     yield from (f"{place.axis} = {place.value:g}: {place.problem}" for place in study.places if place.problem)
     yield from (f"{name}: {reason}" for name, reason in study.absent.items())
     yield from (f"!! {line}" for line in study.claims.contradictions)
-    yield f"The map is in {path.with_suffix('.svg')}, everything in {path}."
+    yield f"The map is in {path.with_suffix('.html')}, everything in {path}."
 
 
 def headline(study: StabilityStudy) -> str:

@@ -20,7 +20,7 @@ from proofroll.core.errors import InputError
 from proofroll.files import scene_file
 from proofroll.files.json_data import plain, record
 from proofroll.files.scene_file import load_scene
-from proofroll.report.stability.map import legend, letters, svg
+from proofroll.report.stability.map import letters
 from proofroll.report.stability.tables import _beyond, boundary_table, headline, silent_lines
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
@@ -152,7 +152,7 @@ def test_a_map_resumes(small: Any, resumed: tuple[Any, int, Path]) -> None:
 
 
 def test_reports_of_a_map(small: Any) -> None:
-    """Terminal and heat map say of every point what it is, within 100 columns."""
+    """The terminal shows each curve within 100 columns, and each kind of failure has a letter of its own."""
     from rich.console import Console
 
     study = stability_study(small)
@@ -161,10 +161,6 @@ def test_reports_of_a_map(small: Any) -> None:
     console.print(boundary_table(study))
     assert "projection solver rotating_frame default" in console.export_text()
     assert len(list(silent_lines(study))) <= 8
-    picture = svg(study)
-    assert picture.startswith("<?xml")
-    assert "projection solver rotating_frame default" in picture, "texts stay texts"
-    assert all(f"{letter} {kind}" in " ".join(legend(study)) for kind, letter in letters(study).items())
     assert set(letters(study)) == set(meanings(load_scene("sphere_in_cylinder")))
     assert len(set(letters(study).values())) == len(letters(study))
 
