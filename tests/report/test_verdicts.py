@@ -146,7 +146,7 @@ def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
     assert "1 refuses the scene, or some case of it, with the reason" in found.answer
     assert "did not even finish" not in " ".join(found.sentences)
     assert "⊘ 1 refused" in counted(content)
-    assert "; 1 refuses the scene or a case of it" in three_sentences([content], {}, NOTHING)[0]
+    assert "1 refuses the scene, or some case of it" in three_sentences([content], {}, NOTHING)[0]
     text = whole(page(report_content([with_runs(made[0], {number: [refused]})], ""), [[]], {}, None))
     assert '<p class="status refused"><b>refused</b>: no wall, no ball</p>' in text
 
@@ -229,7 +229,7 @@ def test_who_is_silent_or_shares_equations_is_marked(outcome: Outcome) -> None:
     assert "◐ incomplete*" in printed(content, 100)
     assert counted(content) == "4 settings: ✓ 1 agrees, ◐ 1 incomplete, ✗ 2 differs; as expected"
     said = three_sentences([content], {}, NOTHING)[0]
-    assert said.startswith("Of 4 settings in one comparison, 1 agrees with the truth everywhere")
+    assert said.startswith("Of 4 settings in one comparison, 1 agrees with the truth in every observable")
 
 
 def test_the_page_says_all_of_it(outcome: Outcome, parse: Any) -> None:

@@ -120,7 +120,8 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     found = report.content.findings.sentences
     assert len(found) == 3
     assert found[0].startswith(
-        "Of 4 settings in one comparison, 1 agrees with the truth everywhere, 1 without reporting all"
+        "Of 4 settings in one comparison, 1 agrees with the truth in every observable and every case, 1 agrees without "
+        "reporting all that is judged"
     )
     assert "closest is alpha fine matched" in found[0]
     assert found[1].startswith(

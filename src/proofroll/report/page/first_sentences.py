@@ -64,46 +64,28 @@ def three_sentences(
 def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
     if not comparisons:
         return "Nothing was compared with the truth in this report."
-    with_truth, alone = ([item for item in comparisons if item.laws_alone is either] for either in (False, True))
-    text = "; ".join(filter(None, (_near(with_truth, choice), _lawful(alone))))
+    clauses = []
+    for alone in (False, True):
+        alike = [item for item in comparisons if item.laws_alone is alone]
+        rows = [row for item in alike for row in item.rows]
+        count = "one comparison" if len(alike) == 1 else f"{len(alike)} comparisons"
+        where = f"{ALONE} ({', '.join(item.name for item in alike)})" if alone else f"in {count}"
+        if alike:
+            nearest = "" if alone else _nearest(alike, choice)
+            clauses.append(f"of {counted(len(rows), 'settings')} {where}, {standings(rows, alone)}{nearest}")
+    text = "; ".join(clauses)
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _lawful(comparisons: Sequence[ReportedComparison]) -> str:
-    """Clause on comparisons whose motion is not unique; empty without any."""
-    if not comparisons:
-        return ""
-    rows = [row for comparison in comparisons for row in comparison.rows]
-    names = ", ".join(item.name for item in comparisons)
-    return f"of {counted(len(rows), 'settings')} {ALONE} ({names}), {standings(rows, alone=True)}"
-
-
-def _near(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
-    """Clause on comparisons with a truth; empty without any."""
-    if not comparisons:
-        return ""
-    rows = [row for comparison in comparisons for row in comparison.rows]
-    counts = Counter(row.verdict.value for row in rows)
-    agree = "agrees" if counts["agrees"] == 1 else "agree"
-    count = "one comparison" if len(comparisons) == 1 else f"{len(comparisons)} comparisons"
-    text = f"Of {counted(len(rows), 'settings')} in {count}, {counts['agrees']} {agree} with the truth everywhere"
-    rest = {
-        "unconfirmed": "at this step, with a limit that is not confirmed",
-        "incomplete": "without reporting all that is judged",
-        "converges": "with a finer step",
-    }
-    parts = [f"{counts[verdict]} {words}" for verdict, words in rest.items() if counts[verdict]]
-    if parts:
-        text += f", {' and '.join(parts)}"
-    if counts["refused"]:
-        text += f"; {counts['refused']} {'refuses' if counts['refused'] == 1 else 'refuse'} the scene or a case of it"
+def _nearest(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
+    """Clause on the setting closest to the truth in the first comparison."""
     best = closest(comparisons[0], choice)
     if best is None:
-        return f"{text}; none gave motion and forces in every case of the first comparison"
+        return "; none gave motion and forces in every case of the first comparison"
     which = " in the first" if len(comparisons) > 1 else ""
     return (
-        f"{text}; closest{which} is {best.name}, whose motion stays within {number(best.motion)} of its range and "
-        f"whose forces within {number(best.forces)} of the largest"
+        f"; closest{which} is {best.name}, whose motion stays within {number(best.motion)} of its range and whose "
+        f"forces within {number(best.forces)} of the largest"
     )
 
 
