@@ -1,9 +1,9 @@
 """Matrix of engines and kinds of scenes: the cheapest run that holds a tolerance, or the reason why none does."""
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import groupby, product
 from types import MappingProxyType
 from typing import NamedTuple
@@ -108,7 +108,7 @@ class ChoiceColumn:
         return self.group, self.name, self.whole
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ChoiceRow:
     """Formulation with one setting, or with all (``setting`` is empty); ``found``: its candidates by study."""
 
@@ -199,18 +199,12 @@ class ChoiceMatrix:
         """Name of an engine for a reader."""
         return self.naming.engines.get(engine.partition("@")[0], engine)
 
-    def cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
-        """Cell of a row and column at a tolerance relative to the quantities' size."""
-        key = (id(row), column.key, tolerance, forces)
-        if key not in self._cells:
-            self._cells[key] = self._new_cell(row, column, tolerance, forces)
-        return self._cells[key]
-
     @cached_property
-    def _cells(self) -> dict[tuple[int, tuple[str, str, bool], float, bool], ChoiceCell]:
-        return {}
+    def cell(self) -> Callable[[ChoiceRow, ChoiceColumn, float, bool], ChoiceCell]:
+        """Function (row, column, tolerance relative to the quantities' size, whether forces count) -> cell."""
+        return cache(self._cell)
 
-    def _new_cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
+    def _cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
         names = [name for name in column.studies if name in row.found]
         judged = [name for name in names if name not in self.unjudged[forces]]
         if names and not judged:
@@ -275,21 +269,15 @@ class ChoiceMatrix:
         witness = engine in self.witnesses
         return [row for row in self.rows if row.engine == engine and not row.setting and (witness or row.is_model)]
 
-    def standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> EngineStanding:
-        """EngineStanding of an engine in a column.
+    @cached_property
+    def standing(self) -> Callable[[str, ChoiceColumn, float, bool], EngineStanding]:
+        """Function (engine, column, tolerance, whether forces count) -> standing of the engine in the column.
 
         A formulation that holds all scenes comes first, the cheapest of these; then the best one for each scene.
         """
-        key = (engine, column.key, tolerance, forces)
-        if key not in self._standings:
-            self._standings[key] = self._new_standing(engine, column, tolerance, forces)
-        return self._standings[key]
+        return cache(self._standing)
 
-    @cached_property
-    def _standings(self) -> dict[tuple[str, tuple[str, str, bool], float, bool], EngineStanding]:
-        return {}
-
-    def _new_standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> EngineStanding:
+    def _standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> EngineStanding:
         rows = self.formulations(engine)
         of_rows = [
             EngineStanding(engine, row.formulation, cell, (cell,))

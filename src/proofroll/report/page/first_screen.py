@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -195,17 +195,12 @@ class FirstScreen:
         return [forces_words(self.matrix, motion, both) for motion, both in pairs]
 
     def _with_forces(self, answered: FirstAnswer) -> FirstAnswer | None:
-        if answered.question.forces:
-            return None
         engines = frozenset(item.engine for column in answered.scenes for item in column.standings)
-        key = answered.question.tolerance, engines
-        if key not in self._answers_with_forces:
-            self._answers_with_forces[key] = answer(self.matrix, answered.question.tolerance, True, engines)
-        return self._answers_with_forces[key]
+        return None if answered.question.forces else self._answer_with_forces(answered.question.tolerance, engines)
 
     @cached_property
-    def _answers_with_forces(self) -> dict[tuple[float, frozenset[str]], FirstAnswer]:
-        return {}
+    def _answer_with_forces(self) -> Callable[[float, frozenset[str]], FirstAnswer]:
+        return cache(lambda tolerance, engines: answer(self.matrix, tolerance, True, engines))
 
     def kind_title(self, group: str) -> str:
         """Title of a kind of scenes."""
