@@ -13,7 +13,6 @@ from proofroll.report.labels import off_by, with_caveat
 from proofroll.report.page.answer import answer
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
 from proofroll.report.parts import PartEntry
-from proofroll.studies.stability.records import StabilityStudy
 
 
 @dataclass(frozen=True)
@@ -53,10 +52,9 @@ def three_sentences(
     comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]], choice: ChoiceMatrix
 ) -> list[str]:
     """Three sentences: the best agreement, silent disagreement (also of the maps in ``entries``), and advice."""
-    maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
     return [
         _agrees(comparisons, choice),
-        _silent(comparisons, maps),
+        _silent(comparisons, kept(comparisons, entries)),
         answer(choice, FIRST_TOLERANCE, forces=True).sentence,
     ]
 
@@ -89,26 +87,24 @@ def _nearest(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) ->
     )
 
 
-def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityStudy]) -> str:
+def _silent(comparisons: Sequence[ReportedComparison], counts: Kept) -> str:
     """Sentence on settings that are silently wrong, and on boundaries of stability passed silently."""
-    wrong = [item for comparison in comparisons for item in _wrong(comparison)]
-    silent, boundaries = (sum(getattr(study, key) for study in maps) for key in ("silent", "boundaries"))
-    passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a warning"
+    passed = f"{counts.passed} of {counts.boundaries} boundaries of stability and accuracy are passed without a warning"
+    passed = passed if counts.boundaries else ""
     alone = [comparison.laws_alone for comparison in comparisons]
     laws, truth = "a law of mechanics" if any(alone) else "", "from the truth" if not all(alone) or not alone else ""
-    if comparisons and not any(run.status == "done" for item in comparisons for run in item.runs):
-        return f"No run has ended that could be silently wrong{f'; {passed}' if maps else ''}."
-    if not wrong:
-        off = " or ".join(filter(None, (truth and f"differs {truth}", laws and f"breaks {laws}")))
-        nothing = f"No setting that ran to its end {off}"
-        if not comparisons:
-            return f"{passed}." if maps else "No run could be silently wrong: nothing was compared."
-        return f"{nothing}; {passed}." if maps else f"{nothing}."
-    _, name, text = max(wrong)
-    differ, breaks, run = ("differ", "break", "run") if len(wrong) > 1 else ("differs", "breaks", "runs")
+    differ, breaks, run = ("differs", "breaks", "runs") if counts.silent < 2 else ("differ", "break", "run")
     off = " or ".join(filter(None, (truth and f"{differ} {truth}", laws and f"{breaks} {laws}")))
-    text = f"{counted(len(wrong), 'settings')} {off} and {run} to the end without a warning, worst {name}: {text}"
-    return f"{text}; {passed}." if maps else f"{text}."
+    if counts.silent:
+        many = counted(counts.silent, "settings")
+        text = f"{many} {off} and {run} to the end without a warning, worst {counts.worst}"
+    elif not comparisons:
+        text = "" if passed else "No run could be silently wrong: nothing was compared"
+    elif any(run.status == "done" for item in comparisons for run in item.runs):
+        text = f"No setting that ran to its end {off}"
+    else:
+        text = "No run has ended that could be silently wrong"
+    return f"{'; '.join(filter(None, (text, passed)))}."
 
 
 def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
