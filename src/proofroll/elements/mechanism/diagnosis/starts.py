@@ -10,6 +10,7 @@ from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesi
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import ProofrollError
 from proofroll.core.first_steps import OF_FIRST_STEPS
+from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED
 from proofroll.elements.mechanism.scene.joint import Joint
@@ -124,11 +125,12 @@ def _away(joint: Joint) -> bool:
 
 
 def _moved(evidence: Evidence, mechanism: Mechanism, times: FloatArray) -> FloatArray | None:
-    """Poses of the true motion of a mechanism at the first times; None: there is none."""
+    """Poses of the true motion of a mechanism at the first times; None: it cannot start so, or has no truth."""
     from proofroll.core.scene import Scene
     from proofroll.core.truth import truth
 
     try:
+        check_contacts(mechanism)
         true = truth(Scene("start", "", (type(evidence.element)(mechanism),)), times)
     except ProofrollError:
         return None

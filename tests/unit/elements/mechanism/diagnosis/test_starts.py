@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,6 +17,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 
 TIMES = np.linspace(0.0, 0.24, 13)
 
@@ -47,6 +49,33 @@ def test_another_start_is_named(q: Sequence[float], v: Sequence[float], said: st
     causes = diagnose_scene(scene, [], run, true, 1e-3)
     assert [item.cause.id for item in causes] == ["start"]
     assert causes[0].sentence.startswith(f"the start was not taken: {said}")
+
+
+def test_a_start_that_contacts_exclude_is_not_tried() -> None:
+    """With all coordinates at zero a grip that never slips would slip: the run is wrong, and no traceback says so."""
+    joint = Joint("free", "free", "world", "ball", q0=(0, 0, 0.4, 1, 0, 0, 0), v0=(1, 0, 0, 0, 0, 0))
+    shapes = (
+        Geometry("sphere", "ball", "sphere", radius=0.1),
+        Geometry("floor", "world", "plane", position=(0, 0, -0.1)),
+    )
+    scene = Scene(
+        "ball",
+        "",
+        (
+            MechanismElement(
+                Mechanism(
+                    (Body("ball", 1.0, inertia=(0.004, 0.004, 0.004)),),
+                    (joint,),
+                    geometries=shapes,
+                    pairs=(Pair("contact", ("sphere", "floor"), friction=math.inf, restitution=0.5),),
+                )
+            ),
+        ),
+    )
+    true = truth(scene, TIMES)
+    run = true.copy(deep=True)
+    run["p_WB"] = 1.1 * run["p_WB"]
+    assert "start" not in {item.cause.id for item in diagnose_scene(scene, [], run, true, 1e-3)}
 
 
 def line(quantity: str, expected: Any, found: Any, holds: bool) -> dict[str, Any]:
