@@ -19,9 +19,9 @@ from made_from import facts, restamped, stamp
 from markdown_tables import caveat_list, cheapest_table, remark_list, verdict_table
 from screenshot import screenshot
 
-from proofroll.ball_studies.regimes import load_regimes, regime_maps
-from proofroll.ball_studies.report.regime_map import draw as draw_regimes
 from proofroll.files.comparison_file import load_comparison
+from proofroll.papers.blajer_2006.report.regime_map import draw as draw_regimes
+from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_maps
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.tradeoff.work_precision import svg
 from proofroll.running.runner import Runner

@@ -500,7 +500,7 @@ def test_onset_ends_soon_after_the_slip(
 ) -> None:
     """An engine is ended a little after the true slip; one that has not slipped by then runs to the end."""
     if soon is not None:
-        monkeypatch.setattr("proofroll.ball_studies.onset._soon", lambda *_: soon)
+        monkeypatch.setattr("proofroll.papers.blajer_2006.slip.onset._soon", lambda *_: soon)
     code, out, err = proofroll(*EARLY, "--engine", LOCATING, "--out", str(tmp_path), "--json")
     assert code == 0, err
     (row,) = json.loads(out)["engines"]
@@ -511,7 +511,7 @@ def test_onset_where_nobody_was_asked_for(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Among engines that were not asked for by name a refusal is an answer; what a person reads fits 100 columns."""
-    monkeypatch.setattr("proofroll.ball_studies.onset.default_engines", lambda _: ["refuses"])
+    monkeypatch.setattr("proofroll.papers.blajer_2006.slip.onset.default_engines", lambda _: ["refuses"])
     code, out, err = proofroll(*EARLY, "--out", str(tmp_path))
     assert code == 0, err
     assert "first slips at 0.144130" in out

@@ -13,12 +13,12 @@ import pytest
 import typer
 from robot_templates import urdf
 
-from proofroll.ball_studies.onset import EngineOnset, OnsetStudy
 from proofroll.cli import app
 from proofroll.core.certificate import Line
 from proofroll.core.comparison import ExceptAt
 from proofroll.core.diagnosis import Cause
 from proofroll.files.json_data import MERGED
+from proofroll.papers.blajer_2006.slip.onset import EngineOnset, OnsetStudy
 from proofroll.report.comparison.records import (
     CauseAt,
     Claims,

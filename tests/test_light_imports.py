@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from importlib.metadata import entry_points
 from importlib.util import find_spec
 
 import pytest
@@ -100,6 +101,7 @@ def test_a_step_loads_no_more_than_it_takes(step: str, loaded: dict[str, set[str
 
 def test_no_engine_is_loaded_for_help(loaded: dict[str, set[str]]) -> None:
     """Help and the version load no adapter, and a description of engines loads those that it describes."""
-    adapters = {step: {name for name in loaded[step] if name.startswith("proofroll.engines.")} for step in loaded}
-    assert adapters["help"] == set()
-    assert {f"proofroll.engines.{name}" for name in ENGINES} <= adapters["describe engines"]
+    announced = {point.name: point.module for point in entry_points(group="proofroll.engines")}
+    assert {name for name in loaded["help"] if name.startswith("proofroll.engines.")} == set()
+    assert loaded["help"] & set(announced.values()) == set()
+    assert {announced[name] for name in ENGINES} <= loaded["describe engines"]

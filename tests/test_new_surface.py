@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proofroll.ball_studies.report.drawings import overview
-from proofroll.ball_studies.report.replay_wall import wall
 from proofroll.core import plugins
 from proofroll.elements.ball_on_surface import kind
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.report.drawings import overview
+from proofroll.papers.blajer_2006.report.replay_wall import wall
 
 PLUGINS = Path(__file__).parent / "plugins"
 Proofroll = Callable[..., tuple[int, str, str]]

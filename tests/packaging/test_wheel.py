@@ -71,7 +71,7 @@ def test_contents(wheel: Path) -> None:
     assert {f"proofroll/{name}" for name in models | claims} <= set(names)
     source = REPOSITORY / "src"
     pages = {path.relative_to(source).as_posix() for path in source.rglob("templates/**/*") if path.is_file()}
-    assert {Path(page).parts[1] for page in pages} == {"report", "ball_studies", "elements", "cli", "robots"}
+    assert {Path(page).parts[1] for page in pages} == {"report", "papers", "elements", "cli", "robots"}
     assert pages <= set(names)
     assert any(name.endswith("LICENSE") for name in names)
     assert not any(name.startswith(("tests/", "proofroll/tests/")) for name in names)

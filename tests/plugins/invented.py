@@ -6,12 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from blajer_2006.part import FiguresPart
-from blajer_2006.reading import load_figures
-from blajer_2006.study import run_figures
-from proofroll.ball_studies.regimes import load_regimes, regime_map
-from proofroll.ball_studies.report.regimes_part import RegimesPart
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.figures.part import FiguresPart
+from proofroll.papers.blajer_2006.figures.reading import load_figures
+from proofroll.papers.blajer_2006.figures.study import run_figures
+from proofroll.papers.blajer_2006.report.regimes_part import RegimesPart
+from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_map
 from proofroll.report.stability.part import StabilityPart
 from proofroll.report.tradeoff.part import TradeoffPart
 from proofroll.running.case import Status

@@ -20,7 +20,6 @@ from flat_judging import judged_curve
 from folded import whole
 from invented import figures_part, further, regimes_part
 
-from proofroll.ball_studies.report.onsets import RunSlips, TrueSlips
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.dataset import observe, scales
 from proofroll.core.events import Event
@@ -28,6 +27,7 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
+from proofroll.papers.blajer_2006.report.onsets import RunSlips, TrueSlips
 from proofroll.report.comparison.plots import PointCurves
 from proofroll.report.page.growing import begun
 from proofroll.report.page.html import page

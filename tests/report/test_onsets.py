@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from folded import whole
 
-from proofroll.ball_studies.report.onsets import CURVE, bracket, clock, conditioning, mark, slip_table
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
@@ -20,6 +19,7 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
+from proofroll.papers.blajer_2006.report.onsets import CURVE, bracket, clock, conditioning, mark, slip_table
 from proofroll.report.comparison.plots import Bound, point_curves
 from proofroll.report.comparison.records import ReportedRun
 from proofroll.report.comparison.scores import scores

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 import xarray as xr
 
-from proofroll.ball_studies.regimes import load_regimes, regime_map
-from proofroll.ball_studies.report.regime_map import boundaries, counts, draw, inline
-from proofroll.ball_studies.report.regimes_part import RegimesPart
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.report.regime_map import boundaries, counts, draw, inline
+from proofroll.papers.blajer_2006.report.regimes_part import RegimesPart
+from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_map
 from proofroll.report.page.growing import begun
 from proofroll.report.terminal.tables import part_lines
 from proofroll.running.store import Store

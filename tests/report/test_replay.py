@@ -19,14 +19,14 @@ from browsing import Visit
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from proofroll.ball_studies.report.kind import BallReport
-from proofroll.ball_studies.report.replay import AWAY, LENGTH, SLIPS, STICKS, poses
-from proofroll.ball_studies.report.replay_wall import middle, wall
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import StoredTrajectory
+from proofroll.papers.blajer_2006.report.kind import BallReport
+from proofroll.papers.blajer_2006.report.replay import AWAY, LENGTH, SLIPS, STICKS, poses
+from proofroll.papers.blajer_2006.report.replay_wall import middle, wall
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, report_content

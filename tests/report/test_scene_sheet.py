@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from proofroll.ball_studies.report import drawings
 from proofroll.files.scene_file import read_scene_file
+from proofroll.papers.blajer_2006.report import drawings
 from proofroll.report.page.scene_sheet import SceneSheet, ShownParameter, scene_sheet
 from proofroll.report.pen import Lettering, Letters
 

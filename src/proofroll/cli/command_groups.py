@@ -10,12 +10,13 @@ from typer.core import TyperGroup
 GROUPS = {
     "Ask": ("scenes", "run", "plot", "replay", "compare", "recommend", "report"),
     "Bring your own scene, engine or trajectory": ("new", "vocabulary", "check", "judge", "export"),
-    "Study": ("tradeoff", "stability", "ladder", "balance", "onset", "regimes", "figures"),
+    "Study": ("tradeoff", "stability", "ladder", "balance"),
+    "Blajer's article (2006)": ("onset", "regimes", "figures"),
     "Maintain": ("engines", "versions", "findings", "cite", "bench", "drill"),
 }
 _OTHERS = "Others"
 # Command -> folder of the package that brings it; the wheel does not contain these.
-_OF_THE_REPOSITORY = {"bench": "benchmarks", "drill": "tests/drill", "figures": "papers/blajer_2006"}
+_OF_THE_REPOSITORY = {"bench": "benchmarks", "drill": "tests/drill"}
 
 
 class GroupedCommands(TyperGroup):

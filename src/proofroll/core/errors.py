@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
-_ENGINES = _PACKAGE / "engines"
+_ADAPTERS = (_PACKAGE / "engines", _PACKAGE / "papers")
 _SHOWN = 20  # names of a list in a message
 _LONGEST_FIELD = 300  # characters: a path and the keys that lead to a value; a key itself may have any length
 
@@ -140,7 +140,8 @@ def raised_at(error: BaseException) -> str:
     """
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "importlib" not in frame.filename]
     files = [(frame, Path(frame.filename)) for frame in frames]
-    outside = [line for line, file in files if not file.is_relative_to(_PACKAGE) or file.is_relative_to(_ENGINES)]
+    ours = [file.is_relative_to(_PACKAGE) and not any(map(file.is_relative_to, _ADAPTERS)) for _, file in files]
+    outside = [frame for (frame, _), harness in zip(files, ours, strict=True) if not harness]
     if not outside:
         return ""
     home = Path(outside[0].filename).parent

@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple, get_args
 
-from proofroll.ball_studies import regimes as regimes_study
 from proofroll.core import comparison
+from proofroll.core.entry_points import loaded
 from proofroll.core.gravity import Gravity
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.elements.mechanism import Body, Force, Joint, Loop, Point, Spring
@@ -84,10 +84,11 @@ CHAPTERS: dict[str, tuple[KeyTable, ...]] = {
         KeyTable("[axes.parameters.NAME]", axes.AxisTerm),
         KeyTable("[[claims]]", stability_claims.Claim),
     ),
-    'A regime map: `study = "regimes"`': (
-        KeyTable("", regimes_study.RegimesStudy, (*_OF_FILE, "speed", "mu_static")),
-        KeyTable("[speed], [mu_static]", regimes_study.EvenValues),
-    ),
+    **{
+        chapter: tuple(KeyTable(*table) for table in tables)
+        for _, chapters in loaded("proofroll.vocabulary_chapters", of=dict)
+        for chapter, tables in chapters.items()
+    },
 }
 # What is read by no dataclass of its own.
 REST = {

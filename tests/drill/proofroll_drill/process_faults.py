@@ -20,7 +20,7 @@ _MAP = """
 import sys
 from pathlib import Path
 from proofroll.files.scene_file import load_scene
-from proofroll.ball_studies.regimes import regime_map
+from proofroll.papers.blajer_2006.slip.regimes import regime_map
 
 def tell(_):
     Path(sys.argv[1]).touch()

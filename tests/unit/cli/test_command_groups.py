@@ -14,7 +14,7 @@ def test_every_command_has_one_group() -> None:
     assert set(_commands().commands) <= set(named)
 
 
-@pytest.mark.parametrize("name", ["bench", "drill", "figures"])
+@pytest.mark.parametrize("name", ["bench", "drill"])
 def test_a_command_of_the_repository_says_where_it_comes_from(name: str) -> None:
     """Where a package of the repository is not installed, its command is answered by the line that installs it."""
     said = _usage_message(typer._click.exceptions.UsageError(f"No such command '{name}'. Did you mean 'new'?"))

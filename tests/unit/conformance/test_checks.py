@@ -7,7 +7,7 @@ from unittest import SkipTest
 import pytest
 
 from proofroll.conformance.checks import _run_apart
-from proofroll.engines.reduced import Reduced
+from proofroll.papers.blajer_2006.reduced import Reduced
 
 
 @pytest.mark.drill

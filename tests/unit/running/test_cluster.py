@@ -22,11 +22,11 @@ import pytest
 from hostile import ENTRY_POINTS
 from robot_templates import urdf
 
-from proofroll.ball_studies.regimes import regime_map
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene, scene_folder
 from proofroll.files.trajectory_file import read
+from proofroll.papers.blajer_2006.slip.regimes import regime_map
 from proofroll.running import cluster
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.cluster import Cluster

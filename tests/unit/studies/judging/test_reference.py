@@ -14,8 +14,8 @@ from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Allowance, RunCurve, Verdict, judge_curve
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.reduced import Reduced
 from proofroll.running.case import Result, Status
 from proofroll.running.identity import resolve
 from proofroll.studies.judging import run_values

@@ -1,0 +1,1 @@
+"""Articles that are reproduced and checked: each a plug-in that nothing else imports."""

@@ -1,0 +1,114 @@
+"""Commands about balls on surfaces: first slips, and maps of regimes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from proofroll.cli import options
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from proofroll.papers.blajer_2006.slip.onset import OnsetStudy
+
+
+def onset(
+    scene: options.SceneName,
+    settings: options.Set = None,
+    engine: Annotated[list[str] | None, typer.Option(help="Engine with settings; repeat. All that can slip.")] = None,
+    until: Annotated[float, typer.Option(help="How long to look for a slip [s].")] = 4.0,
+    uncertainty: Annotated[float, typer.Option(help="Relative uncertainty of friction and resistance.")] = 1e-3,
+    out: options.Out = Path("out"),
+    fresh: options.Fresh = False,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
+) -> None:
+    """Say when the ball first slips, in every engine, and how well that is posed."""
+    from proofroll.core.time_grid import time_grid
+    from proofroll.papers.blajer_2006.slip.onset import onset_study, summary
+    from proofroll.running.case import Status
+
+    time_grid(until, 0.01)
+    with options.progress_bar("runs") as advance:
+        study = onset_study(
+            scene,
+            options.assignments(settings),
+            options.new_runner(out, fresh, jobs, scheduler),
+            engines=engine or (),
+            until=until,
+            uncertainty=uncertainty,
+            progress=lambda case, _: advance(case.engine.name),
+        )
+    options.show(study, as_json, lambda: [summary(study), _onset_table(study)])
+    verdicts = {item.verdict for item in study.engines}
+    # Unless the engine was named, its refusal, or a model that is another scene, is an answer and no error.
+    answers = set() if engine else {Status.REFUSED, Status.WRONG_MODEL}
+    if any(item.verdict in {"failed", "refused"} and item.status not in answers for item in study.engines):
+        raise typer.Exit(options.ENGINE)
+    raise typer.Exit(options.CONTRADICTED if "disagree" in verdicts else options.OK)
+
+
+def _onset_table(study: OnsetStudy) -> Table:
+    """Table with a line per engine: its first slip with bracket, the difference from the truth, and the verdict."""
+    from rich.table import Column
+    from rich.text import Text
+
+    from proofroll.core.number_format import number
+    from proofroll.papers.blajer_2006.slip.onset import first_slip_texts
+    from proofroll.report.terminal.screen import numeric, plain_table, unbroken
+    from proofroll.running.case import Status
+
+    table = plain_table(
+        Column("engine", overflow="fold"),
+        *numeric("first slip [s]"),
+        *unbroken("between [s]"),
+        *numeric("difference [s]"),
+        Column("verdict", overflow="fold"),
+    )
+    for item in study.engines:
+        slip_texts = first_slip_texts(item.onset) if item.onset or item.status is Status.DONE else ("", "")
+        verdict = item.verdict + (f": {item.message}" if item.verdict in {"failed", "refused"} else "")
+        label = (item.name, *(item.settings.get(key, "") for key in ("formulation", "preset")))
+        table.add_row(Text(" ".join(filter(None, label))), *slip_texts, number(item.difference), Text(verdict))
+    return table
+
+
+def regimes(
+    study: Annotated[str, typer.Argument(help='A file with study = "regimes", its name, or its scene.')] = "regimes",
+    out: options.Out = Path("out"),
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
+) -> None:
+    """Draw the map over speed and friction: never slips, slips and recovers, falls."""
+    from proofroll.papers.blajer_2006.report.regime_map import draw, regime_content
+    from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_maps
+    from proofroll.running.store import Store, write_text
+
+    loaded = load_regimes(study)
+    options.require_pages()
+    Store(out)  # fails before the work rather than after it
+    words = "runs of the truth"
+    with options.progress_bar(words, total=loaded.runs) as advance:
+        workers, cluster = jobs or os.cpu_count() or 1, options.new_cluster(scheduler)
+        maps = regime_maps(loaded, workers, lambda count: advance(words, count), cluster)
+    content = regime_content(maps)
+    draw(maps, out / "regimes.svg")
+    write_text(out / "regimes.json", options.json_text(content))
+    options.show(content, as_json, lambda: _regime_lines(content, out))
+
+
+def _regime_lines(content: Mapping[str, Any], out: Path) -> Iterator[str]:
+    """Lines with the counts of runs by regime for each map, and the files of the maps."""
+    for item in content["maps"]:
+        counts = ", ".join(f"{count} {name}" for name, count in item["counts"].items())
+        yield f"f = {item['rolling_resistance']:g} m, {item['runs']} runs of {item['until']:g} s: {counts}."
+        if item["outside_boundaries"] is not None:
+            yield f"  {item['outside_boundaries']} of them on the wrong side of the analytic boundaries."
+    yield f"The map is in {out / 'regimes.svg'}, its numbers in {out / 'regimes.json'}."

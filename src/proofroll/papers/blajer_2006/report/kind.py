@@ -1,0 +1,69 @@
+"""Balls on surfaces in the report of a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.papers.blajer_2006.report import onsets
+from proofroll.report.kinds import ReportKind
+
+if TYPE_CHECKING:
+    from proofroll.report.pen import Picture
+    from proofroll.report.replay.records import ReplayKind
+
+
+class BallReport(ReportKind):
+    """See :class:`proofroll.report.kinds.ReportKind`."""
+
+    template: ClassVar[str] = "slips.html"
+    names: ClassVar[Mapping[str, Any]] = {"onsets": onsets}
+    replay_script: ClassVar[str] = "replay_ball.js"
+    groups: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "ball rolling": ("Rolling balls", "a ball rolls without slip on a wall"),
+        "ball slipping": ("Slipping balls", "a ball sticks, slips and may fall: bounded friction"),
+        "ball impacts": ("Bouncing balls", "a ball hits a wall and leaves it"),
+    }
+    caption: ClassVar[str] = (
+        "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e₁ into the wall, e₂ "
+        "and e₃ along its coordinates. N, F₂, F₃ are drawn as forces on the ball, in their positive sense."
+    )
+
+    @staticmethod
+    def covers(scene: Scene) -> bool:
+        """True if one ball on one surface is the scene's only element."""
+        return len(scene.elements) == 1 and isinstance(scene.elements[0], BallOnSurface)
+
+    @staticmethod
+    def group(scene: Scene) -> str:
+        """Group of the ball's contact with the wall: impacts, slipping, or rolling."""
+        needs = scene.elements[0].requires
+        if BallCapability.IMPACTS in needs:
+            return "ball impacts"
+        return "ball slipping" if BallCapability.BOUNDED_FRICTION in needs else "ball rolling"
+
+    @staticmethod
+    def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
+        """Drawings that serve all cases; they show rolling resistance if some case has it."""
+        from proofroll.papers.blajer_2006.report.drawings import overview
+
+        shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)
+        labels = ("as a whole", "where the ball touches the wall")
+        pictures = [item.picture(label) for item, label in zip(overview(shown.wall, shown), labels, strict=False)]
+        return pictures, "" if pictures else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
+
+    truth_facts = staticmethod(onsets.truth_facts)
+    run_facts = staticmethod(onsets.run_facts)
+    sentences = staticmethod(onsets.ill_posed)
+    mark = staticmethod(onsets.mark)
+
+    @staticmethod
+    def replay() -> ReplayKind:
+        """Drawing of balls on their wall in the replay."""
+        from proofroll.papers.blajer_2006.report.replay import draw_ball, seen
+        from proofroll.report.replay.records import ReplayKind
+
+        return ReplayKind("ball", seen, draw_ball)

@@ -1,0 +1,208 @@
+"""Replay of balls on surfaces: the wall, the balls, and the contact force."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.events import EventKind
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.mechanism.run.contacts.stretches import carried
+from proofroll.files.json_data import plain
+from proofroll.papers.blajer_2006.report.replay_wall import middle, wall
+from proofroll.report.labels import symbol, unit
+from proofroll.report.replay.records import PackedNumbers, Replayed, present
+from proofroll.report.replay.replay import frame_times, in_sight
+
+# Variables of a trajectory by name, "time" included.
+Sampled = Mapping[str, npt.NDArray[Any]]
+# Names of the variables that a replay uses, if present.
+NEEDED = ("time", "p_WB", "v_WB", "w_WB", "q_WB", "N", "F2", "F3", "sticking", "event_kind", "event_time")
+
+# Steps of the quadrature of the spin from one sample to the next; with 1.3 rad between samples its error is below
+# 1e-5 rad.
+_SUBSTEPS = 4
+
+# Rounding of the picture's numbers, powers of two: 8e-6 m, 6e-5 of a quaternion, 1e-3 N; all invisible.
+LENGTH, TURN, FORCE = 2.0**-17, 2.0**-14, 2.0**-10
+# Distance from the true ball, in lengths of the scene, beyond which a ball has left the picture.
+_FAR = 20.0
+# Largest invisible error, in radii of the ball.
+_SEEN = 0.01
+# Speed of the replay relative to real time: at full speed a rolling ball turns too fast for the eye.
+_SPEED = 0.1
+# Angles of the camera, about the vertical and above the horizon [rad].
+_FROM = (-1.15, 0.5)
+
+SLIPS, STICKS, AWAY = 0, 1, 2
+_AFTER: Mapping[str, int] = {
+    EventKind.SLIP: SLIPS,
+    EventKind.STICK: STICKS,
+    EventKind.LIFT_OFF: AWAY,
+    EventKind.BOUNCE: AWAY,
+    EventKind.SETTLE: STICKS,
+}
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Poses of a ball at n frames.
+
+    Attributes:
+        time: of the frames [s], shape (n,).
+        p_WB: centre [m], shape (n, 3).
+        q_WB: orientation, scalar first, shape (n, 4); None: unknown.
+        contact: point of the wall's surface that the ball touches or is nearest to [m], shape (n, 3).
+        normal: e1, from the ball towards the wall, shape (n, 3).
+        press: normal force N [N], shape (n,); None: not reported.
+        friction: F2 e2 + F3 e3, on the ball, in the world [N], shape (n, 3), or None.
+        state: SLIPS, STICKS or AWAY, shape (n,); None: unknown.
+    """
+
+    time: FloatArray
+    p_WB: FloatArray
+    q_WB: FloatArray | None
+    contact: FloatArray
+    normal: FloatArray
+    press: FloatArray | None
+    friction: FloatArray | None
+    state: npt.NDArray[np.uint8] | None
+
+
+def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
+    """Poses of a ball at the frames up to the end of its trajectory.
+
+    Args:
+        body: the scene's ball.
+        sampled: samples of those of the variables :data:`NEEDED` that the trajectory has.
+        times: of the frames [s], rising from 0.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    grid = sampled["time"]
+    if grid.size < 2:  # it ended before its first step
+        times, p_WB = times[:1], sampled["p_WB"][:1]
+    else:
+        times = times[times <= grid[-1] * (1 + 1e-12)]
+        p_WB = np.asarray(CubicHermiteSpline(grid, sampled["p_WB"], sampled["v_WB"])(times))
+    normal = body.surface.normal(p_WB)
+    friction = press = None
+    if "N" in sampled:
+        press, F2, F3 = (np.interp(times, grid, sampled[name]) for name in ("N", "F2", "F3"))
+        frame = body.surface.frame(body.surface.locate(p_WB))
+        friction = F2[:, None] * frame[..., 1] + F3[:, None] * frame[..., 2]
+    return Poses(
+        time=times,
+        p_WB=p_WB,
+        q_WB=_orientation(sampled, times),
+        contact=p_WB + (body.ball.radius + body.surface.gap(p_WB))[:, None] * normal,
+        normal=normal,
+        press=press,
+        friction=friction,
+        state=_state(sampled, times, flies=body.gap0 > 0),
+    )
+
+
+def _state(sampled: Sampled, times: FloatArray, flies: bool) -> npt.NDArray[np.uint8] | None:
+    """State of the contact at each frame, from the events, whose times are finer than the samples; None: unknown.
+
+    With unbounded friction a ball on the wall sticks; ``flies``: it starts off the wall.
+    """
+    if "sticking" not in sampled and not flies and not len(sampled.get("event_kind", ())):
+        return None
+    start = AWAY if flies else int(sampled["sticking"][0]) if "sticking" in sampled else STICKS
+    state = np.full(times.shape, start, dtype=np.uint8)
+    for kind, time in _events(sampled):
+        state[times >= time] = _AFTER[kind]  # never at NaN
+    return state
+
+
+def _orientation(sampled: Sampled, times: FloatArray) -> FloatArray | None:
+    """Orientation at each frame, moved from the sample before by the ball's own spin, shape (n, 4); None: unknown."""
+    from scipy.spatial.transform import Rotation
+
+    if "q_WB" not in sampled:
+        return None
+    grid, w_WB, stored = sampled["time"], sampled["w_WB"], Rotation.from_quat(sampled["q_WB"], scalar_first=True)
+    if times.size < 2:
+        return np.asarray(sampled["q_WB"][:1])
+    # The turn between two samples that the spin does not explain is shared out evenly.
+    unexplained = (carried(stored[:-1], grid, w_WB, _SUBSTEPS).inv() * stored[1:]).as_rotvec()
+    index = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
+    part = (times - grid[index]) / np.diff(grid)[index]
+    turned = carried(stored[index], grid, w_WB, _SUBSTEPS, (grid[index], times))
+    turned *= Rotation.from_rotvec(part[:, None] * unexplained[index])
+    return np.asarray(turned.as_quat(scalar_first=True))
+
+
+def seen(scene: Scene) -> float:
+    """Largest invisible error of a ball's place [m]."""
+    return _SEEN * rolling_ball(scene).ball.radius
+
+
+def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
+    """Drawing of a ball in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
+    body = rolling_ball(replayed.scene)
+    coordinates = body.surface.coordinates
+    sampled = present(replayed.true, [*NEEDED, *coordinates])
+    times = frame_times(float(sampled["time"][-1]), float(np.linalg.norm(sampled["w_WB"], axis=1).max()))
+    true = poses(body, sampled, times)
+    ghosts = [_reachable(poses(body, present(ghost.motion, NEEDED), times), true, body) for ghost in replayed.ghosts]
+    u = np.stack([np.interp(times, sampled["time"], sampled[name]) for name in coordinates], axis=1)
+    built = wall(body, u)
+    numbers = PackedNumbers()
+    numbers.put("points", -1, built.points.reshape(-1, 3), LENGTH)
+    numbers.put("outward", -1, built.normals.reshape(-1, 3), TURN)
+    numbers.put("middle", -1, middle(body, u), LENGTH)
+    numbers.put("coordinates", 0, u, LENGTH)
+    numbers.put("contact", 0, true.contact, LENGTH)
+    numbers.put("normal", 0, true.normal, TURN)
+    numbers.put("friction", 0, true.friction, FORCE)
+    for run, shown in enumerate([true, *ghosts]):
+        numbers.put("p", run, shown.p_WB, LENGTH)
+        numbers.put("q", run, shown.q_WB, TURN)
+        numbers.put("press", run, shown.press, FORCE)
+        numbers.put("pull", run, None if shown.friction is None else np.linalg.norm(shown.friction, axis=1), FORCE)
+        numbers.put("state", run, None if shown.state is None else shown.state.astype(np.float64), 1.0)
+    contact = body.contact
+    case = {
+        "until": float(times[-1]),
+        "frames": times.size,
+        "speed": _SPEED,
+        "from": list(_FROM),
+        "tail": 0.4,
+        "least": 0.1,
+        "off": "distance of its centre from the true ball's",
+        "scale": body.ball.radius,
+        "friction": plain({"static": contact.mu_static, "kinetic": contact.mu_kinetic}),
+        "coordinates": [
+            {"symbol": symbol(name), "unit": unit(text)}
+            for name, text in zip(coordinates, body.surface.units, strict=True)
+        ],
+        "events": [{"kind": kind, "time": plain(time)} for kind, time in _events(sampled)],
+        "wall": {"rows": len(built.points), "columns": built.points.shape[1], "lines": list(built.lines)},
+    }
+    return case, [shown.time.size for shown in ghosts], numbers
+
+
+def _events(sampled: Sampled) -> list[tuple[str, float]]:
+    """Kind and time [s] of each event."""
+    kinds = [kind.decode() if isinstance(kind, bytes) else str(kind) for kind in sampled.get("event_kind", ())]
+    return list(zip(kinds, np.asarray(sampled.get("event_time", ())).tolist(), strict=True))
+
+
+def _reachable(shown: Poses, true: Poses, body: RollingBall) -> Poses:
+    """Frames until a ball leaves the picture for good: unbounded coordinates would make the picture useless."""
+    centre = true.p_WB.mean(axis=0)
+    size = float(np.linalg.norm(true.p_WB - centre, axis=1).max()) + body.ball.radius
+    last = in_sight(np.linalg.norm(shown.p_WB - centre, axis=1) > _FAR * size)
+    kept: dict[str, Any] = {name: None if values is None else values[:last] for name, values in vars(shown).items()}
+    return dataclasses.replace(shown, **kept)

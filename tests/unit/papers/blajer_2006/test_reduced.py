@@ -1,0 +1,169 @@
+"""The least model as an engine: accuracy, refusals, settings, and what its Taylor series do between samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from proofroll.core.engine_abilities import Level, TellsLevels
+from proofroll.core.errors import Diverged, InputError, Missing, Refused
+from proofroll.core.gravity import Gravity
+from proofroll.core.plugins import resolve_settings
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.compiled import library
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
+from proofroll.elements.ball_on_surface.kind import BallOnSurfaceKind
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.reduced import Reduced
+from proofroll.running.simulation import build, simulate
+from proofroll.truth.ball_on_surface.rolling import unreduced
+
+TAYLOR = "reduced[preset=tuned]"
+needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
+
+
+def tilted(**parameters: float) -> Scene:
+    """The cylinder with gravity across its axis as well."""
+    scene = load_scene("sphere_in_cylinder", speed=3.3, axial_speed=0.7, radial_spin=12.0, **parameters)
+    return scene_with(scene, gravity=Gravity(9.81, (0.2, -0.1, -0.9)))
+
+
+SCENES = {
+    name: scene
+    for name, scene in BallOnSurfaceKind.conformance_scenes().items()
+    if name not in {"cylinder-slipping", "cylinder-oriented"}
+} | {
+    "tilted": tilted(),
+    "tilted-resisting": tilted(rolling_resistance=5e-4),
+    "backwards": load_scene("sphere_in_cylinder", speed=-4.0, rolling_resistance=5e-4),
+}
+
+
+@pytest.mark.parametrize("engine", ["reduced", pytest.param(TAYLOR, marks=needs_heyoka)])
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_equations_against_the_other_route(engine: str, scene: Scene) -> None:
+    """Path and forces agree to round-off with the unreduced equations, which share nothing with the engine."""
+    times = np.linspace(0, 0.5, 6)
+    truth = unreduced(rolling_ball(scene), times)
+    built = build(scene, engine)
+    for index, t in enumerate(times):
+        built.advance(float(t))
+        sample = built.sample()
+        assert np.max(np.abs(sample.p_WB - truth.p_WB[index])) < 1e-12
+        assert np.max(np.abs(sample.w_WB - truth.w_WB[index])) < 1e-9
+        assert sample.force is not None
+        assert np.max(np.abs(sample.force - truth.force[index])) < 1e-10
+
+
+@pytest.mark.parametrize("name", ["cylinder", "plane"])
+def test_closed_form_against_the_other_route(name: str) -> None:
+    """The closed form agrees with the unreduced equations."""
+    times = np.linspace(0, 0.5, 3)
+    truth = unreduced(rolling_ball(SCENES[name]), times)
+    engine = build(SCENES[name], "reduced[formulation=closed_form]")
+    engine.advance(0.5)
+    sample = engine.sample()
+    assert np.max(np.abs(sample.p_WB - truth.p_WB[-1])) < 1e-12
+    assert np.max(np.abs(sample.force - truth.force[-1])) < 1e-10
+
+
+@needs_heyoka
+def test_samples_cost_no_steps() -> None:
+    """A run with a thousand samples takes the very steps of a run with one, and ends on the same bits."""
+    often, once = (build(SCENES["cylinder-resisting"], TAYLOR) for _ in range(2))
+    for t in np.linspace(0, 1, 1001)[1:]:
+        often.advance(float(t))
+    once.advance(1.0)
+    assert often._series._integrator.time == once._series._integrator.time > 1.0
+    assert often.sample().p_WB.tobytes() == once.sample().p_WB.tobytes()
+
+
+@pytest.mark.parametrize("engine", ["reduced", pytest.param(TAYLOR, marks=needs_heyoka)])
+def test_rest_under_resistance_is_noticed(engine: str) -> None:
+    """A ball that resistance brings to rest on a level plane is not carried past that: v²/(2 a) of the path remains."""
+    scene = load_scene("inclined_plane", tilt=0.0, speed=0.5, cross_speed=0.0, rolling_resistance=5e-4)
+    deceleration = (5 / 7) * 9.81 * 5e-4 / 0.025
+    rest = 0.5 / deceleration
+    run = simulate(scene, engine, until=1.2 * rest, every=0.3 * rest)
+    assert run.attrs["status"] == "diverged"
+    assert "comes to rest" in run.attrs["message"]
+    assert float(run["time"][-1]) == pytest.approx(0.9 * rest)
+    assert float(run["down"][-1]) == pytest.approx(0.5 * 0.9 * rest - deceleration * (0.9 * rest) ** 2 / 2, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("scene", "why"),
+    [
+        (SCENES["cylinder-resisting"], "no closed form with rolling resistance"),
+        (SCENES["tilted"], "along whose axis gravity points"),
+    ],
+)
+def test_closed_form_is_refused_where_there_is_none(scene: Scene, why: str) -> None:
+    """Where there is no closed form the refusal says why."""
+    with pytest.raises(Refused, match=why):
+        build(scene, "reduced[formulation=closed_form]")
+
+
+def test_taylor_without_heyoka_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without heyoka the refusal names the extra, and the version tells it from an installation that has it."""
+    monkeypatch.setattr(library, "available", lambda: False)
+    with pytest.raises(Missing, match=r"^integrator=taylor needs heyoka.*proofroll\[fast\].*$"):
+        build(SCENES["cylinder"], TAYLOR)
+    assert "heyoka" not in Reduced.version()
+    build(SCENES["cylinder"], "reduced").advance(0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"formulation": "closed_form", "rtol": 1e-6}, "rtol"),
+        ({"formulation": "closed_form", "integrator": "dop853"}, "integrator"),
+        ({"rtol": 1e-15}, "rtol"),
+        ({"integrator": "taylor", "rtol": 1e-17}, "rtol"),
+        ({"integrator": None}, "integrator"),
+    ],
+)
+def test_settings_without_effect_are_refused(options: dict[str, object], field: str) -> None:
+    """A setting that would do nothing, or cannot be kept, is an error that names it."""
+    with pytest.raises(InputError, match=f"reduced: {field}"):
+        resolve_settings(Reduced, options)
+
+
+def test_levels_and_terms() -> None:
+    """Each formulation has its rung, and resistance is built only where the scene has it."""
+    assert isinstance(Reduced, TellsLevels)
+    assert {Reduced.levels[name] for name in Reduced.presets} == {Level.CLOSED_FORM, Level.REDUCED}
+    assert build(SCENES["cylinder"], "reduced").built().terms == frozenset()
+    terms = build(SCENES["cylinder-resisting"], "reduced").built().terms
+    assert terms == frozenset({BallCapability.ROLLING_RESISTANCE})
+
+
+@needs_heyoka
+def test_no_resistance_no_term() -> None:
+    """Without resistance the compiled equations have no parameter for it, with resistance they do."""
+    counts = {
+        name: len(build(SCENES[name], TAYLOR)._series._integrator.pars) for name in ("cylinder", "cylinder-resisting")
+    }
+    assert counts["cylinder"] < counts["cylinder-resisting"]
+
+
+def test_a_loose_tolerance_is_looser_but_not_lost() -> None:
+    """At a tolerance of 1e-6 the path is worse than at the tightest, and still good to a micrometre."""
+    scene = SCENES["cylinder-resisting"]
+    true = unreduced(rolling_ball(scene), np.array([0.0, 1.0])).p_WB[-1]
+    found = {}
+    for rtol in (1e-6, 1e-12):
+        engine = build(scene, "reduced", rtol=rtol)
+        engine.advance(1.0)
+        found[rtol] = float(np.max(np.abs(engine.sample().p_WB - true)))
+    assert found[1e-12] < found[1e-6] < 1e-6
+
+
+@needs_heyoka
+def test_not_finite_is_noticed() -> None:
+    """A state that overflows is reported with its time instead of being sampled."""
+    engine = build(SCENES["cylinder"], TAYLOR)
+    engine._series._integrator.state[2:] = 1e200
+    with pytest.raises(Diverged, match="not finite"):
+        engine.advance(1.0)
