@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.heyoka_library import TIGHTEST
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build

@@ -15,9 +15,9 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.heyoka_library import TIGHTEST, require_heyoka
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import projection, rolling
-from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST, require_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
+from proofroll.core.heyoka_library import require_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.runner import Runner

@@ -266,7 +266,7 @@ def test_kinds_compute_otherwise(tmp_path: Path) -> None:
         kind = BY_NAME[name]
         assert isinstance(kind.untried or took_effect(kind, tmp_path / name), str)
     hidden = BY_NAME["no-heyoka"].variables(tmp_path / "site")
-    asked = "from proofroll.elements.ball_on_surface.compiled.library import available; print(available())"
+    asked = "from proofroll.core.heyoka_library import available; print(available())"
     done = subprocess.run([sys.executable, "-c", asked], env=hidden, capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
 

@@ -8,7 +8,8 @@ from decimal import Decimal, getcontext
 import numpy as np
 import pytest
 
-from proofroll.elements.ball_on_surface.compiled import library, rolling
+from proofroll.core import heyoka_library as library
+from proofroll.elements.ball_on_surface.compiled import rolling
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.elements.mechanism.run.contacts.on_wall import energy

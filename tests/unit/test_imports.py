@@ -282,6 +282,13 @@ def test_no_modules_import_each_other() -> None:
     assert circle(leading(ROOT)) == []
 
 
+def test_only_an_adapter_imports_the_balls_of_its_engine() -> None:
+    """Formulations of a ball on a surface are a room that nothing but the engine's table of formulations knows."""
+    files = [file for file in _files(ROOT / "engines") if "ball" not in file.parts and file.name != "adapter.py"]
+    found = [f"{file}:{line}" for file in files for line, name in _imported(file) if ".ball." in f"{name}."]
+    assert found == []
+
+
 def test_no_folders_of_studies_import_each_other() -> None:
     """A study of one folder builds on another's, and never the other way round as well."""
     assert circle(folders_of(leading(ROOT), "proofroll.studies")) == []

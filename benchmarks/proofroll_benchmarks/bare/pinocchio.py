@@ -21,8 +21,8 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.elements.mechanism.scene.joint_kinds import FACTS
-from proofroll.engines.pinocchio.ball.contact import LARGEST_FRICTION
 from proofroll.engines.pinocchio.ball.plane_contact import PlaneContact
+from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION
 from proofroll.engines.pinocchio.smooth.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.core import heyoka_library as library
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Missing, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface import taylor

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from proofroll.core import heyoka_library as library
 from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import Missing
-from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.runner import Runner

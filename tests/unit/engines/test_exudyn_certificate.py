@@ -16,11 +16,12 @@ from proofroll.running.simulation import build
 pytest.importorskip("exudyn")
 
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.engines.exudyn.adapter import OF_BALLS, PRESETS
 from proofroll.engines.exudyn.ball import ball as ball_module
 from proofroll.engines.exudyn.ball import generic as generic_module
+from proofroll.engines.exudyn.ball.formulations import RUNS
+from proofroll.engines.exudyn.settings import PRESETS
 
-MODELS = [(formulation, preset) for formulation in OF_BALLS for preset in PRESETS[formulation]]
+MODELS = [(formulation, preset) for formulation in RUNS for preset in PRESETS[formulation]]
 BOUNDED = ("generic", "contact")
 
 

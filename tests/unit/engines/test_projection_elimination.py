@@ -9,8 +9,8 @@ import pytest
 import scipy.linalg.lapack
 
 from proofroll.core.errors import Refused
+from proofroll.core.heyoka_library import available
 from proofroll.core.plugins import load_engine
-from proofroll.elements.ball_on_surface.compiled.library import available
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.sampling import row_rank
 from proofroll.elements.mechanism.scene.drives import Actuator

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from true_runs import true_run
 
+from proofroll.core import heyoka_library as library
 from proofroll.core.errors import Missing, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.engines.projection import Projection
 from proofroll.files.scene_file import load_scene

@@ -9,7 +9,7 @@ Mechanisms are bodies in redundant coordinates (:mod:`redundant`), with contacts
 that roll (:mod:`discs`), or its kinematic tree (:mod:`tree`).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, ClassVar
 
@@ -17,15 +17,9 @@ from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.exudyn.ball.carrier import Carrier
-from proofroll.engines.exudyn.ball.contact import PenaltyContact
-from proofroll.engines.exudyn.ball.generic import Generic
-from proofroll.engines.exudyn.ball.local_frame import slides
-from proofroll.engines.exudyn.ball.rolling_disc import RollingDisc
-from proofroll.engines.exudyn.ball.world_coordinates import WorldCoordinates
+from proofroll.engines.exudyn.ball import formulations as ball
 from proofroll.engines.exudyn.contact import discs, spheres
 from proofroll.engines.exudyn.contact.discs import Discs
 from proofroll.engines.exudyn.contact.spheres import Spheres
@@ -36,23 +30,11 @@ from proofroll.engines.exudyn.smooth import redundant, tree
 from proofroll.engines.exudyn.smooth.redundant import Redundant
 from proofroll.engines.exudyn.smooth.tree import KinematicTree
 
-OF_BALLS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
-    "generic": lambda body, settings: (Generic if slides(body) else WorldCoordinates)(body, settings),
-    "carrier": Carrier,
-    "rolling_disc": RollingDisc,
-    "contact": PenaltyContact,
-}
 OF_MECHANISMS: Mapping[str, type[Redundant | KinematicTree]] = {
     "redundant": Redundant,
     "spheres": Spheres,
     "discs": Discs,
     "tree": KinematicTree,
-}
-_HELD = "its constraint holds the ball on the wall"
-_ROLLS_AT_REST: Mapping[str, str] = {
-    BallCapability.IMPACTS: _HELD,
-    BallCapability.BOUNDED_FRICTION: "its joint rolls without slip",
-    BallCapability.MOVING_WALL: "its joint rolls on a body at rest",
 }
 # Formulations whose joints are given by whole frames (exudyn.HT).
 _WITH_FRAMES = {"carrier", *OF_MECHANISMS}
@@ -67,10 +49,7 @@ class Exudyn:
     witness: ClassVar[bool] = False
     oldest: ClassVar[str] = "1.11"  # the oldest that was tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "generic": (ALL_OF_A_BALL | {BallCapability.MOVING_WALL}) - {BallCapability.ORIENTATION},
-        "carrier": ROLLS | {BallCapability.ORIENTATION},
-        "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
-        "contact": ALL_OF_A_BALL | {BallCapability.IMPACTS},
+        **ball.PROVIDES,
         "redundant": redundant.PROVIDES,
         "spheres": spheres.PROVIDES,
         "discs": discs.PROVIDES,
@@ -81,16 +60,7 @@ class Exudyn:
         "discs": frozenset({MechanismCapability.UNBOUNDED_FRICTION}),
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "generic": {
-            BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation",
-            BallCapability.IMPACTS: _HELD,
-        },
-        "contact": {
-            BallCapability.TANGENTIAL_RESTITUTION: "its friction stops the contact point, and has no restitution",
-            BallCapability.MOVING_WALL: "its hollow sphere has no velocity",
-        },
-        "carrier": _ROLLS_AT_REST,
-        "rolling_disc": _ROLLS_AT_REST,
+        **ball.LACKING,
         "redundant": redundant.LACKING,
         "spheres": spheres.LACKING,
         "discs": discs.LACKING,
@@ -124,10 +94,7 @@ class Exudyn:
             because="goes on where Newton's method fails at the edge of the friction zone",
         ),
     )
-    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        formulation: {BallCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}
-        for formulation in ("carrier", "rolling_disc", "contact")
-    }
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = ball.INHERENT
 
     @staticmethod
     def caveat(settings: ExudynSettings) -> str:
@@ -178,7 +145,7 @@ class Exudyn:
         if settings.formulation in OF_MECHANISMS:
             return OF_MECHANISMS[settings.formulation](scene, settings)
         require_provided(cls, settings.formulation, scene)
-        return OF_BALLS[settings.formulation](rolling_ball(scene), settings)
+        return ball.RUNS[settings.formulation](rolling_ball(scene), settings)
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:

@@ -1,6 +1,5 @@
 """Adapter between proofroll and Pinocchio."""
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -10,12 +9,9 @@ from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.pinocchio.ball.contact import ContactRun
-from proofroll.engines.pinocchio.ball.rows_run import RowsRun
+from proofroll.engines.pinocchio.ball import formulations as ball
 from proofroll.engines.pinocchio.contact import impulses
 from proofroll.engines.pinocchio.contact.impulse_run import ImpulseRun
 from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings, lowered
@@ -34,9 +30,7 @@ class Pinocchio:
     witness: ClassVar[bool] = False
     oldest: ClassVar[str] = "3.9"  # oldest version tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "composite": ALL_OF_A_BALL,
-        "free_flyer": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
-        "contact": ALL_OF_A_BALL | {BallCapability.MOVING_WALL, BallCapability.IMPACTS},
+        **ball.PROVIDES,
         "null_space": joint_tree.PROVIDES,
         "constraint_dynamics": constraint_dynamics.PROVIDES,
         "impulses": impulses.PROVIDES,
@@ -45,9 +39,7 @@ class Pinocchio:
         "impulses": frozenset(MechanismCapability[name] for name in ("CONTACT", "JOINT_FRICTION", "STOPS"))
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "composite": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
-        "free_flyer": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
-        "contact": {BallCapability.TANGENTIAL_RESTITUTION: "Pinocchio's solver has no restitution to be asked for"},
+        **ball.LACKING,
         "null_space": joint_tree.LACKING,
         "constraint_dynamics": constraint_dynamics.LACKING,
         "impulses": impulses.LACKING,
@@ -87,9 +79,7 @@ class Pinocchio:
             because="gives the solver the rate at which the contact's plane turns during a step",
         ),
     )
-    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "contact": {BallCapability.ORIENTATION: "the spherical joint's configuration is the ball's orientation"}
-    }
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = ball.INHERENT
 
     @staticmethod
     def caveat(settings: PinocchioSettings) -> str:
@@ -115,32 +105,17 @@ class Pinocchio:
         return defaults | {"gravity": pin.Model().gravity.linear.tolist()}
 
     @classmethod
-    def build(cls, scene: Scene, settings: PinocchioSettings) -> ContactRun | RowsRun | MechanismRun:
+    def build(cls, scene: Scene, settings: PinocchioSettings) -> ball.BallRun | MechanismRun:
         """See :class:`proofroll.core.engine.Engine`; returns a run of the formulation."""
         if settings.formulation in _OF_PINOCCHIO_4 and release(cls.version()) < (4,):
             raise Refused(f"{settings.formulation} needs the constraints of pinocchio 4.0, and this is {cls.version()}")
         if settings.formulation in OF_MECHANISMS:
             return _of_mechanism(scene, settings)
         require_provided(cls, settings.formulation, scene)
-        settings = _decided(scene, settings)
-        return (ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings)
+        return ball.ball_run(scene, settings)
 
 
 def _of_mechanism(scene: Scene, settings: PinocchioSettings) -> MechanismRun:
     mechanism, formulation = mechanism_of(scene), settings.formulation
     require(mechanism, Pinocchio.provides[formulation], Pinocchio.lacking[formulation])
     return (ImpulseRun if formulation == "impulses" else MechanismRun)(mechanism, settings)
-
-
-def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
-    """Settings with the orientation as the scene requires.
-
-    Raises:
-        Refused: the scene requires the orientation, and the settings exclude it.
-    """
-    if settings.formulation == "contact":
-        return settings
-    asked = BallCapability.ORIENTATION in scene.requires
-    if asked and settings.orientation is False:
-        raise Refused(f"needs {BallCapability.ORIENTATION}, which orientation=false leaves out")
-    return dataclasses.replace(settings, orientation=asked) if settings.orientation is None else settings

@@ -124,8 +124,8 @@ class PinocchioSettings:
         """See :class:`proofroll.core.engine.Settings`.
 
         rk4 is of order 4 only if configurations form a vector space, that is without the orientation: see
-        :mod:`proofroll.engines.pinocchio.integrators`. Where the scene decides, :func:`lowered` gives the order with
-        it.
+        :mod:`proofroll.engines.pinocchio.ball.integrators`. Where the scene decides, :func:`lowered` gives the order
+        with it.
         """
         if self.formulation in OF_MECHANISMS and self.formulation != "impulses":
             return 4 if self.integrator == "rk4" else None

@@ -1,35 +1,17 @@
 """Engine adapter of the projection method."""
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Self
-
-import numpy as np
+from typing import ClassVar
 
 import proofroll
-from proofroll.core.arrays import FloatArray
 from proofroll.core.engine_abilities import Level, Term, require_provided
-from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
-from proofroll.core.integrators import INTEGRATORS, Integrator
+from proofroll.core.heyoka_library import with_heyoka
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
-from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
-from proofroll.engines.projection.ball.ball_switching import Switching
-from proofroll.engines.projection.ball.geometry import geometry_of, matrix
-from proofroll.engines.projection.ball.method import ProjectedBall, start_and_scales
-from proofroll.engines.projection.ball.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
-from proofroll.engines.projection.ball.taylor import TaylorSeries
+from proofroll.engines.projection.ball import run as ball
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.smooth import mechanism
 from proofroll.engines.projection.smooth.mechanism import ProjectionMechanism
-
-# Components of the state without the ball's orientation: two coordinates and five velocities.
-_WITHOUT_ORIENTATION = 7
-_OF_BALLS = ("euler", "rotating_frame")
 
 
 class Projection:
@@ -39,16 +21,14 @@ class Projection:
     title: ClassVar[str] = "projection solver"
     witness: ClassVar[bool] = True
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        **dict.fromkeys(_OF_BALLS, ALL_OF_A_BALL | {BallCapability.MOVING_WALL}),
+        **ball.PROVIDES,
         "dependent": mechanism.PROVIDES,
     }
-    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        name: {BallCapability.IMPACTS: "its constraint holds the ball on the wall"} for name in _OF_BALLS
-    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = ball.LACKING
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
-        **dict.fromkeys(_OF_BALLS, Level.PROJECTION),
+        **dict.fromkeys(ball.FORMULATIONS, Level.PROJECTION),
         "dependent": Level.CONSTRAINT,
     }
     terms: ClassVar[Sequence[Term]] = (
@@ -61,9 +41,7 @@ class Projection:
             "coefficients, as in the rotating frame, there is none",
         ),
     )
-    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "euler": {BallCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
-    }
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = ball.INHERENT
 
     @staticmethod
     def family(_: ProjectionSettings) -> Mapping[str, str]:
@@ -76,139 +54,9 @@ class Projection:
         return with_heyoka(proofroll.__version__)
 
     @classmethod
-    def build(cls, scene: Scene, settings: ProjectionSettings) -> Self | ProjectionMechanism:
+    def build(cls, scene: Scene, settings: ProjectionSettings) -> ball.ProjectionBall | ProjectionMechanism:
         """See :class:`proofroll.core.engine.Engine`; ``dependent`` gives a run of a mechanism."""
         if settings.formulation == "dependent":
             return ProjectionMechanism(scene, settings)
         require_provided(cls, settings.formulation, scene)
-        follow = BallCapability.ORIENTATION in scene.requires
-        if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
-            raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
-        return cls(rolling_ball(scene), settings, follow=follow)
-
-    def __init__(self, body: RollingBall, settings: ProjectionSettings, *, follow: bool = False) -> None:
-        """Ball at time 0; ``follow``: integrate its orientation too if the formulation does not need it."""
-        self._surface = body.surface
-        geometry = geometry_of(body.surface)
-        self._orientation: Orientation
-        if settings.formulation == "euler":
-            self._orientation = EulerAngles(renews=settings.singularity == "renew")
-        else:
-            self._orientation = FollowedFrame() if follow else RotatingFrame()
-        self._coordinates = 2 + self._orientation.size
-        turning = [generator.kind == "rotation" for generator in body.surface.generators or ()]
-        periodic = [*turning, *([False] * (2 - len(turning))), *self._orientation.periodic]
-        self._angles = [index for index, whole in enumerate(periodic) if whole]
-        self._ball = ProjectedBall(body, geometry, self._orientation)
-        self._eliminate = settings.eliminates
-        self._bounded = math.isfinite(body.contact.mu_static)
-        self._fixed_step = settings.dt if settings.resolution == "dt" else 0.0
-        resolution, (x, scales) = getattr(settings, settings.resolution), start_and_scales(body, self._orientation)
-        self._motion: Integrator | Switching | TaylorSeries
-        if settings.integrator == "taylor":
-            assert settings.formulation != "dependent"  # refused by the settings
-            self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
-        elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
-            stepper = INTEGRATORS[settings.integrator](resolution)
-            self._motion = Switching(self._ball, body, stepper, x, scales, self._check, self._renewed, self._eliminate)
-        else:
-            self._motion = INTEGRATORS[settings.integrator](resolution)
-            self._motion.begin(0.0, x, self._ball.rates, self._accept, scales)
-
-    def _check(self, t: float, x: FloatArray) -> None:
-        n = self._coordinates
-        if not math.isfinite(float(x.sum())):
-            raise Diverged(f"the state is not finite (NaN or overflow) at t = {t:.6g} s")
-        self._orientation.check(t, x[2:n], x[n + 2 :], self._fixed_step)
-
-    def _accept(self, t: float, x: FloatArray) -> FloatArray:
-        self._check(t, x)
-        return self._accepted(t, x)
-
-    def _accepted(self, t: float, x: FloatArray) -> FloatArray:
-        """State from which the motion goes on, without violations and away from the singularity."""
-        x = self._ball.eliminated(x) if self._eliminate else x
-        renewed = self._renewed(t, x)
-        return self._within_a_turn(x if renewed is None else renewed)
-
-    def _within_a_turn(self, x: FloatArray) -> FloatArray:
-        """State with each angle less than a turn from zero.
-
-        Nothing depends on whole turns, but round-off and the tolerance of a step are relative to the largest component
-        of the state: after ten thousand turns the angles would be accurate to eleven digits only, and so would the
-        rolling.
-        """
-        beyond = [index for index in self._angles if abs(x.item(index)) > math.tau]
-        if beyond:
-            x = x.copy()
-            x[beyond] -= math.tau * np.trunc(x[beyond] / math.tau)
-        return x
-
-    def _renewed(self, t: float, x: FloatArray) -> FloatArray | None:
-        """State in other angles, or None if these are kept; see :meth:`Orientation.renewed`."""
-        n = self._coordinates
-        renewed = self._orientation.renewed(t, x[2:n], x[n + 2 :])
-        return None if renewed is None else np.concatenate([x[:2], renewed[0], x[n : n + 2], renewed[1]])
-
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        start = self._motion.t
-        try:
-            with np.errstate(over="ignore", invalid="ignore"):  # detected by _check, and raised as Diverged
-                self._motion.advance(t)
-        except ArithmeticError as error:
-            raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
-
-    def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return tuple(self._motion.events) if isinstance(self._motion, Switching) else ()
-
-    def remarks(self) -> Sequence[str]:
-        """See :class:`proofroll.core.engine_abilities.TellsRemarks`."""
-        times = self._orientation.renewals if isinstance(self._orientation, EulerAngles) else []
-        if not times:
-            return ()
-        often = "once, at" if len(times) == 1 else f"{len(times)} times, first at"
-        return (f"near the Euler-angle singularity the body's axes were chosen anew {often} t = {times[0]:.6g} s",)
-
-    def sample(self) -> BallSample:
-        """See :class:`proofroll.core.engine.Engine`."""
-        x = self._motion.x
-        kin = self._ball.kinematics(x)
-        frame = matrix(kin.frame)
-        if isinstance(self._motion, Switching):
-            force = self._motion.force
-            sticking = self._motion.mode.sticking if self._bounded else None
-        elif isinstance(self._motion, TaylorSeries):
-            force, sticking = self._motion.force, None
-        else:
-            force, sticking = self._ball.contact_force(self._ball.response(kin)), None
-        return BallSample(
-            p_WB=self._surface.position(x[:2]),
-            v_WB=frame @ kin.v[:3],
-            w_WB=frame @ kin.v[3:],
-            q_WB=self._orientation.quaternion(x[2 : self._coordinates]),
-            force=frame @ force,
-            sticking=sticking,
-        )
-
-    def built(self) -> BallBuilt:
-        """See :class:`proofroll.core.engine.Engine`."""
-        ball, x = self._ball, self._motion.x
-        friction = self._motion.friction if isinstance(self._motion, Switching) else None
-        kin = ball.kinematics(x)
-        frame = matrix(kin.frame)
-        rates = self._motion.rates if isinstance(self._motion, (Switching, TaylorSeries)) else ball.rates(x)
-        acceleration = ball.velocity_rate(kin, rates[self._coordinates : self._coordinates + 5].tolist())
-        return BallBuilt(
-            mass=ball.mass,
-            inertia=np.full(3, ball.inertia),
-            gravity=frame @ ball.weight(kin),
-            ball_radius=ball.radius,
-            rolling_resistance=ball.rolling_resistance,
-            mu_static=friction.mu_static if friction else None,
-            mu_kinetic=friction.mu_kinetic if friction else None,
-            acceleration=frame @ acceleration[:3],
-            angular_acceleration=frame @ acceleration[3:],
-            terms=terms_held(resists=ball.rolling_resistance, slips=self._bounded, turns=len(x) > _WITHOUT_ORIENTATION),
-        )
+        return ball.ball_run(scene, settings)

@@ -6,11 +6,11 @@ from typing import Annotated, Literal
 
 from annotated_types import Gt
 
+from proofroll.core import heyoka_library as library
 from proofroll.core.dop853 import TIGHTEST
 from proofroll.core.engine import Scheme
 from proofroll.core.errors import refuse_first
 from proofroll.core.integrators import INTEGRATORS
-from proofroll.elements.ball_on_surface.compiled import library
 
 _DT = 1e-3
 

@@ -13,9 +13,9 @@ import proofroll
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Diverged, Refused, refuse_first
+from proofroll.core.heyoka_library import TIGHTEST, require_heyoka, with_heyoka
 from proofroll.core.integrators import DormandPrince853
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST, require_heyoka, with_heyoka
 from proofroll.elements.ball_on_surface.compiled.rolling import parameters, reduced, supports
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving

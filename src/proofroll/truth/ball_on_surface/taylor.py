@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
+from proofroll.core import heyoka_library as library
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.compiled.rolling import parameters, start
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion

@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core import heyoka_library as library
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion

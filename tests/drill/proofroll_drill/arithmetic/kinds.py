@@ -138,7 +138,7 @@ def _lacks_a_second_core() -> str:
 
 
 def _lacks_heyoka() -> str:
-    from proofroll.elements.ball_on_surface.compiled import library
+    from proofroll.core import heyoka_library as library
 
     return "" if library.available() else "heyoka is not installed, so that every other kind is without it"
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from proofroll.core import heyoka_library as library
 from proofroll.core.engine_abilities import Level, TellsLevels
 from proofroll.core.errors import Diverged, InputError, Missing, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.kind import BallOnSurfaceKind
 from proofroll.elements.ball_on_surface.model import BallCapability

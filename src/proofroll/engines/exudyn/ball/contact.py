@@ -26,13 +26,11 @@ from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.exudyn.ball.ball import add_ball
 from proofroll.engines.exudyn.ball.local_frame import curvature
+from proofroll.engines.exudyn.contact.hollow_spheres import ON_A_PLANE
 from proofroll.engines.exudyn.integration import BallRun, Integration
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
-# Radius of the hollow sphere in radii of the ball where the wall is not curved. The larger it is, the less its normal
-# turns between two residuals, and the more the stiffness magnifies the round-off of the distance.
-ON_A_PLANE = 10.0
 # Slip speed, in units of ``friction_zone``, from which the ball counts as slipping: at a grazing onset, time steps
 # throw the slip velocity to and fro across the edge of the zone itself.
 SURELY = 2.0

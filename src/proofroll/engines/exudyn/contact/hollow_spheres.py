@@ -11,8 +11,11 @@ import numpy as np
 
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
-from proofroll.engines.exudyn.ball.contact import ON_A_PLANE
 from proofroll.engines.exudyn.native import Output, exu
+
+# Radius of the hollow sphere in radii of the ball where the wall is not curved. The larger it is, the less its normal
+# turns between two residuals, and the more the stiffness magnifies the round-off of the distance.
+ON_A_PLANE = 10.0
 
 
 class MovingPlane(NamedTuple):

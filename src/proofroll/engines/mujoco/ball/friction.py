@@ -1,26 +1,22 @@
 """Bounded friction of a ball: events of stick and slip, switch of the coefficient, correction of the convex cone."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from proofroll.core.errors import Refused
 from proofroll.core.events import Event, EventKind
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.scene.balls import Contact
-from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOAD, MujocoSettings
+from proofroll.engines.mujoco.contact.coefficients import NEAR_CONE
+from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings
 
-# MuJoCo silently raises a smaller coefficient to this (mjMINMU), unless the contact has no friction at all.
-SMALLEST_FRICTION = 1e-5
 # Numbers of user data that BoundedFriction.correct keeps: a Jacobian of three rows and MuJoCo's six velocities.
 SLIP_MEMORY = 18
 # MuJoCo's solver projects a force onto the cone, so the force of a slipping contact lies on it to round-off.
 _ON_CONE = 1 - 1e-9
-# The correction vanishes with the slip, so it may begin a little inside the cone: then all stages of RK4 apply it.
-NEAR_CONE = 1 - 1e-3
 
 
 def condim(mu: float, settings: MujocoSettings) -> int:
@@ -31,20 +27,6 @@ def condim(mu: float, settings: MujocoSettings) -> int:
 def corrects(contact: Contact, settings: MujocoSettings) -> bool:
     """True if the contact's reference acceleration is edited for slip."""
     return settings.cone_correction and 0 < contact.mu_static < math.inf
-
-
-def check_coefficients(coefficients: Iterable[float], settings: MujocoSettings, softened: str) -> None:
-    """Rejects coefficients of friction that MuJoCo would silently change, or that would make ``softened`` soft.
-
-    Raises:
-        Refused: the first such coefficient.
-    """
-    for mu in coefficients:
-        if 0 < mu < SMALLEST_FRICTION:
-            raise Refused(f"MuJoCo raises a coefficient of friction of {mu:g} to {SMALLEST_FRICTION:g}; 0 is exact")
-        if settings.cone == "pyramidal" and mu > LARGEST_PYRAMIDAL_FRICTION:
-            limit = f"{LARGEST_PYRAMIDAL_FRICTION:g}"
-            raise Refused(f"cone=pyramidal with friction above {limit} makes {softened} soft; set cone=elliptic")
 
 
 class BoundedFriction:

@@ -28,7 +28,7 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
     SphereShape,
 )
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
-from proofroll.engines.mujoco.ball.friction import NEAR_CONE, SMALLEST_FRICTION, check_coefficients
+from proofroll.engines.mujoco.contact.coefficients import NEAR_CONE, SMALLEST_FRICTION, check_coefficients
 from proofroll.engines.mujoco.contact.walls import check_walls, curved_end, shapes_at_start
 from proofroll.engines.mujoco.settings import SLIDES, TURNS, UNBOUNDED_FRICTION, MujocoSettings
 

@@ -24,12 +24,11 @@ from proofroll.elements.ball_on_surface.mechanics import (
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
+from proofroll.engines.pinocchio.ball.integrators import QUATERNION
 from proofroll.engines.pinocchio.ball.plane_contact import PlaneContact
-from proofroll.engines.pinocchio.integrators import QUATERNION
+from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
-# Pinocchio's cone needs a number for unbounded friction. PGS accepts any; the iterations of ADMM grow with it.
-LARGEST_FRICTION = {"pgs": 1e6, "admm": 1e2}
 # Ratio of friction to its bound above which an impulse lies on the cone [1].
 _ON_CONE = 1 - 1e-9
 # Normal impulse, relative to that of gravity, that is round-off of the gap: the wall does not press.

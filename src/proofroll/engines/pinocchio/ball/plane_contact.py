@@ -13,9 +13,7 @@ import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-
-# Pinocchio's limit of 1000 is reached at tight tolerances where the normal force is small.
-_ADMM_ITERATIONS = 10_000
+from proofroll.engines.pinocchio.contact.solver import solver_of
 
 
 class PlaneContact:
@@ -102,16 +100,3 @@ class PlaneContact:
         """Friction coefficient that the contact's cone has after it is set to ``mu``, as before each impulse."""
         self.point.setFriction(mu)
         return float(self.point.getFriction())
-
-
-def solver_of(kind: str, tolerance: float, size: int = 3) -> tuple[Any, Any, Any]:
-    """Solver, its options and its result object for ``size`` rows."""
-    if kind == "pgs":
-        solver, options, result = pin.PGSConstraintSolver(size), pin.PGSSolverSettings(), pin.PGSSolverResult()
-    else:
-        solver, options, result = pin.ADMMConstraintSolver(size), pin.ADMMSolverSettings(), pin.ADMMSolverResult()
-        options.max_iterations = _ADMM_ITERATIONS
-    for name in ("feasibility", "complementarity"):
-        for bound in ("absolute", "relative"):
-            setattr(options, f"{bound}_{name}_tol", tolerance)
-    return solver, options, result

@@ -11,8 +11,13 @@ from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, t
 from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.ball.composite import Composite
 from proofroll.engines.pinocchio.ball.free_flyer import FreeFlyer
+from proofroll.engines.pinocchio.ball.integrators import (
+    Adaptive,
+    SemiImplicitEuler,
+    TangentIntegrator,
+    TangentRungeKutta4,
+)
 from proofroll.engines.pinocchio.ball.stick_slip import AdaptiveStickSlip, StickSlipEuler, StickSlipRungeKutta4
-from proofroll.engines.pinocchio.integrators import Adaptive, SemiImplicitEuler, TangentIntegrator, TangentRungeKutta4
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 # For unbounded friction, and for bounded friction.

@@ -21,7 +21,7 @@ from proofroll.core.event_location import Rise, locate_rise
 from proofroll.core.events import Event, EventKind
 from proofroll.elements.mechanism.scene.balls import Contact
 from proofroll.engines.pinocchio.ball.ball_with_rows import NOISE, BallWithRows, SlidingContact, left_the_wall, unit
-from proofroll.engines.pinocchio.integrators import Adaptive, FixedStep, SemiImplicitEuler, TangentRungeKutta4
+from proofroll.engines.pinocchio.ball.integrators import Adaptive, FixedStep, SemiImplicitEuler, TangentRungeKutta4
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 # |u| at which creeping ends, relative to |b|/ω_b; the error of its direction is of the order of the square.
@@ -252,7 +252,7 @@ class AdaptiveStickSlip(Adaptive):
 
 
 class FixedStickSlip(FixedStep):
-    """Mixin for the schemes of :mod:`~proofroll.engines.pinocchio.integrators`.
+    """Mixin for the schemes of :mod:`~proofroll.engines.pinocchio.ball.integrators`.
 
     The time of an event is interpolated; its bracket is the step.
     """

@@ -17,9 +17,8 @@ from proofroll.elements.mechanism.contact.touching import Moving, Touching, touc
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
-from proofroll.engines.pinocchio.ball.contact import LARGEST_FRICTION
-from proofroll.engines.pinocchio.ball.plane_contact import solver_of
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
+from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION, solver_of
 from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningImpulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree

@@ -6,7 +6,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
+from proofroll.core.heyoka_library import require_heyoka
 from proofroll.elements.ball_on_surface.compiled.projection import Formulation, parameters, projected, structure
 from proofroll.elements.ball_on_surface.compiled.rolling import supports
 from proofroll.elements.ball_on_surface.compiled.series import Renewed, Series, still_moving

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
+from proofroll.core.heyoka_library import require_heyoka
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.projection.smooth.connections import SKEW, Bodies, ProjectedConnections

@@ -1,4 +1,4 @@
-"""Time integration on Pinocchio's configurations."""
+"""Time integration of a ball on Pinocchio's configurations."""
 
 import math
 from abc import ABC, abstractmethod
@@ -10,20 +10,11 @@ import pinocchio as pin
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import controlled_step, solver_from
 from proofroll.core.engine import whole_steps
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Diverged
 from proofroll.core.events import Event, EventKind
 from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-
-
-def require_tangent_map() -> None:
-    """Refuses versions of Pinocchio without rates of quaternions.
-
-    Raises:
-        Refused: ``tangentMap`` is missing.
-    """
-    if not hasattr(pin, "tangentMap"):
-        raise Refused(f"the rates of quaternions need tangentMap of pinocchio 4.0, and this is {pin.__version__}")
+from proofroll.engines.pinocchio.smooth.tangent_map import require_tangent_map
 
 
 class TangentIntegrator(ABC):

@@ -1,0 +1,48 @@
+"""Formulations of a ball on a surface in Exudyn, and what each has and lacks."""
+
+from collections.abc import Callable, Mapping
+
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
+from proofroll.engines.exudyn.ball.carrier import Carrier
+from proofroll.engines.exudyn.ball.contact import PenaltyContact
+from proofroll.engines.exudyn.ball.generic import Generic
+from proofroll.engines.exudyn.ball.local_frame import slides
+from proofroll.engines.exudyn.ball.rolling_disc import RollingDisc
+from proofroll.engines.exudyn.ball.world_coordinates import WorldCoordinates
+from proofroll.engines.exudyn.integration import ExudynModel
+from proofroll.engines.exudyn.settings import ExudynSettings
+
+RUNS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
+    "generic": lambda body, settings: (Generic if slides(body) else WorldCoordinates)(body, settings),
+    "carrier": Carrier,
+    "rolling_disc": RollingDisc,
+    "contact": PenaltyContact,
+}
+_HELD = "its constraint holds the ball on the wall"
+_ROLLS_AT_REST: Mapping[str, str] = {
+    BallCapability.IMPACTS: _HELD,
+    BallCapability.BOUNDED_FRICTION: "its joint rolls without slip",
+    BallCapability.MOVING_WALL: "its joint rolls on a body at rest",
+}
+PROVIDES: Mapping[str, frozenset[str]] = {
+    "generic": (ALL_OF_A_BALL | {BallCapability.MOVING_WALL}) - {BallCapability.ORIENTATION},
+    "carrier": ROLLS | {BallCapability.ORIENTATION},
+    "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
+    "contact": ALL_OF_A_BALL | {BallCapability.IMPACTS},
+}
+LACKING: Mapping[str, Mapping[str, str]] = {
+    "generic": {
+        BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation",
+        BallCapability.IMPACTS: _HELD,
+    },
+    "contact": {
+        BallCapability.TANGENTIAL_RESTITUTION: "its friction stops the contact point, and has no restitution",
+        BallCapability.MOVING_WALL: "its hollow sphere has no velocity",
+    },
+    "carrier": _ROLLS_AT_REST,
+    "rolling_disc": _ROLLS_AT_REST,
+}
+INHERENT: Mapping[str, Mapping[str, str]] = {
+    formulation: {BallCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}
+    for formulation in ("carrier", "rolling_disc", "contact")
+}

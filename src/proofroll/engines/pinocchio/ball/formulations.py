@@ -1,0 +1,51 @@
+"""Formulations of a ball on a surface with Pinocchio, and what each has and lacks."""
+
+import dataclasses
+from collections.abc import Mapping
+
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
+from proofroll.engines.pinocchio.ball.contact import ContactRun
+from proofroll.engines.pinocchio.ball.rows_run import RowsRun
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+
+BallRun = ContactRun | RowsRun
+PROVIDES: Mapping[str, frozenset[str]] = {
+    "composite": ALL_OF_A_BALL,
+    "free_flyer": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
+    "contact": ALL_OF_A_BALL | {BallCapability.MOVING_WALL, BallCapability.IMPACTS},
+}
+LACKING: Mapping[str, Mapping[str, str]] = {
+    "composite": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
+    "free_flyer": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
+    "contact": {BallCapability.TANGENTIAL_RESTITUTION: "Pinocchio's solver has no restitution to be asked for"},
+}
+INHERENT: Mapping[str, Mapping[str, str]] = {
+    "contact": {BallCapability.ORIENTATION: "the spherical joint's configuration is the ball's orientation"}
+}
+
+
+def ball_run(scene: Scene, settings: PinocchioSettings) -> BallRun:
+    """Run of the scene's ball.
+
+    Raises:
+        Refused: the scene requires the orientation, and the settings exclude it.
+    """
+    settings = _decided(scene, settings)
+    return (ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings)
+
+
+def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
+    """Settings with the orientation as the scene requires.
+
+    Raises:
+        Refused: the scene requires the orientation, and the settings exclude it.
+    """
+    if settings.formulation == "contact":
+        return settings
+    asked = BallCapability.ORIENTATION in scene.requires
+    if asked and settings.orientation is False:
+        raise Refused(f"needs {BallCapability.ORIENTATION}, which orientation=false leaves out")
+    return dataclasses.replace(settings, orientation=asked) if settings.orientation is None else settings
