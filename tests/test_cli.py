@@ -620,7 +620,8 @@ def test_help_and_version(proofroll: Proofroll) -> None:
         assert command in out
     assert "..." not in out.partition("Ask:")[2]  # no summary is cut
     heads = [line for line in out.splitlines() if line.endswith(":") and not line.startswith(" ")]
-    assert [head.partition(" ")[0].strip(":") for head in heads[:5]] == ["Options", "Ask", "Bring", "Study", "Maintain"]
+    groups = ["Options", "Ask", "Bring", "Study", "Blajer's", "Maintain"]
+    assert [head.partition(" ")[0].strip(":") for head in heads[:6]] == groups
     assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
     assert proofroll()[0] == 2
     code, out, err = proofroll("new")
