@@ -53,12 +53,12 @@ def impulse_of_a_contact(
     if not friction:
         return np.array([aim / G[0, 0], 0.0, 0.0])
     change = np.array([aim, *-slide[1:]])
-    held = np.asarray(np.linalg.lstsq(G, change, rcond=RANK)[0], dtype=np.float64)
-    rests = np.abs(G @ held - change).max() <= _HELD * np.abs(change).max()
+    sticking_impulse = np.asarray(np.linalg.lstsq(G, change, rcond=RANK)[0], dtype=np.float64)
+    rests = np.abs(G @ sticking_impulse - change).max() <= _HELD * np.abs(change).max()
     if np.isinf(friction):
-        return held if rests and held[0] >= 0 else None
-    if rests and np.linalg.norm(held[1:]) <= static * held[0] * (1 + _HELD):
-        return held
+        return sticking_impulse if rests and sticking_impulse[0] >= 0 else None
+    if rests and np.linalg.norm(sticking_impulse[1:]) <= static * sticking_impulse[0] * (1 + _HELD):
+        return sticking_impulse
     # slip · (G_nn − μ G_nt·t) = u + V t, as a function of t = (c, s)
     u = slide[1:] * G[0, 0] + aim * G[1:, 0]
     V = -friction * (np.outer(slide[1:], G[0, 1:]) + aim * G[1:, 1:])

@@ -15,5 +15,5 @@ def slides_of(bodies: BodiesState) -> FreeSlides:
     root = np.linalg.cholesky(bodies.mass)
     locked = np.linalg.qr(np.linalg.solve(root, bodies.C.T))[0]
     ways = np.linalg.solve(root.T, np.eye(len(root)) - locked @ locked.T)
-    held = bodies.mass @ free - bodies.force
-    return free_slides(bodies.touching, bodies.J, bodies.bias, free, ways @ ways.T, loose, held)
+    joint_force = bodies.mass @ free - bodies.force
+    return free_slides(bodies.touching, bodies.J, bodies.bias, free, ways @ ways.T, loose, joint_force)

@@ -72,9 +72,9 @@ class ContactBodies(ContactStretches):
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
         touching = self.equations.at(state := self.start).touching
-        closed, still = closed_and_still(touching, np.ones(len(touching)), 1.0, start_digits(self.contacts))
-        features = tuple(each.feature for each in touching)
-        rough = modes_of(shut_by_pressing(self.contacts, closed), still, features)
+        closed_mask, resting_mask = closed_and_still(touching, np.ones(len(touching)), 1.0, start_digits(self.contacts))
+        features = tuple(touch.feature for touch in touching)
+        rough = modes_of(shut_by_pressing(self.contacts, closed_mask), resting_mask, features)
         rough = self._moved_on(state, rough)
         state = self.equations.eliminated(state, rough)
         mode, margin = self._decided(state, rough)
@@ -89,36 +89,34 @@ class ContactBodies(ContactStretches):
         if not any(closed_in(rough)):
             return rough, np.inf
         bodies = self.equations.at(state, features_of(rough))
-        closed = acting_ones(self.contacts, rough, slides_of(bodies))
-        ways = off_stops(self.contacts, closed)
-        sticks = [acting.kind == "stick" and closed[k] and k not in ways for k, acting in enumerate(rough)]
-        ways = {k: np.array(own.heading) for k, own in enumerate(rough) if own.heading} | ways
+        closed_mask = acting_ones(self.contacts, rough, slides_of(bodies))
+        ways = off_stops(self.contacts, closed_mask)
+        sticks = [acting.kind == "stick" and closed_mask[k] and k not in ways for k, acting in enumerate(rough)]
+        ways = {k: np.array(acting.heading) for k, acting in enumerate(rough) if acting.heading} | ways
 
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
             directed = [
-                own if heading is None or own.along is not None else Acting("slip", None, direction_of(heading))
-                for own, heading in zip(mode, headings, strict=True)
+                acting if heading is None or acting.along is not None else Acting("slip", None, direction_of(heading))
+                for acting, heading in zip(mode, headings, strict=True)
             ]
             return self.equations.accelerated(bodies, tuple(directed))
 
         free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
-        if sticks == list(closed) and not leaving:
-            own = zip(
-                provisional(self.equations, bodies, closed),
-                self._rubs,
-                strict=True,
+        if sticks == list(closed_mask) and not leaving:
+            actings = zip(provisional(self.equations, bodies, closed_mask), self._rubs, strict=True)
+            resting = tuple(
+                acting if rub or acting.kind == "open" else acting._replace(kind="slip") for acting, rub in actings
             )
-            resting = tuple(each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own)
             if all_held(self.equations, bodies, resting, free):
                 return resting, np.inf
-        best = self._tried(bodies, closed, sticks, ways, trial, free, leaving)[0]
-        return self._completed(bodies, closed, sticks, best, free)
+        best = self._tried(bodies, closed_mask, sticks, ways, trial, free, leaving)[0]
+        return self._completed(bodies, closed_mask, sticks, best, free)
 
     def _completed(
         self,
         bodies: BodiesState,
-        closed: Sequence[bool],
-        still: Sequence[bool],
+        closed_mask: Sequence[bool],
+        resting_mask: Sequence[bool],
         best: tuple[float, BodiesSolution, ContactMode],
         free: float,
     ) -> tuple[ContactMode, float]:
@@ -130,17 +128,20 @@ class ContactBodies(ContactStretches):
         size = max(float(np.abs(solution.slide).max()), free) or 1.0
         idle = [
             k
-            for k, own in enumerate(mode)
-            if closed[k] and own.kind == "open" and solution.parting[k] <= SLACK * size and self.contacts[k].presses
+            for k, acting in enumerate(mode)
+            if closed_mask[k]
+            and acting.kind == "open"
+            and solution.parting[k] <= SLACK * size
+            and self.contacts[k].presses
         ]
         if not idle:
             return mode, kept
-        lines, whole = provisional(self.equations, bodies, closed), list(mode)
+        lines, whole = provisional(self.equations, bodies, closed_mask), list(mode)
         for k in idle:
-            each = bodies.touching[k]
-            way = solution.slide[k] if still[k] else each.slide
+            touch = bodies.touching[k]
+            way = solution.slide[k] if resting_mask[k] else touch.slide
             whole[k] = following(
-                lines[k], way - each.normal * (each.normal @ way), still[k] and self._rubs[k], SLACK * size
+                lines[k], way - touch.normal * (touch.normal @ way), resting_mask[k] and self._rubs[k], SLACK * size
             )
         full = self.equations.accelerated(bodies, tuple(whole))
         shares = sharing(full.splits)
@@ -150,9 +151,9 @@ class ContactBodies(ContactStretches):
             return mode, kept
         normals = pressing(tuple(whole), bodies.touching, full.force, full.splits)[self.equations.pressing]
         margins = [
-            self._kept(k, own, still[k], bodies, full, float(normals[k]), free)
-            for k, own in enumerate(whole)
-            if closed[k]
+            self._kept(k, acting, resting_mask[k], bodies, full, float(normals[k]), free)
+            for k, acting in enumerate(whole)
+            if closed_mask[k]
         ]
         return tuple(whole), max(0.0, min(margins))
 
@@ -165,10 +166,10 @@ class ContactBodies(ContactStretches):
         slides = np.concatenate(
             [frame_of_axis(bodies.touching[k].normal)[:, [2, 0, 1]].T @ bodies.touching[k].slide for k in which]
         )
-        struck = [ImpactLaw(self.contacts[k], laws[k], sideways[k]) for k in which]
+        impact_laws = [ImpactLaw(self.contacts[k], laws[k], sideways[k]) for k in which]
         together = self.equations.mechanism.together
         groups = groups_of([self.contacts[k].pair for k in which], slides, together=together)
-        impulses = impulses_in_turn(G, slides, groups, struck, float(state[-1]))
+        impulses = impulses_in_turn(G, slides, groups, impact_laws, float(state[-1]))
         e = self.equations.equations.equations
         state = state.copy()
         state[e.nx : e.nx + e.nu] += ways @ impulses
@@ -180,8 +181,8 @@ class ContactBodies(ContactStretches):
     def _tried(
         self,
         bodies: BodiesState,
-        closed: Sequence[bool],
-        still: Sequence[bool],
+        closed_mask: Sequence[bool],
+        resting_mask: Sequence[bool],
         ways: Mapping[int, Array],
         trial: Trial,
         free: float,
@@ -196,17 +197,17 @@ class ContactBodies(ContactStretches):
         Raises:
             Refused: there is none, or it is not found.
         """
-        count = sum(closed)
+        count = sum(closed_mask)
         slips = [ways.get(k, slip_velocity(touch)) for k, touch in enumerate(bodies.touching)]
         choices = [
-            list(self._candidates(k, own, still[k], slips[k]))
-            for k, own in enumerate(provisional(self.equations, bodies, closed))
+            list(self._candidates(k, acting, resting_mask[k], slips[k]))
+            for k, acting in enumerate(provisional(self.equations, bodies, closed_mask))
         ]
-        for k in np.flatnonzero(slides_of(bodies).moved & still & self._rubs).tolist():
+        for k in np.flatnonzero(slides_of(bodies).moved & resting_mask & self._rubs).tolist():
             choices[k] = [option for option in choices[k] if option.kind != "slip"]
         for k in leaving:
             choices[k] = [option for option in choices[k] if option.kind != "stick"]
-        exchanged = self._exchanged(bodies, choices, still, trial, free)
+        exchanged = self._exchanged(bodies, choices, resting_mask, trial, free)
         if exchanged is not None and (count > _MOST or (exchanged[0] > _CLEAR and not exchanged[1].loose)):
             return [exchanged]
         if count > _MOST:
@@ -216,28 +217,28 @@ class ContactBodies(ContactStretches):
             )
         unique, shared = (list[tuple[float, BodiesSolution, ContactMode]]() for _ in range(2))
         for mode in consistent(self.contacts, choices):
-            attempt = self._headed(bodies, mode, still, trial)
+            attempt = self._headed(bodies, mode, resting_mask, trial)
             if attempt is None:
                 continue
             solution, headed = attempt
             normals = pressing(headed, bodies.touching, solution.force, solution.splits)[self.equations.pressing]
             apart = (
-                self._kept(k, headed[k], still[k], bodies, solution, float(normals[k]), free)
+                self._kept(k, headed[k], resting_mask[k], bodies, solution, float(normals[k]), free)
                 for k in range(len(mode))
-                if closed[k]
+                if closed_mask[k]
             )
             if (least := min(apart, default=np.inf)) >= -SLACK:
                 (shared if solution.loose else unique).insert(0, (max(least, 0.0), solution, headed))
         kept = shared + unique
         if not kept:
             raise Refused("nothing that the contacts can do keeps all inequalities of contact")
-        return sorted(kept, key=lambda one: -one[0])
+        return sorted(kept, key=lambda candidate: -candidate[0])
 
     def _exchanged(
         self,
         bodies: BodiesState,
         choices: Sequence[Sequence[Acting]],
-        still: Sequence[bool],
+        resting_mask: Sequence[bool],
         trial: Trial,
         free: float,
     ) -> tuple[float, BodiesSolution, ContactMode] | None:
@@ -245,15 +246,15 @@ class ContactBodies(ContactStretches):
 
         The first mode has all contacts closed, those that may stick sticking.
         """
-        mode = [next((each for each in options if each.kind != "open"), OPEN) for options in choices]
+        mode = [next((option for option in options if option.kind != "open"), OPEN) for options in choices]
         for _ in range(_PIVOTS * (1 + len(mode))):
-            attempt = self._headed(bodies, tuple(mode), still, trial)
+            attempt = self._headed(bodies, tuple(mode), resting_mask, trial)
             if attempt is None:
                 return None
             solution, headed = attempt
             normals = pressing(headed, bodies.touching, solution.force, solution.splits)[self.equations.pressing]
             kept = [
-                self._kept(k, headed[k], still[k], bodies, solution, float(normals[k]), free)
+                self._kept(k, headed[k], resting_mask[k], bodies, solution, float(normals[k]), free)
                 if len(options) > 1
                 else np.inf
                 for k, options in enumerate(choices)
@@ -270,32 +271,32 @@ class ContactBodies(ContactStretches):
             follow(self.contacts, mode, choices)
         return None
 
-    def _candidates(self, k: int, own: Acting, still: bool, slip: Array) -> Iterator[Acting]:
+    def _candidates(self, k: int, acting: Acting, at_rest: bool, slip: Array) -> Iterator[Acting]:
         """Candidate modes of a contact; ``slip``: along its slip, of any length."""
         mu, bound = self.equations.friction[k], self.equations.bounds[k]
-        if own.kind == "open" or self.contacts[k].presses:
+        if acting.kind == "open" or self.contacts[k].presses:
             yield OPEN
-        if own.kind == "open":
+        if acting.kind == "open":
             return
-        if not still and np.isinf(mu):
+        if not at_rest and np.isinf(mu):
             name = self.contacts[k].name
             raise Refused(f"{name} would slip, but has friction = inf; give it a number")
-        if not still or not (mu or bound):
+        if not at_rest or not (mu or bound):
             x, y, z = (slip / (float(np.linalg.norm(slip)) or 1.0)).tolist()
-            yield Acting("slip", None if own.along is None else (x, y, z), (x, y, z))
+            yield Acting("slip", None if acting.along is None else (x, y, z), (x, y, z))
             return
-        yield Acting("stick", own.along)
+        yield Acting("stick", acting.along)
         if np.isinf(mu):
             return
-        if own.along is None:
+        if acting.along is None:
             yield Acting("slip")
         else:
-            x, y, z = own.along
+            x, y, z = acting.along
             yield Acting("slip", (x, y, z), (x, y, z))
             yield Acting("slip", (-x, -y, -z), (-x, -y, -z))
 
     def _headed(
-        self, bodies: BodiesState, mode: ContactMode, still: Sequence[bool], trial: Trial
+        self, bodies: BodiesState, mode: ContactMode, resting_mask: Sequence[bool], trial: Trial
     ) -> tuple[BodiesSolution, ContactMode] | None:
         """Solution and mode of a candidate, with unknown slip directions solved for.
 
@@ -303,8 +304,8 @@ class ContactBodies(ContactStretches):
         """
         from scipy.optimize import root
 
-        frames = [frame_of_axis(each.normal) for each in bodies.touching]
-        unknown = [k for k, own in enumerate(mode) if own.kind == "slip" and own.heading is None]
+        frames = [frame_of_axis(touch.normal) for touch in bodies.touching]
+        unknown = [k for k, acting in enumerate(mode) if acting.kind == "slip" and acting.heading is None]
 
         def directions(angles: Array) -> list[Array]:
             return [
@@ -313,10 +314,10 @@ class ContactBodies(ContactStretches):
             ]
 
         def tried(angles: Array) -> BodiesSolution:
-            known = dict(zip(unknown, directions(angles), strict=True))
+            given_headings = dict(zip(unknown, directions(angles), strict=True))
             headings = [
-                known.get(k, None if own.heading is None or not mu else np.array(own.heading))
-                for k, (own, mu) in enumerate(zip(mode, self.equations.friction, strict=True))
+                given_headings.get(k, None if acting.heading is None or not mu else np.array(acting.heading))
+                for k, (acting, mu) in enumerate(zip(mode, self.equations.friction, strict=True))
             ]
             return trial(mode, headings)
 
@@ -325,13 +326,16 @@ class ContactBodies(ContactStretches):
             across_slide = zip(unknown, directions(angles), strict=True)
             return np.array([float(cross(way, slides[k]) @ bodies.touching[k].normal) for k, way in across_slide])
 
-        first = tried(np.zeros(len(unknown)))
-        begins = (own.kind == "slip" and rub and rests for own, rub, rests in zip(mode, self._rubs, still, strict=True))
-        if first.loose and any(begins):
+        initial = tried(np.zeros(len(unknown)))
+        begins = (
+            acting.kind == "slip" and rub and rests
+            for acting, rub, rests in zip(mode, self._rubs, resting_mask, strict=True)
+        )
+        if initial.loose and any(begins):
             return None  # whatever the directions are
         if not unknown:
-            return first, mode
-        loose = first.slide
+            return initial, mode
+        loose = initial.slide
         start = np.array([float(np.arctan2(frames[k][:, 1] @ loose[k], frames[k][:, 0] @ loose[k])) for k in unknown])
         for turn in (0.0, 1.0, -1.0, 2.0, -2.0):
             answer = root(sideways, start + turn, tol=1e-15)
@@ -340,7 +344,8 @@ class ContactBodies(ContactStretches):
             ahead = all(float(way @ solution.slide[k]) > 0 for k, way in ways.items())
             if np.abs(answer.fun).max() <= SLACK * size and ahead:
                 headed = (
-                    Acting("slip", None, direction_of(ways[k])) if k in ways else own for k, own in enumerate(mode)
+                    Acting("slip", None, direction_of(ways[k])) if k in ways else acting
+                    for k, acting in enumerate(mode)
                 )
                 return solution, tuple(headed)
         return None
@@ -348,30 +353,30 @@ class ContactBodies(ContactStretches):
     def _kept(
         self,
         k: int,
-        own: Acting,
-        still: bool,
+        acting: Acting,
+        at_rest: bool,
         bodies: BodiesState,
         solution: BodiesSolution,
         normal: float,
         free: float,
     ) -> float:
         """Margin of a contact's inequalities, relative to forces or speeds; negative: one is violated."""
-        each, mu, bound = bodies.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
+        touch, mu, bound = bodies.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
         size_f, size_s = float(np.abs(solution.force).max()), max(float(np.abs(solution.slide).max()), free) or 1.0
-        if own.kind == "open":
+        if acting.kind == "open":
             return float(solution.parting[k]) / size_s if self.contacts[k].pressed_by is None else np.inf
         normal = np.inf if bound else normal
         if not size_f:
             return np.inf
-        if own.kind == "stick":
+        if acting.kind == "stick":
             force = solution.force[k]
-            held = float(np.linalg.norm(force - each.normal * (each.normal @ force)))
+            friction = float(np.linalg.norm(force - touch.normal * (touch.normal @ force)))
             most = bound or self.equations.static[k] * normal
-            return min(normal, most - held if np.isfinite(mu) else np.inf) / size_f
-        if not still or not (mu or bound):
+            return min(normal, most - friction if np.isfinite(mu) else np.inf) / size_f
+        if not at_rest or not (mu or bound):
             return normal / size_f
-        assert own.heading is not None  # known by now
-        return min(normal / size_f, float(np.dot(own.heading, solution.slide[k])) / size_s)
+        assert acting.heading is not None  # known by now
+        return min(normal / size_f, float(np.dot(acting.heading, solution.slide[k])) / size_s)
 
     def forces(self, state: Array, mode: ContactMode) -> tuple[Array, Array]:
         """Contact forces [N], (contacts, 3), and wrenches on the bodies about their centres of mass, (bodies, 6)."""

@@ -47,8 +47,8 @@ class BodySymbols:
         self._equations, self._bodies = equations, equations.equations.equations
         self._kept = equations.equations.independent_rows()
         self._touchings = len(equations.mechanism.contacts)
-        self._laws = [each for each in equations.contacts if isinstance(each, JointContact)]
-        self._frictions = [each for each in equations.contacts if isinstance(each, TurningFriction)]
+        self._laws = [contact for contact in equations.contacts if isinstance(contact, JointContact)]
+        self._frictions = [contact for contact in equations.contacts if isinstance(contact, TurningFriction)]
         self._alone = self._touchings + len(self._laws)  # contacts without friction against turning
 
     @property
@@ -82,26 +82,27 @@ class BodySymbols:
             for k, sign in zip(numbers_of_limits, clamped, strict=False)
         ]
         efforts = {k: effort for k, (effort, _) in limited_ones}
-        now = e.at(state[:-1], functions, Switched(clamped=efforts), time=state[-1])
+        motion = e.at(state[:-1], functions, Switched(clamped=efforts), time=state[-1])
         limits = [*(guard for _, (_, guard) in limited_ones), *kink_guards(kinks)]
         numbers = [law.joint.number for law in self._laws]
-        at = _Now(now.views, e.rate_rows(state[:-1], numbers, functions))
-        touching = [*self._touching(now.views, features_of(mode), functions), *self._of_joints(state, at)]
+        instant = _Now(motion.views, e.rate_rows(state[:-1], numbers, functions))
+        touching = [*self._touching(motion.views, features_of(mode), functions), *self._of_joints(state, instant)]
         turns = [(friction, touching[friction.pressed_by]) for friction in self._frictions]
-        touching += [of_turning(friction, touch, self._relative(friction, at)) for friction, touch in turns]
-        at = at._replace(pressing=[touch for _, touch in turns])
-        joints = [now.rows[k] for k in self._kept]
-        held = [(row.coefficients, row.bias) for row in joints]
-        mass = self._mass(now.drives)
+        touching += [of_turning(friction, touch, self._relative(friction, instant)) for friction, touch in turns]
+        instant = instant._replace(pressing=[touch for _, touch in turns])
+        joints = [motion.rows[k] for k in self._kept]
+        joint_rows = [(row.coefficients, row.bias) for row in joints]
+        mass = self._mass(motion.drives)
         lines = [
             start
             if start is None or self._touchings <= k < self._alone or mode[k].leads
-            else self._line(k, touching[k], start, at, (mass, held), functions)
+            else self._line(k, touching[k], start, instant, (mass, joint_rows), functions)
             for k, start in enumerate(began)
         ]
-        rows, pushes, aims = [row for row, _ in held], [row for row, _ in held], [sub(0.0, bias) for _, bias in held]
-        force = list(now.force)
-        for row, inertia in now.drives:
+        rows, pushes = [row for row, _ in joint_rows], [row for row, _ in joint_rows]
+        aims = [sub(0.0, bias) for _, bias in joint_rows]
+        force = list(motion.force)
+        for row, inertia in motion.drives:
             for n, value in row.coefficients.items():
                 force[n] = sub(force[n], mul(inertia, mul(value, row.bias)))
         owner: list[tuple[int, Vector]] = []
@@ -109,44 +110,47 @@ class BodySymbols:
         turning = TurningMoments(mode, contacts, touching, lines, root)
 
         def row_of(k: int, direction: Vector) -> Row:
-            return self._row(k, touching[k], direction, at)
+            return self._row(k, touching[k], direction, instant)
 
-        for k, (own, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
-            if own.kind == "open":
+        for k, (acting, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
+            if acting.kind == "open":
                 continue
-            part = rows_of(own.kind, touch, line, contacts[k], root)
-            rate = self._bias(k, touch, at)
-            if line is not None and own.kind == "slip" and (bound := float(self._equations.bounds[k])):
-                for n, value in self._row(k, touch, scaled(-bound, line), at).items():
+            part = rows_of(acting.kind, touch, line, contacts[k], root)
+            rate = self._bias(k, touch, instant)
+            if line is not None and acting.kind == "slip" and (bound := float(self._equations.bounds[k])):
+                for n, value in self._row(k, touch, scaled(-bound, line), instant).items():
                     force[n] = add(force[n], value)
-            for direction, along in zip(part.directions, part.along, strict=True):
-                rows.append(self._row(k, touch, direction, at))
-                pushes.append(turning.pushed(self._row(k, touch, along, at), len(owner), k, along, row_of))
-                beyond = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
+            for direction, push in zip(part.directions, part.along, strict=True):
+                rows.append(self._row(k, touch, direction, instant))
+                pushes.append(turning.pushed(self._row(k, touch, push, instant), len(owner), k, push, row_of))
+                beyond = dot(touch.normal_rate, touch.slide) if acting.kind == "slip" else 0.0
                 aims.append(sub(sub(0.0, dot(direction, rate)), beyond))
-                owner.append((k, along))
+                owner.append((k, push))
         (answer,), pivots = self._eliminated(mass, rows, pushes, [[*force, *aims]])
         response: Scalar = 1.0
-        if any(own.kind == "slip" and mu for own, mu in zip(mode, self._equations.friction, strict=True)):
+        if any(acting.kind == "slip" and mu for acting, mu in zip(mode, self._equations.friction, strict=True)):
             smooth = self._eliminated(mass, rows, rows, [])[1]
-            for one, other in zip(pivots[e.nu :], smooth[e.nu :], strict=True):
-                response = mul(response, one / other)
-        forces: list[Vector | None] = [None if own.kind == "open" else [0.0, 0.0, 0.0] for own in mode]
-        for (k, along), size in zip(owner, answer[e.nu + len(held) :], strict=True):
+            for pivot, smooth_pivot in zip(pivots[e.nu :], smooth[e.nu :], strict=True):
+                response = mul(response, pivot / smooth_pivot)
+        forces: list[Vector | None] = [None if acting.kind == "open" else [0.0, 0.0, 0.0] for acting in mode]
+        for (k, push), size in zip(owner, answer[e.nu + len(joint_rows) :], strict=True):
             own_force = forces[k]
             assert own_force is not None  # its owner is closed
-            forces[k] = plus(own_force, scaled(size, along))
-        turning.add_to(forces, answer[e.nu + len(held) :])
-        moved = [plus(self._moved(k, touch, answer, at), self._bias(k, touch, at)) for k, touch in enumerate(touching)]
+            forces[k] = plus(own_force, scaled(size, push))
+        turning.add_to(forces, answer[e.nu + len(joint_rows) :])
+        moved = [
+            plus(self._moved(k, touch, answer, instant), self._bias(k, touch, instant))
+            for k, touch in enumerate(touching)
+        ]
         return SolvedSymbols(
-            rates=[*now.rate, *answer[: e.nu], *now.angle_rate],
+            rates=[*motion.rate, *answer[: e.nu], *motion.angle_rate],
             touching=touching,
             lines=lines,
             forces=forces,
             response=response,
             slide_rates=moved,
             within_limits=limits,
-            poses=self._poses(now.views)[:-1],
+            poses=self._poses(motion.views)[:-1],
             efforts=[efforts.get(k, self._wanted(state, k, functions)) for k in range(len(e.mechanism.actuators))],
             drives=None if e.mechanism.prescribed or e.mechanism.loops or e.mechanism.couplings else (),
         )
@@ -181,55 +185,55 @@ class BodySymbols:
         root = functions["sqrt"]
         return [touch_in_scalars(contact, bodies[a], bodies[b], root, feature) for contact, (a, b), feature in pairs]
 
-    def _of_joints(self, state: Sequence[Scalar], at: _Now) -> list[ScalarTouch]:
+    def _of_joints(self, state: Sequence[Scalar], instant: _Now) -> list[ScalarTouch]:
         """Laws of joints as contacts."""
-        pairs = zip(self._laws, at.laws, strict=True)
+        pairs = zip(self._laws, instant.laws, strict=True)
         return [of_joint(law, *self._along(state, law.joint.number, row)) for law, row in pairs]
 
-    def _row(self, k: int, touch: ScalarTouch, direction: Vector, now: _Now) -> Row:
+    def _row(self, k: int, touch: ScalarTouch, direction: Vector, instant: _Now) -> Row:
         """Coefficients, along the velocities, of a contact's slide in a direction."""
         row: Row = {}
         if k >= self._alone:
-            friction, pressing = self._frictions[k - self._alone], now.pressing[k - self._alone]
+            friction, pressing = self._frictions[k - self._alone], instant.pressing[k - self._alone]
             way = resisted(friction, pressing, direction)
             for body, sign in zip(self._equations.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
                 if body < 0:
                     continue
-                entries = self._bodies.bodies[body].projected(now.views[body], [0.0, 0.0, 0.0], scaled(sign, way))
-                for at, entry in enumerate(entries, self._bodies.u_slices[body].start):
-                    row[at] = add(row.get(at, 0.0), entry)
-            return {at: entry for at, entry in row.items() if not is_zero(entry)}
+                entries = self._bodies.bodies[body].projected(instant.views[body], [0.0, 0.0, 0.0], scaled(sign, way))
+                for column, entry in enumerate(entries, self._bodies.u_slices[body].start):
+                    row[column] = add(row.get(column, 0.0), entry)
+            return {column: entry for column, entry in row.items() if not is_zero(entry)}
         if k >= self._touchings:
             part = dot(floats(self._laws[k - self._touchings].direction), direction)
-            moves = now.laws[k - self._touchings].coefficients
+            moves = instant.laws[k - self._touchings].coefficients
             return {} if is_zero(part) else {n: mul(part, value) for n, value in moves.items()}
-        views = now.views
+        views = instant.views
         for body, sign in zip(self._equations.pairs[k], (1.0, -1.0), strict=True):
             if body < 0:
                 continue
             arm, way = minus(touch.place, views[body].r), scaled(sign, direction)
             entries = self._bodies.bodies[body].projected(views[body], way, cross(arm, way))
-            for at, entry in enumerate(entries, self._bodies.u_slices[body].start):
-                row[at] = add(row.get(at, 0.0), entry)
-        return {at: entry for at, entry in row.items() if not is_zero(entry)}
+            for column, entry in enumerate(entries, self._bodies.u_slices[body].start):
+                row[column] = add(row.get(column, 0.0), entry)
+        return {column: entry for column, entry in row.items() if not is_zero(entry)}
 
-    def _relative(self, friction: TurningFriction, now: _Now) -> Vector:
+    def _relative(self, friction: TurningFriction, instant: _Now) -> Vector:
         """Angular velocity of the first body of a contact relative to the second."""
-        return minus(*(now.views[body].w for body in self._equations.pairs[friction.pressed_by]))
+        return minus(*(instant.views[body].w for body in self._equations.pairs[friction.pressed_by]))
 
-    def _moved(self, k: int, touch: ScalarTouch, u: Sequence[Scalar], now: _Now) -> list[Scalar]:
+    def _moved(self, k: int, touch: ScalarTouch, u: Sequence[Scalar], instant: _Now) -> list[Scalar]:
         """Slide of a contact by velocities u, or its rate by accelerations."""
-        rows = [self._row(k, touch, axis, now) for axis in AXES]
-        return [add(*(mul(value, u[at]) for at, value in row.items())) for row in rows]
+        rows = [self._row(k, touch, axis, instant) for axis in AXES]
+        return [add(*(mul(value, u[column]) for column, value in row.items())) for row in rows]
 
-    def _bias(self, k: int, touch: ScalarTouch, now: _Now) -> Vector:
+    def _bias(self, k: int, touch: ScalarTouch, instant: _Now) -> Vector:
         """Rate of a contact's slide while the velocities stay."""
         if k >= self._alone:
-            friction, pressing = self._frictions[k - self._alone], now.pressing[k - self._alone]
-            return resisted_rate(friction, pressing, self._relative(friction, now))
+            friction, pressing = self._frictions[k - self._alone], instant.pressing[k - self._alone]
+            return resisted_rate(friction, pressing, self._relative(friction, instant))
         if k >= self._touchings:
-            return scaled(now.laws[k - self._touchings].bias, floats(self._laws[k - self._touchings].direction))
-        a, b = (now.views[body] for body in self._equations.pairs[k])
+            return scaled(instant.laws[k - self._touchings].bias, floats(self._laws[k - self._touchings].direction))
+        a, b = (instant.views[body] for body in self._equations.pairs[k])
         return minus(*(cross(view.w, minus(touch.place_rate, view.v)) for view in (a, b)))
 
     def _line(
@@ -237,16 +241,16 @@ class BodySymbols:
         k: int,
         touch: ScalarTouch,
         start: Vector,
-        now: _Now,
+        instant: _Now,
         bodies: tuple[Sequence[Row], Sequence[tuple[Row, Scalar]]],
         functions: Any,
     ) -> Vector:
         """Present direction of the only line along which a contact can slide: where a force across would move it."""
-        push, (mass, held) = self._row(k, touch, touch.across(start), now), bodies
-        right = [push.get(at, 0.0) for at in range(self._bodies.nu)] + [0.0] * len(held)
-        joints = [row for row, _ in held]
+        push, (mass, joint_rows) = self._row(k, touch, touch.across(start), instant), bodies
+        right = [push.get(column, 0.0) for column in range(self._bodies.nu)] + [0.0] * len(joint_rows)
+        joints = [row for row, _ in joint_rows]
         (answer,), _ = self._eliminated(mass, joints, joints, [right])
-        way = touch.across(self._moved(k, touch, answer, now))
+        way = touch.across(self._moved(k, touch, answer, instant))
         return scaled(1.0 / functions["sqrt"](dot(way, way)), way)
 
     def _mass(self, drives: Sequence[Drive]) -> list[Row]:
@@ -256,8 +260,8 @@ class BodySymbols:
         ]
         for row, inertia in drives:
             for i, value in row.coefficients.items():
-                for j, other in row.coefficients.items():
-                    mass[i][j] = add(mass[i].get(j, 0.0), mul(inertia, mul(value, other)))
+                for j, factor in row.coefficients.items():
+                    mass[i][j] = add(mass[i].get(j, 0.0), mul(inertia, mul(value, factor)))
         return mass
 
     def _eliminated(
@@ -266,6 +270,6 @@ class BodySymbols:
         """Solutions and pivots of M u̇ − pushesᵀ z = loads, rows u̇ = aims."""
         system: list[Row] = [dict(row) for row in mass]
         for number, push in enumerate(pushes, self._bodies.nu):
-            for at, value in push.items():
-                system[at][number] = scaled(-1.0, [value])[0]
+            for place, value in push.items():
+                system[place][number] = scaled(-1.0, [value])[0]
         return eliminated([*system, *(dict(row) for row in rows)], rights)

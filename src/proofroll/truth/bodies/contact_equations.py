@@ -134,21 +134,21 @@ class ContactEquations:
             R, v, w = (np.array(part, dtype=float) for part in (view.R, view.v, view.w))
             arm = R @ com
             bodies.append(Moving(np.array(view.r) - arm, R, v - cross(w, arm), w))
-        given = [None] * len(self.pairs) if features is None else features[: len(self.pairs)]
-        pairs = zip(self.mechanism.contacts, self.pairs, given, strict=True)
+        feature_numbers = [None] * len(self.pairs) if features is None else features[: len(self.pairs)]
+        pairs = zip(self.mechanism.contacts, self.pairs, feature_numbers, strict=True)
         touching = tuple(touch(c, bodies[a], bodies[b], feature) for c, (a, b), feature in pairs)
         J, rates = np.zeros((len(self.contacts), 3, e.nu)), np.zeros((len(self.contacts), 3))
-        for k, (pair, each) in enumerate(zip(self.pairs, touching, strict=True)):
+        for k, (pair, point) in enumerate(zip(self.pairs, touching, strict=True)):
             for body, sign in zip(pair, (1.0, -1.0), strict=True):
-                if body < 0 or each.absent:
+                if body < 0 or point.absent:
                     continue
                 view = constrained.views[body]
-                arm = each.place - np.array(view.r)
+                arm = point.place - np.array(view.r)
                 for row, axis in zip(J[k], _AXES, strict=True):
                     entries = e.bodies[body].projected(view, axis.tolist(), cross(arm, axis).tolist())
                     row[e.u_slices[body]] += sign * np.array(entries, dtype=float)
                 # ω × (ω × arm) of the material point, and ω × the velocity of the contact point relative to it
-                rates[k] += sign * cross(view.w, each.place_rate - np.array(view.v))
+                rates[k] += sign * cross(view.w, point.place_rate - np.array(view.v))
         numbers = [contact.joint.number for contact in self._of_joints]
         coordinates = zip(*self.equations.along(state[:-1], numbers), strict=True) if numbers else ()
         moves = e.rate_rows(state[:-1].tolist(), numbers)
@@ -160,7 +160,7 @@ class ContactEquations:
         speeds = (float(np.linalg.norm(np.array(view.w, dtype=float))) for view in constrained.views)
         fastest = max(speeds) if self._turning else 0.0
         for friction in self._turning:
-            k, there = len(touching), touching[friction.pressed_by]
+            k, pressing_touch = len(touching), touching[friction.pressed_by]
             rows, relative = np.zeros((3, e.nu)), np.zeros(3)
             for body, sign in zip(self.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
                 if body < 0:
@@ -170,9 +170,9 @@ class ContactEquations:
                 for row, axis in zip(rows, _AXES, strict=True):
                     entries = e.bodies[body].projected(view, [0.0, 0.0, 0.0], axis.tolist())
                     row[e.u_slices[body]] += sign * np.array(entries, dtype=float)
-            touching += (friction.touching(there, relative),)
-            J[k] = friction.resisted(there.normal, rows)
-            rates[k] = friction.resisted_rate(there, relative, np.zeros(3), fastest)
+            touching += (friction.touching(pressing_touch, relative),)
+            J[k] = friction.resisted(pressing_touch.normal, rows)
+            rates[k] = friction.resisted_rate(pressing_touch, relative, np.zeros(3), fastest)
         mass = np.asarray(np.linalg.inv(half @ half.T), dtype=np.float64)
         C, bias = independent(C, bias, self.equations.rank)
         centres = np.array([view.r for view in constrained.views], dtype=float)
@@ -193,19 +193,21 @@ class ContactEquations:
 
     def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
         """Accelerations and forces while each contact keeps its mode."""
-        if any(own.along for own in mode):
+        if any(acting.along for acting in mode):
             pairs = zip(self.contacts, self.responses(state), strict=True)
             lines = [line_response(contact, G, state.touching) for contact, G in pairs]
             mode = tuple(map(turned, mode, state.touching, lines))
-        wanted = [
-            -held @ bias - (each.normal_rate @ each.slide if own.kind == "slip" else 0.0)
-            for held, own, each, bias in zip(self._held(state, mode), mode, state.touching, state.bias, strict=True)
+        aims = [
+            -directions @ bias - (point.normal_rate @ point.slide if acting.kind == "slip" else 0.0)
+            for directions, acting, point, bias in zip(
+                self._held(state, mode), mode, state.touching, state.bias, strict=True
+            )
         ]
         rubs = self.friction + self.bounds > 0
-        headings = [heading_of(own, each) if own.kind == "slip" and rub else None
-                    for own, each, rub in zip(mode, state.touching, rubs, strict=True)]  # fmt: skip
-        turning = np.array([each.normal_rate @ each.slide for each in state.touching])
-        return self._solved(state, mode, headings, wanted, state.force, -state.of_joints, state.bias, turning)
+        headings = [heading_of(acting, point) if acting.kind == "slip" and rub else None
+                    for acting, point, rub in zip(mode, state.touching, rubs, strict=True)]  # fmt: skip
+        turning = np.array([point.normal_rate @ point.slide for point in state.touching])
+        return self._solved(state, mode, headings, aims, state.force, -state.of_joints, state.bias, turning)
 
     def responses(self, state: BodiesState) -> Array:
         """Rates of each contact's slide by unit forces on it, other contacts open, (contacts, 3, 3)."""
@@ -214,8 +216,8 @@ class ContactEquations:
         if len(state.C):
             joints = np.linalg.solve(root, state.C.T)
             ways = ways - joints @ np.linalg.lstsq(joints, ways, rcond=RANK)[0]
-        each = ways.T.reshape(*state.J.shape)
-        return np.asarray(each @ each.swapaxes(1, 2))
+        scaled_rows = ways.T.reshape(*state.J.shape)
+        return np.asarray(scaled_rows @ scaled_rows.swapaxes(1, 2))
 
     def coupled_responses(self, state: BodiesState, which: Sequence[int]) -> tuple[Array, Array]:
         """Changes of the velocities (nu, 3 contacts) and slides (3 contacts, 3 contacts) by unit impulses on contacts.
@@ -234,8 +236,8 @@ class ContactEquations:
     def _held(self, state: BodiesState, mode: ContactMode) -> list[Array]:
         """Directions in which each contact constrains the sliding velocity."""
         return [
-            held_directions(own, each, contact.presses)
-            for own, each, contact in zip(mode, state.touching, self.contacts, strict=True)
+            held_directions(acting, point, contact.presses)
+            for acting, point, contact in zip(mode, state.touching, self.contacts, strict=True)
         ]
 
     def _solved(
@@ -243,33 +245,35 @@ class ContactEquations:
         state: BodiesState,
         mode: ContactMode,
         headings: Sequence[Array | None],
-        wanted: Sequence[Array],
+        targets: Sequence[Array],
         right: Array,
         of_joints: Array,
         bias: Array,
         beyond: Array,
     ) -> BodiesSolution:
-        """Solution x of M x − Cᵀλ − Dᵀz = right, C x = of_joints, K x = wanted."""
-        rows, along, aims, owner = [state.C], [state.C], [of_joints], list[tuple[int, Array]]()
+        """Solution x of M x − Cᵀλ − Dᵀz = right, C x = of_joints, K x = targets."""
+        rows, pushes, aims, owner = [state.C], [state.C], [of_joints], list[tuple[int, Array]]()
         force, turning = np.zeros((len(mode), 3)), list[tuple[int, int, Array]]()
-        for k, held in enumerate(self._held(state, mode)):
-            rows.append(held @ state.J[k])
-            aims.append(wanted[k])
+        for k, constrained in enumerate(self._held(state, mode)):
+            rows.append(constrained @ state.J[k])
+            aims.append(targets[k])
             heading = headings[k] if mode[k].kind == "slip" else None
-            directions = held
+            directions = constrained
             by = self.contacts[k].pressed_by
             if heading is not None and by is not None:
                 turning.append((k, by, -self.friction[k] * heading))
             elif heading is not None:
                 force[k] = -self.bounds[k] * heading
-                directions = held - self.friction[k] * heading
-            along.append(directions @ state.J[k])
+                directions = constrained - self.friction[k] * heading
+            pushes.append(directions @ state.J[k])
             owner += [(k, direction) for direction in directions]
         right = right + np.einsum("kin,ki->n", state.J, force)
         if not owner:  # no contact holds anything: the rows of joints alone, which are independent
             x, none = accelerated_by(state.mass, right, state.C, of_joints), np.zeros((len(mode), 3, 0))
             slide = state.J @ x + bias
-            parting = np.array([each.normal @ rate for each, rate in zip(state.touching, slide, strict=True)]) + beyond
+            parting = (
+                np.array([point.normal @ rate for point, rate in zip(state.touching, slide, strict=True)]) + beyond
+            )
             return BodiesSolution(
                 mode=mode,
                 moved=x,
@@ -282,8 +286,8 @@ class ContactEquations:
                 spread=0.0,
                 shifts=none,
             )
-        K, D = np.concatenate(rows), np.concatenate(along)
-        moments = moments_by_pressing(turning, owner, [each.normal for each in state.touching])
+        K, D = np.concatenate(rows), np.concatenate(pushes)
+        moments = moments_by_pressing(turning, owner, [point.normal for point in state.touching])
         for k, place, moment in moments:
             D[len(state.C) + place] += moment @ state.J[k]
         nu, count = len(state.u), len(K)
@@ -315,7 +319,7 @@ class ContactEquations:
             force[k] += z[place] * moment
             shifts[k] += np.outer(moment, ways[nu + len(state.C) + place])
         slide = state.J @ x + bias
-        parting = np.array([each.normal @ rate for each, rate in zip(state.touching, slide, strict=True)]) + beyond
+        parting = np.array([point.normal @ rate for point, rate in zip(state.touching, slide, strict=True)]) + beyond
         spread = float(np.linalg.norm(ways[:nu]))
         return BodiesSolution(
             mode=mode,
@@ -334,9 +338,9 @@ class ContactEquations:
         """Forces of contacts between bodies, and wrenches on the bodies about their centres of mass, (bodies, 6)."""
         moments = force[len(force) - len(self._turning) :]
         wrenches, force = np.zeros((len(self.mechanism.bodies) + 1, 6)), force[: len(self.pairs)]
-        for pair, each, push in zip(self.pairs, state.touching, force, strict=False):
+        for pair, point, push in zip(self.pairs, state.touching, force, strict=False):
             for body, sign in zip(pair, (1.0, -1.0), strict=True):
-                wrenches[body] += sign * np.concatenate([push, cross(each.place - state.centres[body], push)])
+                wrenches[body] += sign * np.concatenate([push, cross(point.place - state.centres[body], push)])
         for friction, moment in zip(self._turning, moments, strict=True):
             for body, sign in zip(self.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
                 wrenches[body, 3:] += sign * moment
@@ -353,8 +357,8 @@ class ContactEquations:
         """Efforts with a limit before they are clamped, in parts of their limits."""
         if not self.limited:
             return np.zeros(0)
-        along = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
-        motors = zip(self.limited.values(), *along, strict=True)
+        drive_states = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
+        motors = zip(self.limited.values(), *drive_states, strict=True)
         return np.array([motor.wanted(state[-1], q, v) / motor.bound for motor, q, v in motors])
 
     def kinks(self, state: Array) -> Array:
@@ -380,12 +384,12 @@ class ContactEquations:
 
     def switched(self, state: Array, mode: ContactMode) -> Switched:
         """Joints that are held or slide with friction in a mode, and clamped efforts."""
-        own = mode_of_joints(self._switched, self.contacts, mode)
-        pairs = list(zip(self._switched, own, strict=True))
+        joint_modes = mode_of_joints(self._switched, self.contacts, mode)
+        pairs = list(zip(self._switched, joint_modes, strict=True))
         return self.clamped(state)._replace(
-            held=tuple(joint.number for joint, now in pairs if now in HOLDING),
-            stopped=tuple(joint.number for joint, now in pairs if now in STOPPED),
-            push={joint.number: joint.push(now) for joint, now in pairs if joint.push(now)},
+            held=tuple(joint.number for joint, joint_mode in pairs if joint_mode in HOLDING),
+            stopped=tuple(joint.number for joint, joint_mode in pairs if joint_mode in STOPPED),
+            push={joint.number: joint.push(joint_mode) for joint, joint_mode in pairs if joint.push(joint_mode)},
         )
 
     def eliminated(self, state: Array, mode: ContactMode) -> Array:
@@ -395,8 +399,8 @@ class ContactEquations:
         state = unit if np.abs(unit - state).max() > EXACT else state
         features = features_of(mode)
         presses, bodies = [contact.presses for contact in self.contacts], self.at(state, features)
-        closed = [k for k, own in enumerate(mode) if own.kind != "open" and presses[k]]
-        gaps = np.array([bodies.touching[k].gap for k in closed])
+        closed_contacts = [k for k, acting in enumerate(mode) if acting.kind != "open" and presses[k]]
+        gaps = np.array([bodies.touching[k].gap for k in closed_contacts])
         slides = forbidding_rows(mode, bodies.touching, bodies.J, presses) @ bodies.u
         left = np.abs(np.concatenate([bodies.residual, bodies.C @ bodies.u, gaps, slides])).max(initial=0.0)
         if left <= EXACT:
@@ -405,9 +409,9 @@ class ContactEquations:
         if not len(slides):
             return state
         bodies = self.at(state, features)
-        if closed:
-            normals = np.array([bodies.touching[k].normal @ bodies.J[k] for k in closed])
-            gaps = np.array([bodies.touching[k].gap for k in closed])
+        if closed_contacts:
+            normals = np.array([bodies.touching[k].normal @ bodies.J[k] for k in closed_contacts])
+            gaps = np.array([bodies.touching[k].gap for k in closed_contacts])
             back = least_motion(bodies.mass, bodies.C, normals, gaps)
             state[: e.nx] -= self.equations.moving(state[: e.nx], back)
             state = self.equations.normalised(state)

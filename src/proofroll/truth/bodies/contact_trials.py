@@ -12,32 +12,32 @@ from proofroll.truth.bodies.contact_equations import BodiesState, ContactEquatio
 from proofroll.truth.switching.contact_guards import Touchable
 
 
-def provisional(equations: ContactEquations, bodies: BodiesState, closed: Sequence[bool]) -> list[Acting]:
+def provisional(equations: ContactEquations, bodies: BodiesState, closed_mask: Sequence[bool]) -> list[Acting]:
     """Provisional mode of each contact: open, or stick, with its line if it can slide along a line only."""
     modes, responses = list[Acting](), equations.responses(bodies)
-    for contact, each, G, shut in zip(equations.contacts, bodies.touching, responses, closed, strict=True):
-        frame = frame_of_axis(each.normal)[:, [2, 0, 1]]
+    for contact, touch, G, shut in zip(equations.contacts, bodies.touching, responses, closed_mask, strict=True):
+        frame = frame_of_axis(touch.normal)[:, [2, 0, 1]]
         response = frame.T @ line_response(contact, G, bodies.touching) @ frame
         modes.append(first_mode("stick", frame, np.zeros(2), response) if shut else OPEN)
     return modes
 
 
-def next_trial(contact: Touchable, own: Acting, options: Sequence[Acting], force: Array, normal: float) -> Acting:
+def next_trial(contact: Touchable, acting: Acting, options: Sequence[Acting], force: Array, normal: float) -> Acting:
     """Next trial of a contact whose present one violates an inequality.
 
     Args:
         contact: its laws.
-        own: its present trial.
+        acting: its present trial.
         options: all its trials.
         force: on it in the present trial, (3,).
         normal: the normal force that bounds its friction.
     """
-    if own.kind == "open":
+    if acting.kind == "open":
         return options[1]
     if (normal < 0 or np.isinf(contact.friction)) and options[0].kind == "open":
         return OPEN
-    if own.kind == "slip":
-        return next((option for option in options if option.kind == "stick"), own)
+    if acting.kind == "slip":
+        return next((option for option in options if option.kind == "stick"), acting)
     slips = [option for option in options if option.kind == "slip"]
     return next((slip for slip in slips if slip.along and np.dot(slip.along, force) < 0), slips[-1])
 
@@ -59,5 +59,5 @@ def consistent(contacts: Sequence[Touchable], choices: Sequence[Sequence[Acting]
         mode = list(options)
         follow(contacts, mode, choices)
         # what is opened here counts once
-        if all(own == option or option == of[0] for own, option, of in zip(mode, options, choices, strict=True)):
+        if all(acting == option or option == of[0] for acting, option, of in zip(mode, options, choices, strict=True)):
             yield tuple(mode)

@@ -28,6 +28,6 @@ def accelerated_by(mass: Array, load: Array, C: Array, aims: Array) -> Array:
     root = np.linalg.cholesky(mass)
     free = np.linalg.solve(root, load)
     if len(C):
-        held, R = np.linalg.qr(np.linalg.solve(root, C.T))
-        free = free + held @ (np.linalg.solve(R.T, aims) - held.T @ free)
+        basis, R = np.linalg.qr(np.linalg.solve(root, C.T))
+        free = free + basis @ (np.linalg.solve(R.T, aims) - basis.T @ free)
     return np.asarray(np.linalg.solve(root.T, free))

@@ -141,12 +141,12 @@ class MaximalEquations:
         self._driving: dict[int, list[int]] = {}
         for number, actuator in enumerate(mechanism.actuators):
             self._driving.setdefault(mechanism.joint_index[actuator.joint], []).append(number)
-        held = {mechanism.joint_index[actuator.joint] for actuator in mechanism.actuators if actuator.kp}
+        driven_joints = {mechanism.joint_index[actuator.joint] for actuator in mechanism.actuators if actuator.kp}
         # a spring on an angle counts whole turns, which an attitude does not
         self.angles = [
             (k, n)
             for k, joint in enumerate(mechanism.joints)
-            if (joint.stiffness or joint.limits or k in held) and joint.kind in _COUNTED
+            if (joint.stiffness or joint.limits or k in driven_joints) and joint.kind in _COUNTED
             for n in range(joint.nq)
         ]
 

@@ -180,7 +180,7 @@ def _solution(
     A drive is an additional row with compliance 1/inertia. Accelerations u̇₀ of bodies without inertia, whose M is
     singular, are additional unknowns: C₀ᵀλ − M₀u̇₀ = −force₀.
     """
-    held, drives = len(rows), [*constrained.drives, *constrained.holders]
+    row_count, drives = len(rows), [*constrained.drives, *constrained.holders]
     rows = [*rows, *(drive.row for drive in drives)]
     blocks = _inverse_blocks(equations)
     free = [add(*(mul(value, constrained.force[k]) for k, value in block)) for block in blocks]
@@ -193,9 +193,9 @@ def _solution(
             shared = touching[i] & rows[j].coefficients.keys()
             if shared:
                 A[i, j] = add(*(mul(weighted[i][k], rows[j].coefficients[k]) for k in sorted(shared)))
-    for i, drive in enumerate(drives, held):
+    for i, drive in enumerate(drives, row_count):
         A[i, i] = add(A.get((i, i), 0.0), 1.0 / drive.inertia)
-    predecessors = _of_light_bodies(A, equations, rows, held)
+    predecessors = _of_light_bodies(A, equations, rows, row_count)
     right = [
         sub(sub(0.0, row.bias), add(*(mul(value, free[k]) for k, value in row.coefficients.items()))) for row in rows
     ]
@@ -207,15 +207,15 @@ def _solution(
             result[k] = add(result[k], mul(value, multiplier))
     for k, value in zip(equations.light, unknowns[m:], strict=True):
         result[k] = value
-    return result, unknowns[:held]
+    return result, unknowns[:row_count]
 
 
 def _of_light_bodies(
-    A: dict[tuple[int, int], Scalar], equations: MaximalEquations, rows: Sequence[ConstraintRow], held: int
+    A: dict[tuple[int, int], Scalar], equations: MaximalEquations, rows: Sequence[ConstraintRow], row_count: int
 ) -> dict[int, set[int]]:
     """Adds the columns of u̇₀ to A; returns the unknowns that must be eliminated before each unknown.
 
-    Drives come before the accelerations that they hold, and these before the multipliers of the first ``held`` rows.
+    Drives come before the accelerations that they hold, these before the multipliers of the first ``row_count`` rows.
     Then no pivot is zero, as M plus the drives is positive definite.
     """
     predecessors: dict[int, set[int]] = {}
@@ -223,7 +223,7 @@ def _of_light_bodies(
         for i, row in enumerate(rows):
             if k in row.coefficients:
                 A[p, i] = row.coefficients[k]
-                later, earlier = (i, p) if i < held else (p, i)
+                later, earlier = (i, p) if i < row_count else (p, i)
                 predecessors.setdefault(later, set()).add(earlier)
         for column, index in enumerate(equations.light[: p - len(rows) + 1], len(rows)):
             A[p, column] = -float(equations.mass_matrix[k, index])

@@ -201,12 +201,12 @@ def follow(
     happenings: list[Happening] = []
     margins, transitions = list[tuple[float, float]](), list[Transition[ModeT]]()
 
-    def path(known: bool, ended: str = "") -> HybridPath[SpanT]:
+    def path(complete: bool, ended: str = "") -> HybridPath[SpanT]:
         return HybridPath(
             stretches=tuple(stretches),
             happenings=tuple(happenings),
             margins=tuple(margins),
-            known=known,
+            known=complete,
             ended=ended,
             transitions=tuple(transitions),
         )
@@ -218,17 +218,17 @@ def follow(
         margins.append((time, change.margin))
         since = since + 1 if since or change.margin < close else 0
         if change.mode is None or since > _BEYOND:
-            return path(known=False)
+            return path(complete=False)
         end = next((corner for corner in breaks if time < corner < until), until)
         try:
             stretch = route.walk(time, change.state, change.mode, end)
         except (Diverged, Refused) as error:
             if not stretches:
                 raise
-            return path(known=False, ended=str(error))
+            return path(complete=False, ended=str(error))
         stretches.append(stretch)
         if stretch.guard is None and end == until:
-            return path(known=True)
+            return path(complete=True)
         standstills = standstills + 1 if stretch.end <= stretch.start else 0
         length = stretch.end - stretch.start
         if length > 0.0:
@@ -249,7 +249,7 @@ def follow(
             if not undecided and stretch.end <= 0:
                 raise
             ended = "" if undecided else str(error)
-            return path(known=False, ended=ended)
+            return path(complete=False, ended=ended)
 
 
 def _latest(happenings: Sequence[Happening]) -> str:

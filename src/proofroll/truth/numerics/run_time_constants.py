@@ -34,8 +34,8 @@ class Constants:
         number: value -> symbol of a number.
     """
 
-    def __init__(self, parameter: Callable[[int], Any], first: int, number: Callable[[float], Any]) -> None:
-        self._parameter, self._first, self._number = parameter, first, number
+    def __init__(self, parameter: Callable[[int], Any], start: int, number: Callable[[float], Any]) -> None:
+        self._parameter, self._first, self._number = parameter, start, number
         self._indices: dict[float | _Coefficient, int] = {}
         self._functions: dict[str, Callable[[Any], Any]] = {}
 

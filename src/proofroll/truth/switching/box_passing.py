@@ -37,13 +37,13 @@ def passed_boxes(
         NotUnique: other faces meet while the boxes touch, or a corner meets a side below an edge.
     """
     (k, border), (state, ahead) = guard, states
-    closed, features, time = closed_in(mode), list(features_of(mode)), float(state[-1])
+    closed_mask, features, time = closed_in(mode), list(features_of(mode)), float(state[-1])
     group = [number for number, contact in enumerate(contacts) if contact.pair == contacts[k].pair]
     nearest = touching(ahead, None)
     if isinstance(contacts[k].box_slot, BoxSlot):
-        there = touching(ahead, tuple(bits | (number in group) for number, bits in enumerate(features)))
-        inside = {number for number in group if there[number].borders[0].left_by > 0}
-        if border and any(closed[number] for number in inside):
+        touching_beyond = touching(ahead, tuple(bits | (number in group) for number, bits in enumerate(features)))
+        inside = {number for number in group if touching_beyond[number].borders[0].left_by > 0}
+        if border and any(closed_mask[number] for number in inside):
             raise NotUnique(
                 f"the boxes of {contacts[k].pair} have turned so far at t = {time:.6g} s that other faces meet than "
                 "those that touch, and what their corners and edges do then is not followed; end before"
@@ -52,12 +52,12 @@ def passed_boxes(
     for number in group:
         of_boxes = isinstance(contacts[k].box_slot, BoxSlot) and not border
         features[number] = same[number] if of_boxes else nearest[number].feature
-    here = touching(state, tuple(features))
+    touching_now = touching(state, tuple(features))
     for number in group:
-        touch = here[number]
+        touch = touching_now[number]
         if touch.absent:
-            closed[number] = False
-        elif not closed[number]:
+            closed_mask[number] = False
+        elif not closed_mask[number]:
             slot = contacts[number].box_slot
             assert slot is not None  # as of all of the pair
             if not slot.strikes_sides and touch.gap < -_TOUCHES * size:
@@ -65,8 +65,8 @@ def passed_boxes(
                     f"a corner of {contacts[k].pair} meets a side of the other box at t = {time:.6g} s, below its "
                     "edge, which is not followed; end before"
                 )
-            closed[number] = bool(max(abs(touch.gap) / size, abs(float(touch.normal @ touch.slide))) <= _TOUCHES)
-    return list(np.array(closed, dtype=bool).tolist()), tuple(features)
+            closed_mask[number] = bool(max(abs(touch.gap) / size, abs(float(touch.normal @ touch.slide))) <= _TOUCHES)
+    return list(np.array(closed_mask, dtype=bool).tolist()), tuple(features)
 
 
 def beside_border(

@@ -97,33 +97,33 @@ class SolvedContacts(NamedTuple):
 def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactGuard]:
     """Guards of a mode, in an order that both routes share."""
     guards: list[ContactGuard] = []
-    on_stops = off_stops(contacts, [own.kind != "open" for own in mode])
-    for k, (contact, own) in enumerate(zip(contacts, mode, strict=True)):
+    on_stops = off_stops(contacts, [acting.kind != "open" for acting in mode])
+    for k, (contact, acting) in enumerate(zip(contacts, mode, strict=True)):
         features = contact.features if isinstance(contact, BodyContact) else None
         if features is not None:
-            borders = features.borders(own.feature, 0.0, 0.0, 0.0)
+            borders = features.borders(acting.feature, 0.0, 0.0, 0.0)
             guards += [ContactGuard(k, "pass", number) for number in range(len(borders))]
         slot = contact.box_slot if isinstance(contact, BodyContact) else None
         if slot is not None:
             guards += [ContactGuard(k, "pass", number) for number in range(1 + slot.leads)]
-        if own.kind == "open":
-            if contact.pressed_by is None and not (slot is not None and slot.absent(own.feature)):
+        if acting.kind == "open":
+            if contact.pressed_by is None and not (slot is not None and slot.absent(acting.feature)):
                 guards.append(ContactGuard(k, "close"))
             continue
         if contact.presses:
             guards.append(ContactGuard(k, "lift"))
         if (contact.friction or contact.bound) and np.isfinite(contact.friction) and k not in on_stops:  # else it stays
-            guards.append(ContactGuard(k, "still" if own.kind == "slip" else "break"))
-        if own.along is not None and contact.friction:  # a joint that rubs has none, and its line never turns
+            guards.append(ContactGuard(k, "still" if acting.kind == "slip" else "break"))
+        if acting.along is not None and contact.friction:  # a joint that rubs has none, and its line never turns
             guards.append(ContactGuard(k, "turn"))
-        parallel = features is not None and features.needs_angle(own.feature)
+        parallel = features is not None and features.needs_angle(acting.feature)
         if parallel or (isinstance(contact, BodyContact) and contact.of_disc):
             guards.append(ContactGuard(k, "flat"))
-    if any(own.kind == "slip" and contact.friction for contact, own in zip(contacts, mode, strict=True)):
+    if any(acting.kind == "slip" and contact.friction for contact, acting in zip(contacts, mode, strict=True)):
         guards.append(ContactGuard(-1, "tear"))
-        if sum(own.kind != "open" for own in mode) > 1:
+        if sum(acting.kind != "open" for acting in mode) > 1:
             guards.append(ContactGuard(-1, "share"))
-    if sum(own.kind != "open" for own in mode) > 1 and any(own.kind == "stick" for own in mode):
+    if sum(acting.kind != "open" for acting in mode) > 1 and any(acting.kind == "stick" for acting in mode):
         guards.append(ContactGuard(-1, "grip"))
     return guards
 
@@ -142,17 +142,17 @@ def guard_value(
     """
     if guard.contact < 0:
         return _of_all(guard, contacts, solved)
-    own, touch = solved.mode[guard.contact], solved.touching[guard.contact]
+    acting, touch = solved.mode[guard.contact], solved.touching[guard.contact]
     if guard.kind in {"close", "flat", "pass"}:
         left = touch.borders[guard.border].left_by if guard.kind == "pass" else 0.0
         return {"close": -float(touch.gap), "flat": FLAT - touch.tilt, "pass": float(left)}[guard.kind]
     if guard.kind == "turn":
         began = mode[guard.contact].along
         assert began is not None  # a contact without a line
-        assert own.along is not None  # has no such guard
-        return TURNED - float(np.dot(began, own.along))
+        assert acting.along is not None  # has no such guard
+        return TURNED - float(np.dot(began, acting.along))
     if guard.kind == "still":
-        return _stopping(own, touch)
+        return _stopping(acting, touch)
     if gripped(solved, guard.contact):
         return NOT_SHARED  # together with all that share its load
     return (
@@ -170,7 +170,9 @@ def _of_all(guard: ContactGuard, contacts: Sequence[Touchable], solved: SolvedCo
 
 def gripped(solved: SolvedContacts, k: int) -> bool:
     """True for a contact that shares its load while a contact sticks, so that its force alone decides nothing."""
-    return any(own.kind == "stick" for own in solved.mode) and bool(np.abs(solved.shifts[k]).max(initial=0.0) > RANK)
+    return any(acting.kind == "stick" for acting in solved.mode) and bool(
+        np.abs(solved.shifts[k]).max(initial=0.0) > RANK
+    )
 
 
 class SharedForces(Protocol):
@@ -199,11 +201,11 @@ def borne_forces(contacts: Sequence[Touchable], touching: Sequence[Touching], so
 
 def best_grip(contacts: Sequence[Touchable], touching: Sequence[Touching], solved: SharedForces) -> Distribution | None:
     """Distribution of a shared load that closed contacts bear best; None: they share none, or nothing sticks."""
-    if not solved.shifts.shape[2] or all(own.kind != "stick" for own in solved.mode):
+    if not solved.shifts.shape[2] or all(acting.kind != "stick" for acting in solved.mode):
         return None
     return best_distribution(
         cones_of(
-            kinds=[own.kind for own in solved.mode],
+            kinds=[acting.kind for acting in solved.mode],
             normals=np.array([touch.normal for touch in touching]),
             friction=np.array([contact.static for contact in contacts]),
             bounds=np.array([contact.bound for contact in contacts]),
@@ -232,15 +234,15 @@ def features_beyond(
         state: at the border.
         size: of the mechanism.
     """
-    found = list(features_of(mode))
-    borders = touching(state, tuple(found))[k].borders
+    new_features = list(features_of(mode))
+    borders = touching(state, tuple(new_features))[k].borders
     for _ in range(_MOST_BORDERS):
-        found[k] = borders[border].beyond
-        borders = touching(state, tuple(found))[k].borders
-        border = int(np.argmax([each.left_by for each in borders]))
+        new_features[k] = borders[border].beyond
+        borders = touching(state, tuple(new_features))[k].borders
+        border = int(np.argmax([edge.left_by for edge in borders]))
         if borders[border].left_by <= size * _ON_BORDER:
             break
-    return tuple(found)
+    return tuple(new_features)
 
 
 def _beyond_its_bound(k: int, contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
@@ -296,7 +298,7 @@ def _undecided(contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
     """
     load = float(np.abs(solved.force[sharing(solved.splits)]).max(initial=0.0))
     rubbing = zip(solved.mode, contacts, solved.touching, strict=True)
-    speeds = (slip_velocity(each) for own, contact, each in rubbing if own.kind == "slip" and contact.friction)
+    speeds = (slip_velocity(touch) for acting, contact, touch in rubbing if acting.kind == "slip" and contact.friction)
     return load * solved.spread * max(float(np.linalg.norm(speed)) for speed in speeds) - REST
 
 
@@ -317,9 +319,9 @@ def pressing(mode: ContactMode, touching: Sequence[Touching], force: Array, spli
     By duality that is the least mean load of groups of contacts, weighted so that no split changes it: of a box on its
     four corners, half the load of an edge.
     """
-    normals = np.array([each.normal @ own for each, own in zip(touching, force, strict=True)])
+    normals = np.array([touch.normal @ push for touch, push in zip(touching, force, strict=True)])
     shares = sharing(splits)
-    if any(own.kind == "stick" for own in mode):
+    if any(acting.kind == "stick" for acting in mode):
         return normals  # friction that holds may be split, too, within its own bounds
     loads, sums = [np.inf], np.column_stack([splits, np.ones(len(splits))]).T
     if len(shares) > _FEW:
@@ -342,15 +344,15 @@ def unloaded(solved: SolvedContacts) -> list[int]:
     """
     from scipy.optimize import linprog
 
-    normals = np.array([each.normal @ force for each, force in zip(solved.touching, solved.force, strict=True)])
+    normals = np.array([touch.normal @ force for touch, force in zip(solved.touching, solved.force, strict=True)])
     shares = sharing(solved.splits)
     sizes, rows, free = float(np.abs(normals).max()) or 1.0, solved.splits[shares], (None, None)
     bounds, none = [free] * rows.shape[1], []
     for k, row in zip(shares, rows, strict=True):
-        found = linprog(-row, -rows, normals[shares] / sizes + _NO_LOAD, bounds=bounds, method="highs")
-        if found.status:
+        optimum = linprog(-row, -rows, normals[shares] / sizes + _NO_LOAD, bounds=bounds, method="highs")
+        if optimum.status:
             return []
-        if normals[k] / sizes - found.fun <= 2 * len(shares) * _NO_LOAD:
+        if normals[k] / sizes - optimum.fun <= 2 * len(shares) * _NO_LOAD:
             none.append(k)
     return none if len(none) < len(shares) else []
 
@@ -365,20 +367,20 @@ def _most_even(normals: Array, splits: Array) -> float:
     count, ways = splits.shape
     sizes = float(np.abs(normals).max()) or 1.0
     rows, free = np.column_stack([-splits, np.ones(count)]), (None, None)
-    found = linprog([*np.zeros(ways), -1.0], rows, normals / sizes, bounds=[free] * (ways + 1), method="highs")
-    if found.status:
+    optimum = linprog([*np.zeros(ways), -1.0], rows, normals / sizes, bounds=[free] * (ways + 1), method="highs")
+    if optimum.status:
         return float(np.inf)
-    group = np.flatnonzero(-found.ineqlin.marginals > RANK)
+    group = np.flatnonzero(-optimum.ineqlin.marginals > RANK)
     sums = np.column_stack([splits, np.ones(count)]).T
     weights = np.linalg.lstsq(sums[:, group], np.eye(ways + 1)[-1], rcond=RANK)[0]  # exact, for the group
     return float(weights @ normals[group])
 
 
-def _stopping(own: Acting, touch: Touching) -> float:
+def _stopping(acting: Acting, touch: Touching) -> float:
     """Guard of the end of a slip [m/s]: minus the speed along a known way; in the plane, FAINT minus the speed."""
-    if own.along is None and not own.leads:
+    if acting.along is None and not acting.leads:
         return FAINT - float(np.linalg.norm(slip_velocity(touch)))
-    return -float(heading_of(own, touch) @ touch.slide)
+    return -float(heading_of(acting, touch) @ touch.slide)
 
 
 def striking(
@@ -395,17 +397,17 @@ def striking(
 
     return [
         k
-        for k, (contact, own, touch) in enumerate(zip(contacts, mode, touching, strict=True))
-        if k == hit or (contact.presses and own.kind == "open" and closes(touch))
+        for k, (contact, acting, touch) in enumerate(zip(contacts, mode, touching, strict=True))
+        if k == hit or (contact.presses and acting.kind == "open" and closes(touch))
     ]
 
 
-def lies_against(own: Acting, touch: Touching, size: float) -> bool:
+def lies_against(acting: Acting, touch: Touching, size: float) -> bool:
     """True if a contact is closed and at rest along its normal, though nothing may press it; ``size`` as above."""
     if touch.absent:
         return False
     parting = float(touch.normal @ touch.slide)
-    return own.kind != "open" or (abs(touch.gap) <= size * _TOGETHER and abs(parting) <= REST)
+    return acting.kind != "open" or (abs(touch.gap) <= size * _TOGETHER and abs(parting) <= REST)
 
 
 def noise_of(guards: Sequence[ContactGuard], size: float) -> FloatArray:

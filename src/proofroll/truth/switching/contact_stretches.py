@@ -96,20 +96,22 @@ class ContactStretches(ContactWalks):
         """
         slides = self._free_slides(state, rough)
         rough = passing(rough, slides)
-        rests = [k for k, own in enumerate(rough) if own.kind == "stick" and slides.moved[k]]
+        rests = [k for k, acting in enumerate(rough) if acting.kind == "stick" and slides.moved[k]]
         if not rests:
             return rough
-        others = tuple(OPEN._replace(feature=own.feature) if k in rests else own for k, own in enumerate(rough))
+        others = tuple(
+            OPEN._replace(feature=acting.feature) if k in rests else acting for k, acting in enumerate(rough)
+        )
         mode, step, rates = self._decided(state, others)[0], [0.0, 0.5, 0.5, 1.0], list[Array]()
         for part in step:
             rates.append(self._equations.rate(state + part * _SOON * rates[-1] if rates else state, mode))
         ahead = state + _SOON * np.array([1.0, 2.0, 2.0, 1.0]) / 6 @ np.array(rates)
-        touching, found = self._touching(ahead, features_of(rough)), list(rough)
+        touching, modes = self._touching(ahead, features_of(rough)), list(rough)
         for k in rests:
             slip = slip_velocity(touching[k])
             if (speed := float(np.linalg.norm(slip))) > REST:
-                found[k] = rough[k]._replace(kind="slip", heading=direction_of(slip / speed))
-        return tuple(found)
+                modes[k] = rough[k]._replace(kind="slip", heading=direction_of(slip / speed))
+        return tuple(modes)
 
     @abstractmethod
     def _struck(
@@ -149,17 +151,17 @@ class ContactStretches(ContactWalks):
         self._check_spin(closed_in(mode), self._touching(stretch.last, features), time)
         return stretch
 
-    def _check_spin(self, closed: Sequence[bool], touching: Sequence[Touching], time: float) -> None:
-        check_spin(self.faces, closed, touching, [contact.friction for contact in self.contacts], time)
+    def _check_spin(self, closed_mask: Sequence[bool], touching: Sequence[Touching], time: float) -> None:
+        check_spin(self.faces, closed_mask, touching, [contact.friction for contact in self.contacts], time)
 
     def change(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
-        changed = self._changed(stretch)
-        return replace(changed, blur=max(changed.blur, stretch.blur))
+        transition = self._changed(stretch)
+        return replace(transition, blur=max(transition.blur, stretch.blur))
 
     def _changed(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         if isinstance(stretch, BegunSlip):
-            mode = tuple(own._replace(leads=False) for own in stretch.mode_at(stretch.end))
+            mode = tuple(acting._replace(leads=False) for acting in stretch.mode_at(stretch.end))
             stretch = replace(stretch, mode=mode)
         guards = guards_of(self.contacts, stretch.mode)
         if stretch.guard is None or not 0 <= stretch.guard < len(guards):  # a break, a slip begun, an effort, a kink
@@ -170,7 +172,7 @@ class ContactStretches(ContactWalks):
         k, kind, border = guards[stretch.guard]
         if kind == "tear":
             slipping = zip(self.contacts, stretch.mode, strict=True)
-            raise torn(next(c.name for c, own in slipping if own.kind == "slip" and c.friction), stretch.end)
+            raise torn(next(c.name for c, acting in slipping if acting.kind == "slip" and c.friction), stretch.end)
         if kind == "flat":
             raise lying(self._equations.mechanism.contacts[k], stretch.end)
         solved = self._solved(stretch.last, stretch.mode)
@@ -188,19 +190,19 @@ class ContactStretches(ContactWalks):
 
     def jumped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """Transition at the end of a stretch where forces jump: the mode is decided anew."""
-        before, after = self._signs, self._after(stretch, stretch.last, closed_in(stretch.mode), ())
-        if after.mode is None:
-            return after
-        pairs = enumerate(zip(before, self._clamped(after.state, after.mode), strict=True))
-        jumps = self._of_efforts({k: bool(now) for k, (was, now) in pairs if was != now})
-        return replace(after, happenings=(*after.happenings, *jumps))
+        old_signs, transition = self._signs, self._after(stretch, stretch.last, closed_in(stretch.mode), ())
+        if transition.mode is None:
+            return transition
+        pairs = enumerate(zip(old_signs, self._clamped(transition.state, transition.mode), strict=True))
+        jumps = self._of_efforts({k: bool(new_sign) for k, (old_sign, new_sign) in pairs if old_sign != new_sign})
+        return replace(transition, happenings=(*transition.happenings, *jumps))
 
     def _of_efforts(self, limited: Mapping[int, bool]) -> tuple[tuple[str, str], ...]:
         """Events of efforts, by their numbers: True for one that reaches its limit, False for one that leaves it."""
         if self._equations.mechanism.contacts:
             return ()  # beside contacts of bodies no engine reports them
         kinds = {True: EventKind.SATURATE, False: EventKind.RELEASE}
-        return tuple((kinds[at], self._limited[k]) for k, at in limited.items() if k < len(self._limited))
+        return tuple((kinds[reached], self._limited[k]) for k, reached in limited.items() if k < len(self._limited))
 
     def _broken(self, stretch: Stretch[ContactMode], k: int) -> Transition[ContactMode]:
         """Transition where friction no longer holds a contact, or contacts that share a load if ``k`` is -1.
@@ -208,7 +210,7 @@ class ContactStretches(ContactWalks):
         Of a slip with less friction all forces jump.
         """
         contacts, solved = self.contacts, self._solved(stretch.last, stretch.mode)
-        held = {k: solved.force[k]}
+        grips = {k: solved.force[k]}
         if k < 0:
             lost = lost_grip(contacts, solved)
             if lost.lifting:
@@ -220,12 +222,12 @@ class ContactStretches(ContactWalks):
                     "to slip in different directions: no route of the truth follows that; end before, or take more "
                     "friction"
                 )
-            held = {number: lost.force[number] for number in lost.slipping}
-        if any(contacts[number].static > contacts[number].friction for number in held):
-            return self._after(stretch, stretch.last, closed_in(stretch.mode), (), leaving=tuple(held))
-        mode, leaving = list(stretch.mode), leaving_slips(stretch.mode, solved, held)
-        for number, own in leaving.items():
-            mode[number] = own
+            grips = {number: lost.force[number] for number in lost.slipping}
+        if any(contacts[number].static > contacts[number].friction for number in grips):
+            return self._after(stretch, stretch.last, closed_in(stretch.mode), (), leaving=tuple(grips))
+        mode, leaving = list(stretch.mode), leaving_slips(stretch.mode, solved, grips)
+        for number, acting in leaving.items():
+            mode[number] = acting
         return Transition(stretch.last, tuple(mode), tuple((EventKind.SLIP, contacts[k].name) for k in leaving))
 
     def _unshared(self, stretch: Stretch[ContactMode], leaving: Sequence[int]) -> Transition[ContactMode]:
@@ -253,14 +255,16 @@ class ContactStretches(ContactWalks):
         """Transition where the nearest features of solids are left by a border: rates of normals jump, slips go on."""
         state, mode, of_bodies = stretch.last, stretch.mode, self._equations.mechanism.contacts
         if of_bodies[k].box_slot is None:
-            closed, features = closed_in(mode), features_beyond(mode, k, border, self._touching, state, self._size)
+            closed_mask, features = closed_in(mode), features_beyond(mode, k, border, self._touching, state, self._size)
         else:
             states = state, self._ahead(stretch)
-            closed, features = passed_boxes(of_bodies, mode, (k, border), self._touching, states, self._size)
-        if mode[k].kind == "open" and closed == closed_in(mode):
+            closed_mask, features = passed_boxes(of_bodies, mode, (k, border), self._touching, states, self._size)
+        if mode[k].kind == "open" and closed_mask == closed_in(mode):
             return Transition(state, with_features(mode, features), ())
-        after = self._after(stretch, state, closed, (), features=features)
-        return replace(after, happenings=tuple(item for item in after.happenings if item[0] != EventKind.TURN))
+        transition = self._after(stretch, state, closed_mask, (), features=features)
+        return replace(
+            transition, happenings=tuple(item for item in transition.happenings if item[0] != EventKind.TURN)
+        )
 
     def _impact(self, stretch: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
         """Transition at an impact."""
@@ -269,15 +273,15 @@ class ContactStretches(ContactWalks):
         hits = striking(contacts, stretch.mode, touching, hit, stretch.end, self._size)
         self._check_spin([k in hits for k in range(len(contacts))], touching, stretch.end)
         # dry friction of joints and of turning gives no impulse
-        closed = [
-            (k in hits or lies_against(own, touch, self._size)) and contact.presses
-            for k, (own, touch, contact) in enumerate(zip(stretch.mode, touching, contacts, strict=True))
+        closed_mask = [
+            (k in hits or lies_against(acting, touch, self._size)) and contact.presses
+            for k, (acting, touch, contact) in enumerate(zip(stretch.mode, touching, contacts, strict=True))
         ]
         laws = [contact.restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         sideways = [contact.tangential_restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         speed, delay = -float(touching[hit].normal @ touching[hit].slide), 0.0
         series = self._series.after(contacts[hit].pair, Impact(stretch.end, frozenset(hits), speed))
-        rough = modes_of(closed, closed, features)
+        rough = modes_of(closed_mask, closed_mask, features)
         state, stays, margin = self._struck(stretch.last, rough, laws, sideways)
         if series is not None:
             margin = np.inf  # what impacts leave repeats, however slow they are
@@ -288,7 +292,7 @@ class ContactStretches(ContactWalks):
             modes, normal = (rebounding(contacts, stretch.mode, hit), stretch.mode), touching[hit].normal
             pull, falling = (-float(normal @ self._solved(state, mode).slide_rate[hit]) for mode in modes)
             delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law, max(falling, 0.0))
-            state, stays, margin = self._struck(stretch.last, rough, [0.0] * len(closed), [0.0] * len(closed))
+            state, stays, margin = self._struck(stretch.last, rough, [0.0] * len(closed_mask), [0.0] * len(closed_mask))
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
         settled = [bool(delay) and contacts[k].pair == contacts[hit].pair for k in hits]
         kinds = (EventKind.SETTLE if over else EventKind.IMPACT for over in settled)
@@ -304,15 +308,15 @@ class ContactStretches(ContactWalks):
         """
         touching, features = self._touching(state, features_of(stretch.mode)), features_of(stretch.mode)
         shuts = {k for k in series.contacts if touching[k].gap <= speed * series.period}
-        closed = [
+        closed_mask = [
             k in shuts or stay or bool(contact.bound)
             for k, (stay, contact) in enumerate(zip(stays, self.contacts, strict=True))
         ]
         happened = tuple((EventKind.SETTLE, self.contacts[k].name) for k in sorted(shuts))
-        after = self._after(
-            stretch, state, closed, happened, delay=series.remaining, stopped=max(speed, REST), features=features
+        transition = self._after(
+            stretch, state, closed_mask, happened, delay=series.remaining, stopped=max(speed, REST), features=features
         )
-        return replace(after, blur=speed * series.remaining)
+        return replace(transition, blur=speed * series.remaining)
 
     def _stopped(self, stretch: Stretch[ContactMode], k: int) -> Transition[ContactMode]:
         """Transition where a slip stops: alone, or with all others; in the plane first to its last instants.
@@ -322,20 +326,20 @@ class ContactStretches(ContactWalks):
         if stretch.mode[k].along is None and not isinstance(stretch, BegunSlip | StoppingSlip):
             ending = stretch.mode[k]._replace(stops=True)
             return Transition(stretch.last, (*stretch.mode[:k], ending, *stretch.mode[k + 1 :]), ())
-        closed, solved = closed_in(stretch.mode), self._solved(stretch.last, stretch.mode)
-        slides = [k for k, own in enumerate(stretch.mode) if own.kind == "slip"]
+        closed_mask, solved = closed_in(stretch.mode), self._solved(stretch.last, stretch.mode)
+        slides = [k for k, acting in enumerate(stretch.mode) if acting.kind == "slip"]
         slips = np.linalg.norm([slip_velocity(solved.touching[k]) for k in slides], axis=1)
         if slips.max() <= FAINT:
-            ended = self._after(stretch, stretch.last, closed, (), stopped=FAINT)
+            ended = self._after(stretch, stretch.last, closed_mask, (), stopped=FAINT)
             if ended.mode is not None and self._stands(ended.state, ended.mode):
                 return replace(ended, blur=float((slips / np.linalg.norm(solved.slide_rate[slides], axis=1)).max()))
-        return self._after(stretch, stretch.last, closed, ())
+        return self._after(stretch, stretch.last, closed_mask, ())
 
     def _after(
         self,
         stretch: Stretch[ContactMode],
         state: Array,
-        closed: Sequence[bool],
+        closed_mask: Sequence[bool],
         happened: tuple[tuple[str, str], ...],
         margin: float = np.inf,
         delay: float = 0.0,
@@ -347,20 +351,20 @@ class ContactStretches(ContactWalks):
 
         ``features``: of solids that touch from now on; None: the same.
         """
-        closed, before = shut_by_pressing(self.contacts, closed), features_of(stretch.mode)
-        features = before if features is None else features
-        slips = [float(np.linalg.norm(slip_velocity(each))) for each in self._touching(state, features)]
-        still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
-        rough = self._moved_on(state, modes_of(closed, still, features))
+        closed_mask, old_features = shut_by_pressing(self.contacts, closed_mask), features_of(stretch.mode)
+        features = old_features if features is None else features
+        slips = [float(np.linalg.norm(slip_velocity(touch))) for touch in self._touching(state, features)]
+        resting = [shut and slip <= stopped for shut, slip in zip(closed_mask, slips, strict=True)]
+        rough = self._moved_on(state, modes_of(closed_mask, resting, features))
         state = self._equations.eliminated(state, rough)
         mode, sure = self._decided(state, rough, leaving)
         # A slip in the plane may have turned since it began: its sense is that of the last step.
-        sliding = self._touching(stretch.visited[-1][1] if stretch.visited else stretch.first, before)
-        was = tuple(
-            own._replace(along=own.along or headed(own, each).heading)
-            for own, each in zip(stretch.mode, sliding, strict=True)
+        sliding = self._touching(stretch.visited[-1][1] if stretch.visited else stretch.first, old_features)
+        old_mode = tuple(
+            acting._replace(along=acting.along or headed(acting, touch).heading)
+            for acting, touch in zip(stretch.mode, sliding, strict=True)
         )
-        changed = changes(self.contacts, was, mode, self._stands(state, mode))
-        struck = {name for _, name in happened}
-        happenings = (*happened, *(item for item in changed if item[1] not in struck))
+        mode_events = changes(self.contacts, old_mode, mode, self._stands(state, mode))
+        struck_names = {name for _, name in happened}
+        happenings = (*happened, *(item for item in mode_events if item[1] not in struck_names))
         return Transition(state, mode, happenings, margin=np.inf if delay else min(margin, sure), delay=delay)

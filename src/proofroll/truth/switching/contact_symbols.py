@@ -103,11 +103,11 @@ def of_joint(contact: JointContact, q: Scalar, v: Scalar) -> ScalarTouch:
     )
 
 
-def limited(wanted: Scalar, bound: float, sign: Scalar, root: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
+def limited(effort: Scalar, bound: float, sign: Scalar, root: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
     """Effort with a limit, and its guard; ``sign``: of an effort at its limit, 0 of one within, a parameter."""
     within = sub(1.0, mul(sign, sign))
-    excess = sub(root(mul(wanted, wanted)) / bound, 1.0)
-    return add(mul(within, wanted), mul(sign, bound)), mul(sub(mul(2.0, within), 1.0), excess)
+    excess = sub(root(mul(effort, effort)) / bound, 1.0)
+    return add(mul(within, effort), mul(sign, bound)), mul(sub(mul(2.0, within), 1.0), excess)
 
 
 def kink_guards(kinks: Sides) -> list[Scalar]:
@@ -178,21 +178,21 @@ def guard_symbols(
 
 def slip_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
     """Products u², u·u̇ and u̇² of each slip u in the plane with friction; u² is smooth, also where the slip stops."""
-    found: list[Scalar] = []
-    for own, contact, touch, rate in zip(mode, contacts, solved.touching, solved.slide_rates, strict=True):
-        if turning_slip(own, contact):
+    symbols: list[Scalar] = []
+    for acting, contact, touch, rate in zip(mode, contacts, solved.touching, solved.slide_rates, strict=True):
+        if turning_slip(acting, contact):
             slip = touch.across(touch.slide)
-            found += [dot(slip, slip), dot(slip, rate), dot(rate, rate)]
-    return found
+            symbols += [dot(slip, slip), dot(slip, rate), dot(rate, rate)]
+    return symbols
 
 
 def led_symbols(mode: ContactMode, solved: SolvedSymbols) -> list[Scalar]:
     """Normal, slide and its rate of each contact that leads, which slips against a given direction."""
-    found: list[Scalar] = []
-    for own, touch, rate in zip(mode, solved.touching, solved.slide_rates, strict=True):
-        if own.leads:
-            found += [*touch.normal, *touch.slide, *rate]
-    return found
+    symbols: list[Scalar] = []
+    for acting, touch, rate in zip(mode, solved.touching, solved.slide_rates, strict=True):
+        if acting.leads:
+            symbols += [*touch.normal, *touch.slide, *rate]
+    return symbols
 
 
 def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
@@ -202,22 +202,22 @@ def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: Sol
     """
     if solved.drives is None:
         return []
-    found: list[Scalar] = []
+    symbols: list[Scalar] = []
     for p, R, v, w in solved.poses:
-        found += [*p, *(entry for row in R for entry in row), *v, *w]
-    for own, contact, touch, line, force in zip(
+        symbols += [*p, *(entry for row in R for entry in row), *v, *w]
+    for acting, contact, touch, line, force in zip(
         mode, contacts, solved.touching, solved.lines, solved.forces, strict=True
     ):
-        rubs = own.kind == "slip" and contact.bound
+        rubs = acting.kind == "slip" and contact.bound
         rubbing = force if not rubs or line is None else scaled(-float(contact.bound), line)
-        where = (*touch.place, *touch.normal) if contact.pressed_by is None else (*_NONE, *_NONE)
-        found += [*(rubbing or _NONE), *where]
-    return [*found, *solved.efforts, *solved.drives]
+        location = (*touch.place, *touch.normal) if contact.pressed_by is None else (*_NONE, *_NONE)
+        symbols += [*(rubbing or _NONE), *location]
+    return [*symbols, *solved.efforts, *solved.drives]
 
 
-def turning_slip(own: Acting, contact: Touchable) -> bool:
+def turning_slip(acting: Acting, contact: Touchable) -> bool:
     """True for a slip in the plane with friction along its own direction, which may turn."""
-    return bool(own.kind == "slip" and own.along is None and contact.friction and not own.leads)
+    return bool(acting.kind == "slip" and acting.along is None and contact.friction and not acting.leads)
 
 
 def eliminated(rows: list[Row], rights: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:

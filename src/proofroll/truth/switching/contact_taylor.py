@@ -134,7 +134,7 @@ class CompiledModes:
         """
         if not self._covers or not follows(mode, self._contacts):
             return None
-        key = tuple((own.kind, own.along is not None, own.leads, own.feature) for own in mode)
+        key = tuple((acting.kind, acting.along is not None, acting.leads, acting.feature) for acting in mode)
         if key not in self._modes:
             self._modes[key] = CompiledMode(
                 self._symbols, self._contacts, mode, len(clamped), self._length, self._by_collocation
@@ -154,7 +154,7 @@ class CompiledMode:
         length: int,
         by_collocation: bool,
     ) -> None:
-        lined = [k for k, own in enumerate(mode) if own.along is not None or own.leads]
+        lined = [k for k, acting in enumerate(mode) if acting.along is not None or acting.leads]
         constants = Constants(lambda index: heyoka.par[index], 3 * len(lined) + limits, heyoka.expression)
         clamped = [Symbol(heyoka.par[3 * len(lined) + number], constants) for number in range(limits)]
         self._clamped: tuple[int, ...] = (0,) * limits
@@ -163,7 +163,7 @@ class CompiledMode:
         began: list[Vector | None] = [None] * len(mode)
         for place, k in enumerate(lined):
             began[k] = [Symbol(heyoka.par[3 * place + axis], constants) for axis in range(3)]
-        solved = symbols.solved([Symbol(each, constants) for each in state], mode, clamped, began, functions)
+        solved = symbols.solved([Symbol(entry, constants) for entry in state], mode, clamped, began, functions)
         slips = slip_symbols(mode, contacts, solved)
         guards = [*guard_symbols(guards_of(contacts, mode), contacts, solved, began, functions), *solved.within_limits]
         stated, led = stated_symbols(mode, contacts, solved), led_symbols(mode, solved)
@@ -184,9 +184,9 @@ class CompiledMode:
 
     def at_limits(self, clamped: tuple[int, ...]) -> Self:
         """The same mode with these signs of efforts at their limits."""
-        other = copy(self)
-        other._clamped = clamped
-        return other
+        limited_mode = copy(self)
+        limited_mode._clamped = clamped
+        return limited_mode
 
     def _guards(self, pars: Array, states: Array) -> Array:
         """Guards at states (state, places), (places, guards).
@@ -207,9 +207,9 @@ class CompiledMode:
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
         """Guards, numbers of slips and rates of states (times, state) of one stretch, each (times, …)."""
         pars = self._parameters(mode, float(states[0, -1]))
-        found, first = self._called(states.T, pars), self._first_rate
-        slips = found[self._count : self._count + self._slips].T
-        return found[: self._count].T, slips, found[first : first + states.shape[1]].T
+        outputs, start = self._called(states.T, pars), self._first_rate
+        slips = outputs[self._count : self._count + self._slips].T
+        return outputs[: self._count].T, slips, outputs[start : start + states.shape[1]].T
 
     def _called(self, states: Array, pars: Array) -> Array:
         """Guards, numbers of slips, rates and, last, rates in the variable of integration, of states (state, times).
@@ -224,7 +224,7 @@ class CompiledMode:
 
     def led(self, mode: ContactMode, time: float) -> Led:
         """Values at states in this mode, in which a slip leads, from a time [s] on."""
-        pars, first = self._parameters(mode, time), self._count + self._slips
+        pars, start = self._parameters(mode, time), self._count + self._slips
         places = [3 * place for place, k in enumerate(self._lined) if mode[k].leads]
 
         def led(states: Array, directions: Array) -> LedValues:
@@ -232,7 +232,7 @@ class CompiledMode:
             for place in places:
                 columns[place : place + 3] = directions.T
             values = self._called(states.T, columns)
-            normals, slides, slide_rates = (values[first + 3 * part : first + 3 * part + 3].T for part in range(3))
+            normals, slides, slide_rates = (values[start + 3 * part : start + 3 * part + 3].T for part in range(3))
             return LedValues(
                 rates=values[self._first_rate : self._first_rate + states.shape[1]].T,
                 normals=normals,
@@ -302,11 +302,11 @@ class CompiledMode:
 
     def record_of(self, mode: ContactMode, time: float) -> Callable[[Array], tuple[Array, Array]]:
         """Function of states (state, places) after a time [s]: :func:`stated_symbols`, rate of time by its variable."""
-        pars, first = self._parameters(mode, time), self._first_rate
+        pars, start = self._parameters(mode, time), self._first_rate
 
         def record(states: Array) -> tuple[Array, Array]:
-            found = self._called(states, pars)
-            return found[first - self._stated : first], found[-1] if self._slips else np.ones(states.shape[1])
+            outputs = self._called(states, pars)
+            return outputs[start - self._stated : start], outputs[-1] if self._slips else np.ones(states.shape[1])
 
         return record
 
@@ -386,12 +386,12 @@ class CompiledMode:
     def decay_of(self, mode: ContactMode, k: int, time: float) -> Callable[[Array], tuple[Array, Array]]:
         """Function of states (state, places) after a time [s]: slip speeds, changes until the slip would stop so."""
         pars, place = self._parameters(mode, time), self._count + 3 * self._turning.index(k)
-        first = self._first_rate
+        start = self._first_rate
 
         def decay(states: Array) -> tuple[Array, Array]:
-            found = self._called(states, pars)
-            square, along, rate = found[place : place + 3]
-            change = np.maximum(0.0, -along / rate) * found[first : first + len(states)]
+            outputs = self._called(states, pars)
+            square, product, rate = outputs[place : place + 3]
+            change = np.maximum(0.0, -product / rate) * outputs[start : start + len(states)]
             # a slip that round-off has stopped has no direction, and changes nothing
             return np.sqrt(square), np.where(square, change, 0.0)
 
@@ -399,10 +399,10 @@ class CompiledMode:
 
     def within(self, law: StretchLaw, stretch: CompiledStretch, times: FloatArray) -> FloatArray:
         """States at increasing times [s] within a stretch that this mode integrated, shape (times, state)."""
-        begun, first = stretch.visited[0]
-        states = np.empty((len(times), len(first)))
+        begun, start = stretch.visited[0]
+        states = np.empty((len(times), len(start)))
         early, pars = times <= begun, self._parameters(stretch.mode, stretch.start)
-        states[early] = first + (times[early] - begun)[:, None] * self.values(first[None], stretch.mode)[2]
+        states[early] = start + (times[early] - begun)[:, None] * self.values(start[None], stretch.mode)[2]
         number = int(early.sum())
         for step in stretch.steps:
             stop = int(np.searchsorted(times, step.last[-1], side="right"))

@@ -191,18 +191,18 @@ class ContactWalks(ABC):
 
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """See the protocol."""
-        state, before = np.append(state[:-1], time), self._signs
+        state, old_signs = np.append(state[:-1], time), self._signs
         self._signs = self._clamped(state, mode)
-        if time > 0.0 and before[len(self._limited) :] != self._signs[len(self._limited) :]:
+        if time > 0.0 and old_signs[len(self._limited) :] != self._signs[len(self._limited) :]:
             count, mechanism = len(self._limited), self._equations.mechanism
-            refuse_jolts(mechanism, time, before[count:], self._signs[count:])
+            refuse_jolts(mechanism, time, old_signs[count:], self._signs[count:])
         if not self._equations.mechanism.contacts and self._solved(state, mode).shifts.any():
             raise Refused(REDUNDANT)
         if self._stands(state, mode):
             return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
-        if any(own.leads for own in mode):
+        if any(acting.leads for acting in mode):
             return self._begun(time, state, mode, until)
-        stopping = next((k for k, own in enumerate(mode) if own.stops), None)
+        stopping = next((k for k, acting in enumerate(mode) if acting.stops), None)
         if stopping is not None:
             return self._stopping(time, state, mode, stopping)
         guards = guards_of(self.contacts, mode)
@@ -214,7 +214,7 @@ class ContactWalks(ABC):
 
     def _begun(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """First instants of a slip from rest in the plane, which end before another contact changes."""
-        name = next(contact.name for contact, own in zip(self.contacts, mode, strict=True) if own.leads)
+        name = next(contact.name for contact, acting in zip(self.contacts, mode, strict=True) if acting.leads)
         compiled = self.by_symbols(state, mode)
         led = led_by(mode, self._equations.rate, self._solved) if compiled is None else compiled.led(mode, time)
         begun = begun_slip(time, state, mode, until, led, self._begins_by, name)
@@ -313,7 +313,7 @@ class ContactWalks(ABC):
     def _as_it_goes(self, state: Array, mode: ContactMode) -> ContactMode:
         """Mode with the present directions of slips in the plane, however slow."""
         touching = self._touching(state, features_of(mode))
-        return tuple(headed(own, each) for own, each in zip(mode, touching, strict=True))
+        return tuple(headed(acting, touch) for acting, touch in zip(mode, touching, strict=True))
 
     def _stopping(self, time: float, state: Array, mode: ContactMode, k: int) -> StoppingSlip:
         """Last instants of a slip below FAINT.
@@ -322,8 +322,10 @@ class ContactWalks(ABC):
         """
 
         def one(y: Array) -> tuple[float, Array]:
-            now, touch = self._as_it_goes(y, mode), self._touching(y, features_of(mode))[k]
-            change = faint_time(touch, self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
+            current_mode, touch = self._as_it_goes(y, mode), self._touching(y, features_of(mode))[k]
+            change = faint_time(touch, self._solved(y, current_mode).slide_rate[k]) * self._equations.rate(
+                y, current_mode
+            )
             return float(np.linalg.norm(slip_velocity(touch))), change
 
         def by_states(states: Array) -> tuple[Array, Array]:
@@ -340,15 +342,15 @@ class ContactWalks(ABC):
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""
         solved, wait = self._solved(state, mode), 0.0
-        for k, own in enumerate(mode):
-            begins = own.kind == "slip" and own.along is None and self.contacts[k].friction
+        for k, acting in enumerate(mode):
+            begins = acting.kind == "slip" and acting.along is None and self.contacts[k].friction
             if begins and np.linalg.norm(slip_velocity(solved.touching[k])) < FAINT:
                 wait = max(wait, 2 * FAINT / float(np.linalg.norm(solved.slide_rate[k])))
         return (state, time) if not wait else (state + wait * self._equations.rate(state, mode), time + wait)
 
     def _stands(self, state: Array, mode: ContactMode) -> bool:
         """True if nothing moves or is about to move."""
-        if self._timed or any(own.kind == "slip" for own in mode):
+        if self._timed or any(acting.kind == "slip" for acting in mode):
             return False
         solved = self._solved(state, mode)
         return float(np.abs(solved.velocity).max()) <= ROUND_OFF and float(np.abs(solved.acceleration).max()) <= STANDS

@@ -50,12 +50,12 @@ class ImpactSeries:
             again = zip(impacts[-length - 1 :], impacts[-2 * length - 1 : -length], strict=True)
             if any(late.contacts != early.contacts for late, early in again):
                 continue
-            last, middle, first = (impacts[-1 - cycles * length] for cycles in range(3))
-            period, before = last.time - middle.time, middle.time - first.time
+            last, middle, earliest = (impacts[-1 - cycles * length] for cycles in range(3))
+            period, previous_period = last.time - middle.time, middle.time - earliest.time
             if not 0 <= last.speed < middle.speed:
                 continue
             ratio = last.speed / middle.speed
-            if period < before and abs(period / before - ratio) <= _ALIKE:
-                hit = (each.contacts for each in self._all if each.time > middle.time)
+            if period < previous_period and abs(period / previous_period - ratio) <= _ALIKE:
+                hit = (entry.contacts for entry in self._all if entry.time > middle.time)
                 return GeometricSeries(ratio, period * ratio / (1 - ratio), period, frozenset().union(*hit))
         return None

@@ -83,10 +83,10 @@ def _decided(
             near = [k for k in near if not abs(after_one[k]) <= abs(start[k]) / 2 or start[k] == 0.0]
         if not near:
             break
-        two, four = (kinks(_stepped(state, times * step, sides, rates)) - start for times in (2, 4))
-        left = [k for k in near if _grows(after_one[k], two[k], four[k])]
+        after_two, after_four = (kinks(_stepped(state, times * step, sides, rates)) - start for times in (2, 4))
+        left = [k for k in near if _grows(after_one[k], after_two[k], after_four[k])]
         for k in left:
-            decided[k] = int(np.sign(four[k]))
+            decided[k] = int(np.sign(after_four[k]))
         near = [k for k in near if k not in left]
     return decided
 

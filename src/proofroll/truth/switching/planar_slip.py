@@ -124,43 +124,43 @@ class _Nodes:
         self.derivative = np.array([chebyshev.chebval(points, s) for s in slopes]).T @ self.to_series * 2
 
 
-def leading(own: Acting, normal: Array, force: Array) -> Acting:
-    """Mode in which a contact leaves rest in its plane, against the ``force`` that held it; ``own``: before."""
-    held = force - normal * (normal @ force)
-    x, y, z = (-held / np.linalg.norm(held)).tolist()
-    return own._replace(kind="slip", heading=(x, y, z), leads=True)
+def leading(acting: Acting, normal: Array, force: Array) -> Acting:
+    """Mode of a contact that leaves rest in its plane, against the ``force`` that held it; ``acting``: mode before."""
+    friction = force - normal * (normal @ force)
+    x, y, z = (-friction / np.linalg.norm(friction)).tolist()
+    return acting._replace(kind="slip", heading=(x, y, z), leads=True)
 
 
-def leaving_slips(mode: ContactMode, solved: SolvedContacts, held: Mapping[int, Array]) -> dict[int, Acting]:
-    """Slips that start at the bound of friction, opposite to the friction that ``held`` each contact."""
-    found = {}
-    for k, force in held.items():
+def leaving_slips(mode: ContactMode, solved: SolvedContacts, forces: Mapping[int, Array]) -> dict[int, Acting]:
+    """Slips that start at the bound of friction, opposite to the friction that held each contact, in ``forces``."""
+    slips = {}
+    for k, force in forces.items():
         line = solved.mode[k].along
         if line is None:
-            found[k] = leading(mode[k], solved.touching[k].normal, force)
+            slips[k] = leading(mode[k], solved.touching[k].normal, force)
             continue
         sign = -1.0 if np.dot(line, force) > 0 else 1.0
         x, y, z = (sign * component for component in line)
-        found[k] = mode[k]._replace(kind="slip", along=(x, y, z), heading=(x, y, z))
-    return found
+        slips[k] = mode[k]._replace(kind="slip", along=(x, y, z), heading=(x, y, z))
+    return slips
 
 
 def with_heading(mode: ContactMode, way: Array) -> ContactMode:
     """The mode in which what leads slips in a direction, shape (3,)."""
     heading = direction_of(way)
-    return tuple(own._replace(heading=heading) if own.leads else own for own in mode)
+    return tuple(acting._replace(heading=heading) if acting.leads else acting for acting in mode)
 
 
 def led_by(mode: ContactMode, rate: Rate, solve: Solve) -> Led:
     """Values in a mode in which a slip leads, in numbers; ``rate``, ``solve``: of a state in a mode."""
-    k = next(number for number, own in enumerate(mode) if own.leads)
+    k = next(number for number, acting in enumerate(mode) if acting.leads)
 
     def value(state: Array, direction: Array) -> tuple[Array, Array, Array, Array]:
         led = with_heading(mode, direction)
         solved = solve(state, led)
         return rate(state, led), solved.touching[k].normal, solved.touching[k].slide, solved.slide_rate[k]
 
-    return lambda *at: LedValues(*map(np.array, zip(*map(value, *at), strict=True)))
+    return lambda *arguments: LedValues(*map(np.array, zip(*map(value, *arguments), strict=True)))
 
 
 def begun_slip(
@@ -183,7 +183,7 @@ def begun_slip(
     Raises:
         Refused: other contacts fix its direction, or it does not grow.
     """
-    heading = next(own.heading for own in mode if own.leads)
+    heading = next(acting.heading for acting in mode if acting.leads)
     length, nodes = min(_FIRST, until - time), _Nodes(count)
     for _ in range(_HALVINGS):
         settled = _settled(state, np.array(heading), length, nodes, led)

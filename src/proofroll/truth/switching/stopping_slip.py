@@ -63,7 +63,7 @@ class StoppingSlip(Stretch[ContactMode]):
 
 def stopping_slip(time: float, state: Array, mode: ContactMode, guard: int, decay: Decay) -> StoppingSlip:
     """Last instants of a slip from a time [s] and state on; ``guard``: that it stops."""
-    first, steps, integrator, place = state, list[_Step](), PicardSteps(lambda states: decay(states)[1]), 0.0
+    start, steps, integrator, place = state, list[_Step](), PicardSteps(lambda states: decay(states)[1]), 0.0
     last = float(np.log(np.maximum(decay(state[:, None])[0], ROUND_OFF) / ROUND_OFF)[0])
     while place < last:
         end, state, inside = integrator.step(place, state, min(last, place + _DECAY))
@@ -75,7 +75,7 @@ def stopping_slip(time: float, state: Array, mode: ContactMode, guard: int, deca
         start=time,
         end=float(ended[-1]),
         mode=mode,
-        first=first,
+        first=start,
         last=ended,
         guard=guard,
         steps=steps,

@@ -59,11 +59,11 @@ class ContactTree(ContactStretches):
     def _struck(
         self, state: Array, rough: ContactMode, laws: Sequence[float], sideways: Sequence[float]
     ) -> tuple[Array, list[bool], float]:
-        (q, v, time), features, closed = self.dynamics.parts(state), features_of(rough), closed_in(rough)
-        which = np.flatnonzero(closed).tolist()
+        (q, v, time), features, closed_mask = self.dynamics.parts(state), features_of(rough), closed_in(rough)
+        which = np.flatnonzero(closed_mask).tolist()
         normal, tangential = (np.array([law[k] for k in which]) for law in (laws, sideways))
         velocity, impulse, margin = self.dynamics.struck(q, v, which, normal, time, tangential, features)
-        stays, touching = list(closed), self.dynamics.at(q, velocity, time, features).touching
+        stays, touching = list(closed_mask), self.dynamics.at(q, velocity, time, features).touching
         for pressed, k in zip(impulse[:, 0] > 0, which, strict=True):
             leaves = float(touching[k].normal @ touching[k].slide) > REST
             stays[k] = not laws[k] if pressed else not leaves

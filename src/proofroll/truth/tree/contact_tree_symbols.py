@@ -70,7 +70,7 @@ class TreeSymbols:
     def __init__(self, dynamics: ContactDynamics) -> None:
         self._dynamics, self._mechanism = dynamics, dynamics.mechanism
         index = self._mechanism.body_index
-        self._pairs = [(index[each.body_a], index[each.body_b]) for each in self._mechanism.contacts]
+        self._pairs = [(index[contact.body_a], index[contact.body_b]) for contact in self._mechanism.contacts]
 
     @property
     def covers(self) -> bool:
@@ -112,35 +112,35 @@ class TreeSymbols:
         def row_of(k: int, direction: Vector) -> Row:
             return _along(slides[k][0], direction)
 
-        for k, (own, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
-            if own.kind == "open":
+        for k, (action, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
+            if action.kind == "open":
                 continue
-            part = rows_of(own.kind, touch, line, contacts[k], root)
-            beyond = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
-            for direction, along in zip(part.directions, part.along, strict=True):
+            part = rows_of(action.kind, touch, line, contacts[k], root)
+            beyond = dot(touch.normal_rate, touch.slide) if action.kind == "slip" else 0.0
+            for direction, force_direction in zip(part.directions, part.along, strict=True):
                 rows.append(_along(slides[k][0], direction))
-                pushes.append(turning.pushed(row_of(k, along), len(owner), k, along, row_of))
+                pushes.append(turning.pushed(row_of(k, force_direction), len(owner), k, force_direction, row_of))
                 aims.append(sub(sub(0.0, dot(direction, slides[k][1])), beyond))
-                owner.append((k, along))
+                owner.append((k, force_direction))
         responses, _ = eliminated(mass, [self._free(push) for push in pushes])
         acting = [_applied(rows, response) for response in responses]
-        system: list[Row] = [{j: each[i] for j, each in enumerate(acting)} for i in range(len(rows))]
+        system: list[Row] = [{j: column[i] for j, column in enumerate(acting)} for i in range(len(rows))]
         right = [sub(aim, value) for aim, value in zip(aims, _applied(rows, free), strict=True)]
         (sizes,), pivots = eliminated(system, [right])
         response: Scalar = 1.0
-        if any(own.kind == "slip" and mu for own, mu in zip(mode, self._dynamics.friction, strict=True)):
+        if any(action.kind == "slip" and mu for action, mu in zip(mode, self._dynamics.friction, strict=True)):
             plain, _ = eliminated(mass, [self._free(row) for row in rows])
-            smooth = [_applied(rows, each) for each in plain]
-            _, others = eliminated([{j: each[i] for j, each in enumerate(smooth)} for i in range(len(rows))], [])
-            for one, other in zip(pivots, others, strict=True):
-                response = mul(response, one / other)
-        forces: list[Vector | None] = [None if own.kind == "open" else [0.0, 0.0, 0.0] for own in mode]
+            smooth = [_applied(rows, column) for column in plain]
+            _, others = eliminated([{j: column[i] for j, column in enumerate(smooth)} for i in range(len(rows))], [])
+            for pivot, smooth_pivot in zip(pivots, others, strict=True):
+                response = mul(response, pivot / smooth_pivot)
+        forces: list[Vector | None] = [None if action.kind == "open" else [0.0, 0.0, 0.0] for action in mode]
         moved = list(free)
-        for (k, along), size, each in zip(owner, sizes, responses, strict=True):
+        for (k, force_direction), size, column in zip(owner, sizes, responses, strict=True):
             force = forces[k]
             assert force is not None  # its owner is closed
-            forces[k] = plus(force, scaled(size, along))
-            moved = plus(moved, scaled(size, each))
+            forces[k] = plus(force, scaled(size, force_direction))
+            moved = plus(moved, scaled(size, column))
         turning.add_to(forces, sizes)
         slide_rates = [plus(_moved(J, moved), bias) for J, bias in slides]
         drives = []
@@ -243,8 +243,8 @@ class TreeSymbols:
                 turn = body.turn.get(i, _NONE)
                 load[i] = add(load[i], dot(way, pull), dot(turn, moment))
                 carried, turned_by = scaled(float(data.mass), way), turned(inertia, turn)
-                for j, other in move.items():
-                    value = add(dot(carried, other), dot(turned_by, body.turn.get(j, _NONE)))
+                for j, factor in move.items():
+                    value = add(dot(carried, factor), dot(turned_by, body.turn.get(j, _NONE)))
                     if not is_zero(value):
                         mass[i][j] = add(mass[i].get(j, 0.0), value)
         for joint, at_q, at_v in zip(m.joints, m.q_slices, m.v_slices, strict=True):
@@ -257,12 +257,12 @@ class TreeSymbols:
         limits, efforts = list[Scalar](), list[Scalar]()
         for actuator in m.actuators:
             place, n = m.place_of(actuator.joint)
-            wanted = actuator.wanted(time, q[place], v[n], functions)
+            effort = actuator.wanted(time, q[place], v[n], functions)
             if actuator.limit is not None:
-                wanted, guard = limited(wanted, float(actuator.bound), clamped[len(limits)], functions["sqrt"])
+                effort, guard = limited(effort, float(actuator.bound), clamped[len(limits)], functions["sqrt"])
                 limits.append(guard)
-            efforts.append(wanted)
-            load[n] = add(load[n], wanted)
+            efforts.append(effort)
+            load[n] = add(load[n], effort)
         add_point_loads(m, bodies, load, time, functions)
         driven = [(n, mass[n], load[n]) for _, _, n in m.prescribed]
         for joint, _, n in m.prescribed:
@@ -272,8 +272,8 @@ class TreeSymbols:
 
     def _free(self, row: Row) -> list[Scalar]:
         """Loads along the velocities; those along prescribed ones move nothing."""
-        held = {n for _, _, n in self._mechanism.prescribed}
-        return [0.0 if n in held else row.get(n, 0.0) for n in range(self._mechanism.nv)]
+        prescribed = {n for _, _, n in self._mechanism.prescribed}
+        return [0.0 if n in prescribed else row.get(n, 0.0) for n in range(self._mechanism.nv)]
 
 
 def _slide(

@@ -102,9 +102,9 @@ def contact_forces(
     static = friction if static is None else static
     least = _RESTS * float(np.abs(c).max())
     if len(friction) > 1 and (friction + bounds).all() and all(slip is None for slip in sliding):
-        held = _all_held(G, c, static, bounds, max(near, _RESTS), max(near, AT_BOUND), pressing)
-        if held is not None:
-            return held.reshape(-1, 3), ["stick"] * len(friction)
+        sticking_forces = _all_held(G, c, static, bounds, max(near, _RESTS), max(near, AT_BOUND), pressing)
+        if sticking_forces is not None:
+            return sticking_forces.reshape(-1, 3), ["stick"] * len(friction)
     for _ in range(_SWEEPS):
         last_forces = f.copy()
         for k, mu in enumerate(friction):
@@ -248,20 +248,20 @@ def _idle(
     idle = [k for k, kind in enumerate(done) if kind == "open" and w[k, 0] <= least]
     if not (idle and least):
         return []
-    closed = [k for k, kind in enumerate(done) if kind != "open" or k in idle]
-    pushes = np.zeros((len(G), len(closed)))  # unit normal forces with their friction
-    for place, k in enumerate(closed):
+    closed_contacts = [k for k, kind in enumerate(done) if kind != "open" or k in idle]
+    pushes = np.zeros((len(G), len(closed_contacts)))  # unit normal forces with their friction
+    for place, k in enumerate(closed_contacts):
         speed = float(np.linalg.norm(w[k, 1:]))
         way = w[k, 1:] / speed if speed > least else np.zeros(2)
         slip = sliding[k]
         mu = friction[k] if np.isfinite(friction[k]) else 0.0  # what never slips has no friction of a slip
         pushes[3 * k : 3 * k + 3, place] = [1.0, *(-mu * (way if slip is None else slip))]
-    normals = [3 * k for k in closed]
+    normals = [3 * k for k in closed_contacts]
     _, sizes, ways = np.linalg.svd(G[np.ix_(normals, normals)])
     splits = ways[(sizes > _SHARES * sizes[0]).sum() :]
     spread = np.abs(G @ pushes @ splits.T).max(initial=0.0)
     share = np.linalg.norm(splits, axis=0) > _SHARES
-    return [k for k in idle if share[closed.index(k)]] if spread <= _SHARES * np.abs(G).max() else []
+    return [k for k in idle if share[closed_contacts.index(k)]] if spread <= _SHARES * np.abs(G).max() else []
 
 
 def _all_held(
@@ -277,9 +277,9 @@ def _all_held(
     scale = natural_rows(G)
     values, vectors = np.linalg.eigh(G * np.outer(scale, scale))
     whole = values > NULL * values[-1]
-    held: Array = -scale * (vectors[:, whole] @ ((vectors[:, whole].T @ (scale * c)) / values[whole]))
-    rounded = _ROUND_OFF * float((scale * (np.abs(G) @ np.abs(held))).max())
-    if np.abs(scale * (c + G @ held)).max() > max(rests * float(np.abs(scale * c).max()), rounded):
+    forces: Array = -scale * (vectors[:, whole] @ ((vectors[:, whole].T @ (scale * c)) / values[whole]))
+    rounded = _ROUND_OFF * float((scale * (np.abs(G) @ np.abs(forces))).max())
+    if np.abs(scale * (c + G @ forces)).max() > max(rests * float(np.abs(scale * c).max()), rounded):
         return None
     count = len(friction)
     cones = cones_of(
@@ -288,15 +288,15 @@ def _all_held(
         friction=friction,
         bounds=bounds,
         pressed_by=pressing,
-        force=held.reshape(count, 3),
+        force=forces.reshape(count, 3),
         shifts=(scale[:, None] * vectors[:, ~whole]).reshape(count, 3, -1),
     )
     if cones.hold(np.zeros(len(whole) - whole.sum()), near):
-        return held
+        return forces
     best = best_distribution(cones)
     if best is None or not cones.hold(best.weights, near):
         return None
-    return np.asarray(held + scale * (vectors[:, ~whole] @ best.weights))
+    return np.asarray(forces + scale * (vectors[:, ~whole] @ best.weights))
 
 
 def robust_forces(

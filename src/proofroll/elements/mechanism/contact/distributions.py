@@ -42,10 +42,10 @@ class ContactCones(NamedTuple):
 
     def hold(self, weights: Array, near: float) -> bool:
         """True if all contacts press and are held; ``near``: part of a bound by which friction may exceed it."""
-        bound, held = self.bound + self.bound_rates @ weights, self.held + self.held_rates @ weights
-        size = float(np.abs(np.column_stack([bound, held])).max(initial=0.0))
+        bound, friction = self.bound + self.bound_rates @ weights, self.held + self.held_rates @ weights
+        size = float(np.abs(np.column_stack([bound, friction])).max(initial=0.0))
         least = _ROUND_OFF * size  # of a contact that bears nothing of a load
-        return bool((bound * (1 + near) + least >= np.linalg.norm(held, axis=1)).all() and (bound >= -least).all())
+        return bool((bound * (1 + near) + least >= np.linalg.norm(friction, axis=1)).all() and (bound >= -least).all())
 
 
 class Distribution(NamedTuple):

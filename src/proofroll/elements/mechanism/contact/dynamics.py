@@ -102,27 +102,27 @@ class ContactDynamics:
         return self._last.of(key, lambda: self._at(q.copy(), v.copy(), time, features))
 
     def _at(self, q: Array, v: Array, time: float, features: Features | None) -> ContactsNow:
-        found = self.equations.solve(q, v, (), time=time)
-        mass, C = self.equations.inertial(found.motion)[1], found.C
+        solution = self.equations.solve(q, v, (), time=time)
+        mass, C = self.equations.inertial(solution.motion)[1], solution.C
         mass = self.equations.weighted(mass, np.zeros(len(v)), C, np.zeros(len(C)))[0]
         loose = W = np.asarray(np.linalg.inv(mass), dtype=np.float64)
-        if found.split is not None:
-            W = W - found.split[0] @ found.split[0].T
-        touching = touches(self.mechanism, found.motion, features)
-        parts = [slide_row(found.motion, self._bodies[k], each) for k, each in enumerate(touching)]
+        if solution.split is not None:
+            W = W - solution.split[0] @ solution.split[0].T
+        touching = touches(self.mechanism, solution.motion, features)
+        parts = [slide_row(solution.motion, self._bodies[k], touch) for k, touch in enumerate(touching)]
         for contact in self._of_joints:
-            at = contact.joint.velocity
-            touching += (contact.touching(float(q[contact.joint.coordinate]), float(v[at])),)
-            parts.append((np.outer(contact.direction, np.eye(len(v))[at]), np.zeros(3)))
-        fastest = float(np.linalg.norm(found.motion.w_WB, axis=1).max()) if self.turning else 0.0
+            velocity = contact.joint.velocity
+            touching += (contact.touching(float(q[contact.joint.coordinate]), float(v[velocity])),)
+            parts.append((np.outer(contact.direction, np.eye(len(v))[velocity]), np.zeros(3)))
+        fastest = float(np.linalg.norm(solution.motion.w_WB, axis=1).max()) if self.turning else 0.0
         for friction in self.turning:
-            there = touching[friction.pressed_by]
-            turning, J, rate = turning_row(found.motion, self._bodies[friction.pressed_by])
-            touching += (friction.touching(there, turning),)
-            parts.append((friction.resisted(there.normal, J), friction.resisted_rate(there, turning, rate, fastest)))
+            touch = touching[friction.pressed_by]
+            turning, J, rate = turning_row(solution.motion, self._bodies[friction.pressed_by])
+            touching += (friction.touching(touch, turning),)
+            parts.append((friction.resisted(touch.normal, J), friction.resisted_rate(touch, turning, rate, fastest)))
         J = np.array([row for row, _ in parts]).reshape(-1, 3, len(v))
         bias = np.array([rate for _, rate in parts]).reshape(-1, 3)
-        return ContactsNow(solution=found, mass=mass, W=W, loose=loose, touching=touching, J=J, bias=bias)
+        return ContactsNow(solution=solution, mass=mass, W=W, loose=loose, touching=touching, J=J, bias=bias)
 
     def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
         """Accelerations and forces while each contact keeps the given mode, at a time [s].
@@ -135,37 +135,37 @@ class ContactDynamics:
     def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
         """Accelerations and forces at a state while each contact keeps the given mode; see :meth:`solve`."""
         mode = tuple(
-            turned(own, found, line_response(contact, J @ state.W @ J.T, state.touching)) if own.along else own
-            for contact, own, found, J in zip(self.contacts, mode, state.touching, state.J, strict=True)
+            turned(acting, touch, line_response(contact, J @ state.W @ J.T, state.touching)) if acting.along else acting
+            for contact, acting, touch, J in zip(self.contacts, mode, state.touching, state.J, strict=True)
         )
-        rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
+        rows, bias, pushes, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
         force, turning = np.zeros((len(mode), 3)), list[tuple[int, int, Array]]()
-        for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
+        for k, (acting, touch) in enumerate(zip(mode, state.touching, strict=True)):
             contact = self.contacts[k]
-            directions = held_directions(own, found, contact.presses)
+            directions = held_directions(acting, touch, contact.presses)
             rows.append(directions @ state.J[k])
             bias.append(directions @ state.bias[k])
             owner += [k] * len(directions)
-            if own.kind == "slip":
-                bias[-1] = bias[-1] + found.normal_rate @ found.slide
-                heading = self.heading(own, found) if self.friction[k] or self._bounds[k] else np.zeros(3)
+            if acting.kind == "slip":
+                bias[-1] = bias[-1] + touch.normal_rate @ touch.slide
+                heading = self.heading(acting, touch) if self.friction[k] or self._bounds[k] else np.zeros(3)
                 force[k] = -self._bounds[k] * heading
                 if contact.pressed_by is None:
                     directions = directions - self.friction[k] * heading
                 else:
                     turning.append((k, contact.pressed_by, -self.friction[k] * heading))
-            along += list(directions)
+            pushes += list(directions)
         K, free = np.concatenate(rows), state.solution.acceleration
         free = free + state.W @ np.einsum("kin,ki->n", state.J, force)
         if not owner:
             none = np.zeros((len(mode), 3, 0))
             return ContactSolution(state, mode, acceleration=free, force=force, response=1.0, shifts=none, spread=0.0)
-        D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
-        owned = list(zip(owner, along, strict=True))
-        moments = moments_by_pressing(turning, owned, [each.normal for each in state.touching])
+        D = np.array([direction @ state.J[k] for direction, k in zip(pushes, owner, strict=True)])
+        owned = list(zip(owner, pushes, strict=True))
+        moments = moments_by_pressing(turning, owned, [touch.normal for touch in state.touching])
         for k, place, moment in moments:
             D[place] += moment @ state.J[k]
-        S, wanted = K @ state.W @ D.T, -np.concatenate(bias)
+        S, aims = K @ state.W @ D.T, -np.concatenate(bias)
         smooth = K @ state.W @ K.T
         units = natural_rows(K @ state.loose @ K.T)
         values, vectors = np.linalg.eigh(smooth * np.outer(units, units))
@@ -179,11 +179,11 @@ class ContactDynamics:
         # forces of a heavy body that cancel on a light one leave digits to the second round
         for _ in range(_ROUNDS):
             step = state.W @ (state.mass @ (bound - free) + D.T @ z)
-            left = U[:, kept].T @ (units * (wanted - K @ (free + step)))
+            left = U[:, kept].T @ (units * (aims - K @ (free + step)))
             change = units * (V[kept].T @ (left / sizes[kept]))
             z, free = z + change, free + step + state.W @ (D.T @ change)
         shifts = np.zeros((len(mode), 3, ways.shape[1]))
-        for k, direction, size, loose in zip(owner, along, z, ways, strict=True):
+        for k, direction, size, loose in zip(owner, pushes, z, ways, strict=True):
             force[k] += size * direction
             shifts[k] += np.outer(direction, loose)
         for k, place, moment in moments:
@@ -195,9 +195,9 @@ class ContactDynamics:
         return ContactSolution(state, mode, free, force, response=response, shifts=shifts, spread=spread)
 
     @staticmethod
-    def heading(own: Acting, found: Touching) -> Array:
+    def heading(acting: Acting, touch: Touching) -> Array:
         """Unit direction in which a contact slips; its friction acts against it."""
-        return heading_of(own, found)
+        return heading_of(acting, touch)
 
     def rate(self, y: Array, mode: ContactMode) -> Array:
         """Right-hand side for the state (q, v, time)."""
@@ -232,21 +232,23 @@ class ContactDynamics:
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""
         (q, v, time), presses = self.parts(y), [contact.presses for contact in self.contacts]
-        closed = [k for k, own in enumerate(mode) if own.kind != "open" and presses[k]]
+        closed_contacts = [k for k, acting in enumerate(mode) if acting.kind != "open" and presses[k]]
         unit = self.equations.tree.normalised(q)
-        q = on_stops([self.contacts[k] for k in closed], unit if np.abs(unit - q).max(initial=0.0) > EXACT else q)
+        q = on_stops(
+            [self.contacts[k] for k in closed_contacts], unit if np.abs(unit - q).max(initial=0.0) > EXACT else q
+        )
         state = self.at(q, v, time, features := features_of(mode))
-        gaps = np.array([state.touching[k].gap for k in closed])
-        found, K = state.solution, forbidding_rows(mode, state.touching, state.J, presses)
-        left = [found.rows.residual, found.C @ v, gaps, K @ v]
+        gaps = np.array([state.touching[k].gap for k in closed_contacts])
+        solution, K = state.solution, forbidding_rows(mode, state.touching, state.J, presses)
+        left = [solution.rows.residual, solution.C @ v, gaps, K @ v]
         if np.abs(np.concatenate(left)).max(initial=0.0) > EXACT:
             y = np.append(self.equations.eliminated(y[:-1], ()), time)
             if not len(K):
                 return y
             (q, v, _), state = self.parts(y), self.at(*self.parts(y), features)
-            normals = np.array([state.touching[k].normal @ state.J[k] for k in closed]).reshape(-1, len(v))
-            gaps = np.array([state.touching[k].gap for k in closed])
-            q = self.equations.tree.moved(q, -least_motion_for(state.W, normals, gaps)) if closed else q
+            normals = np.array([state.touching[k].normal @ state.J[k] for k in closed_contacts]).reshape(-1, len(v))
+            gaps = np.array([state.touching[k].gap for k in closed_contacts])
+            q = self.equations.tree.moved(q, -least_motion_for(state.W, normals, gaps)) if closed_contacts else q
             state = self.at(q, v, time, features)
             K = forbidding_rows(mode, state.touching, state.J, presses)
             v = v - least_motion_for(state.W, K, K @ v)
@@ -277,20 +279,20 @@ class ContactDynamics:
             NotUnique: a disc lies flat, or capsules touch along a line.
         """
         state = self.at(q, v, time, features_of(rough))
-        closed = acting_ones(self.contacts, rough, state.free_slides)
-        which = [k for k, shut in enumerate(closed) if shut]
+        closed_mask = acting_ones(self.contacts, rough, state.free_slides)
+        which = [k for k, shut in enumerate(closed_mask) if shut]
         self._refuse_flat(state, which, time)
         if not which:
             return rough, np.inf
         frames = {k: frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which}
         J = np.concatenate([frames[k].T @ state.J[k] for k in which])
         c = J @ state.solution.acceleration + np.concatenate([frames[k].T @ state.bias[k] for k in which])
-        sliding, ways = list[Array | None](), off_stops(self.contacts, closed)
+        sliding, ways = list[Array | None](), off_stops(self.contacts, closed_mask)
         for place, k in enumerate(which):
-            found = state.touching[k]
+            touch = state.touching[k]
             if self.contacts[k].presses:
-                c[3 * place] += found.normal_rate @ found.slide
-            across = frames[k][:, 1:].T @ ways.get(k, rough[k].heading or found.slide)
+                c[3 * place] += touch.normal_rate @ touch.slide
+            across = frames[k][:, 1:].T @ ways.get(k, rough[k].heading or touch.slide)
             sliding.append(None if rough[k].kind == "stick" and k not in ways else across / np.linalg.norm(across))
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
         moved = state.free_slides.moved[which]
@@ -310,13 +312,13 @@ class ContactDynamics:
             static=static[which],
             pressed_by=pressed_by(self.contacts, which),
         )
-        mode, moves = [OPEN for _ in closed], (c + G @ force.ravel()).reshape(-1, 3)
+        mode, moves = [OPEN for _ in closed_mask], (c + G @ force.ravel()).reshape(-1, 3)
         for place, k in enumerate(which):
-            own = slice(3 * place, 3 * place + 3)
+            part = slice(3 * place, 3 * place + 3)
             slides = sliding[place]
             if slides is None:  # friction acts against the slide, and one that carries nothing has none
                 slides = -force[place, 1:] if force[place, 1:].any() else moves[place, 1:]
-            by_force = line_response(self.contacts[k], frames[k] @ G[own, own] @ frames[k].T, state.touching)
+            by_force = line_response(self.contacts[k], frames[k] @ G[part, part] @ frames[k].T, state.touching)
             mode[k] = first_mode(done[place], frames[k], slides, frames[k].T @ by_force @ frames[k])
         return with_features(tuple(mode), features_of(rough)), np.inf if same else 0.0
 
@@ -324,7 +326,7 @@ class ContactDynamics:
         self,
         q: Array,
         v: Array,
-        closed: Sequence[int],
+        closed_contacts: Sequence[int],
         restitution: Array,
         time: float = 0.0,
         sideways: Array | None = None,
@@ -335,37 +337,37 @@ class ContactDynamics:
         Args:
             q: coordinates.
             v: velocities before it.
-            closed: contacts whose gaps are closed.
+            closed_contacts: contacts whose gaps are closed.
             restitution: of each of them.
             time: of the impact, for messages [s].
             sideways: tangential restitution of each of them; None: none has any.
             features: of solids that touch; None: the nearest.
 
         Returns:
-            The velocities, the impulses (closed, 3), and the margin to another outcome: inf, or 0 if it is not unique.
+            The velocities, the impulses (contacts, 3), the margin to another outcome: inf, or 0 if it is not unique.
 
         Raises:
             NotUnique: several contacts press each other, so that their order counts; or one is along a line.
         """
         state = self.at(q, v, time, features)
-        self._refuse_flat(state, closed, time)
-        frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed]
-        J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, closed, strict=True)])
-        sideways = np.zeros(len(closed)) if sideways is None else sideways
+        self._refuse_flat(state, closed_contacts, time)
+        frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed_contacts]
+        J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, closed_contacts, strict=True)])
+        sideways = np.zeros(len(closed_contacts)) if sideways is None else sideways
         c = returning(J @ v, restitution, sideways)
-        G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed]
-        sliding = [None] * len(closed)
+        G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed_contacts]
+        sliding, numbers = [None] * len(closed_contacts), list(closed_contacts)
         impulse, done, same = robust_forces(
-            G, c, self.friction[list(closed)], sliding, names, None, time, _NO_IMPULSE, self._static[list(closed)]
+            G, c, self.friction[numbers], sliding, names, None, time, _NO_IMPULSE, self._static[numbers]
         )
         speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
         hit = (speeds < -TOUCHING * scale) | (impulse[:, 0] > TOUCHING * impulse[:, 0].max())
-        lossy = np.array([bool(self.contacts[k].friction or self.contacts[k].restitution) for k in closed])
+        lossy = np.array([bool(self.contacts[k].friction or self.contacts[k].restitution) for k in closed_contacts])
         if not self.mechanism.together and ordered(G, lossy, hit):
-            groups = groups_of([self.contacts[k].pair for k in closed], J @ v, together=False)
+            groups = groups_of([self.contacts[k].pair for k in closed_contacts], J @ v, together=False)
 
             def strike(response: Array, slides: Array, group: list[int]) -> Array:
-                of = np.array([closed[k] for k in group])
+                of = np.array([numbers[k] for k in group])
                 comes = returning(slides, restitution[group], sideways[group])
                 told = [names[k] for k in group]
                 near = _ROUND_OFF * scale / float(np.abs(comes).max())
@@ -377,20 +379,20 @@ class ContactDynamics:
             jumps = state.W @ J.T
             told = [names[k] for k in np.flatnonzero(hit)]
             once, *turns = (
-                left_by(J @ v + G @ given, TOUCHING * scale) for given in (impulse.ravel(), *outcomes.impulses)
+                left_by(J @ v + G @ impulses, TOUCHING * scale) for impulses in (impulse.ravel(), *outcomes.impulses)
             )
             alike = all(turn == once for turn in turns)
             refuse_spread(jumps @ outcomes.impulses.T, outcomes, told, time, jumps @ impulse.ravel(), alike=alike)
             same = True
-        after = v + state.W @ J.T @ impulse.ravel()
+        velocities = v + state.W @ J.T @ impulse.ravel()
         # The impulses are found to some digits; what holds fixes the velocities to the last one.
-        held = np.array([[way != "open", *[way == "stick"] * 2] for way in done]).ravel()
-        after -= least_motion_for(state.W, J[held], (J @ (after - v) + c)[held])
-        return after, impulse, np.inf if same else 0.0
+        held_rows = np.array([[way != "open", *[way == "stick"] * 2] for way in done]).ravel()
+        velocities -= least_motion_for(state.W, J[held_rows], (J @ (velocities - v) + c)[held_rows])
+        return velocities, impulse, np.inf if same else 0.0
 
-    def _refuse_flat(self, state: ContactsNow, closed: Sequence[int], time: float) -> None:
+    def _refuse_flat(self, state: ContactsNow, closed_contacts: Sequence[int], time: float) -> None:
         """Raises NotUnique if one of these contacts is along an edge or a line at a time [s]."""
-        for k in closed:
+        for k in closed_contacts:
             if state.touching[k].flat:
                 raise lying(self.mechanism.contacts[k], time)
 
@@ -399,20 +401,20 @@ class ContactDynamics:
 
         Forces [N], (contacts, 3), and the :func:`contact_sums` [N], (sums, 3), are NaN where they are not determinate.
         """
-        found, count = self.solve(q, v, mode, time), len(self._bodies)
+        solution, count = self.solve(q, v, mode, time), len(self._bodies)
         joints = mode_of_joints(self.equations.switched, self.contacts, mode)
 
         def record(force: Array) -> dict[str, Any]:
-            return self.equations.sample(q, v, joints, time, *self._loads(found.state, force))
+            return self.equations.sample(q, v, joints, time, *self._loads(solution.state, force))
 
-        fields, pressed = record(found.force), found.force[:count]
-        for shift in np.moveaxis(found.undetermined, 2, 0):  # what another distribution changes is not determinate
-            others = record(found.force + shift)
+        fields, pressed = record(solution.force), solution.force[:count]
+        for shift in np.moveaxis(solution.undetermined, 2, 0):  # what another distribution changes is not determinate
+            others = record(solution.force + shift)
             for name in ("wrench", "named"):
                 fields[name] = np.where(np.abs(others[name] - fields[name]) > RANK, np.nan, fields[name])
-        moved = np.abs(np.einsum("pk,kiw->piw", self.sums, found.undetermined)).max(axis=2, initial=0.0)
+        moved = np.abs(np.einsum("pk,kiw->piw", self.sums, solution.undetermined)).max(axis=2, initial=0.0)
         sums = np.where(moved <= RANK, self.sums[:, :count] @ pressed, np.nan)
-        return fields, np.where(found.determinate[:count], pressed, np.nan), sums
+        return fields, np.where(solution.determinate[:count], pressed, np.nan), sums
 
     def _loads(self, state: ContactsNow, force: Array) -> tuple[Array, Array]:
         """Loads by contacts of bodies: along the velocities, and about the world's origin, (bodies + 1, 6)."""

@@ -29,7 +29,7 @@ class FreeSlides(NamedTuple):
 
 
 def free_slides(
-    touching: Sequence[Touching], J: Array, bias: Array, acceleration: Array, W: Array, loose: Array, held: Array
+    touching: Sequence[Touching], J: Array, bias: Array, acceleration: Array, W: Array, loose: Array, joint_force: Array
 ) -> FreeSlides:
     """See :class:`FreeSlides`.
 
@@ -40,13 +40,13 @@ def free_slides(
         acceleration: without forces of contacts, (velocities,).
         W: accelerations by unit forces along the velocities, (velocities, velocities).
         loose: the same without loops, couplings and motions.
-        held: forces of these along the velocities, (velocities,).
+        joint_force: forces of these along the velocities, (velocities,).
     """
-    across = np.array([np.eye(3) - np.outer(each.normal, each.normal) for each in touching]).reshape(-1, 3, 3)
+    across = np.array([np.eye(3) - np.outer(touch.normal, touch.normal) for touch in touching]).reshape(-1, 3, 3)
     J, bias = across @ J, np.einsum("kij,kj->ki", across, bias)
-    response, most = (np.einsum("kin,nm,kim->k", J, each, J) for each in (W, loose))
+    response, most = (np.einsum("kin,nm,kim->k", J, metric, J) for metric in (W, loose))
     # in the norm of kinetic energy, which has one unit for all velocities
-    strength = np.sqrt(acceleration @ np.linalg.solve(loose, acceleration)) + np.sqrt(held @ loose @ held)
+    strength = np.sqrt(acceleration @ np.linalg.solve(loose, acceleration)) + np.sqrt(joint_force @ loose @ joint_force)
     sizes = np.sqrt(most) * strength + np.linalg.norm(bias, axis=1)
     return FreeSlides(J @ acceleration + bias, _RESTS * sizes, response <= NO_RESPONSE * most)
 
@@ -72,6 +72,6 @@ def passing(rough: ContactMode, slides: FreeSlides) -> ContactMode:
     sizes = np.linalg.norm(slides.rates, axis=1)
     goes = slides.moved & (sizes > slides.least)
     return tuple(
-        own._replace(kind="slip", heading=direction_of(rate / size)) if on and own.kind == "stick" else own
-        for own, on, rate, size in zip(rough, goes, slides.rates, sizes, strict=True)
+        acting._replace(kind="slip", heading=direction_of(rate / size)) if on and acting.kind == "stick" else acting
+        for acting, on, rate, size in zip(rough, goes, slides.rates, sizes, strict=True)
     )

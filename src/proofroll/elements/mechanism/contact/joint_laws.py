@@ -84,12 +84,12 @@ class JointContact:
 
 def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
     """Laws of switched joints as contacts: of each joint its stops, then its dry friction."""
-    found = []
+    laws = []
     for joint in joints:
-        found += [JointContact(joint, side) for side, stop in ((1, joint.low), (-1, joint.high)) if np.isfinite(stop)]
+        laws += [JointContact(joint, side) for side, stop in ((1, joint.low), (-1, joint.high)) if np.isfinite(stop)]
         if joint.friction:
-            found.append(JointContact(joint, 0))
-    return tuple(found)
+            laws.append(JointContact(joint, 0))
+    return tuple(laws)
 
 
 def line_response(contact: object, G: Array, touching: Sequence[Touching]) -> Array:
@@ -105,16 +105,16 @@ def line_response(contact: object, G: Array, touching: Sequence[Touching]) -> Ar
     return G
 
 
-def on_stops(closed: Sequence[object], q: Array) -> Array:
+def on_stops(closed_contacts: Sequence[object], q: Array) -> Array:
     """Coordinates with those of joints that rest on a stop, of the contacts that are closed, exactly at it."""
     q = q.copy()
-    for contact in closed:
+    for contact in closed_contacts:
         if isinstance(contact, JointContact):
             q[contact.joint.coordinate] = contact.stop
     return q
 
 
-def off_stops(contacts: Sequence[object], closed: Sequence[bool]) -> dict[int, Array]:
+def off_stops(contacts: Sequence[object], closed_mask: Sequence[bool]) -> dict[int, Array]:
     """Direction off the stop of the dry friction of each joint that rests on one, by the number of that friction.
 
     Stop and friction hold the joint together, by at least minus the bound of friction. So friction counts there as that
@@ -122,7 +122,7 @@ def off_stops(contacts: Sequence[object], closed: Sequence[bool]) -> dict[int, A
     """
     sides = {
         contact.joint.number: contact.side
-        for contact, shut in zip(contacts, closed, strict=True)
+        for contact, shut in zip(contacts, closed_mask, strict=True)
         if shut and isinstance(contact, JointContact) and contact.side
     }
     return {
@@ -136,17 +136,18 @@ def rebounding(contacts: Sequence[object], mode: ContactMode, hit: int) -> Conta
     """Mode after a rebound on a contact; if that is a stop, the dry friction of its joint acts against the way off."""
     ways = off_stops(contacts, [k == hit for k in range(len(mode))])
     return tuple(
-        Acting("slip", direction_of(ways[k]), direction_of(ways[k])) if k in ways else own for k, own in enumerate(mode)
+        Acting("slip", direction_of(ways[k]), direction_of(ways[k])) if k in ways else acting
+        for k, acting in enumerate(mode)
     )
 
 
-def refuse_rubbing_stops(contacts: Sequence[object], closed: Sequence[bool], time: float) -> None:
+def refuse_rubbing_stops(contacts: Sequence[object], closed_mask: Sequence[bool], time: float) -> None:
     """Refuses a joint with dry friction that a stop holds from a time on [s].
 
     Raises:
         Refused: the shares of its friction and its stop are not determinate, and neither is when it leaves the stop.
     """
-    for contact, shut in zip(contacts, closed, strict=True):
+    for contact, shut in zip(contacts, closed_mask, strict=True):
         if shut and isinstance(contact, JointContact) and contact.side and contact.joint.friction:
             raise Refused(
                 f"joint {contact.name} rests on a stop from t = {time:.6g} s on and has dry friction, beside contacts "
@@ -157,17 +158,17 @@ def refuse_rubbing_stops(contacts: Sequence[object], closed: Sequence[bool], tim
 
 def mode_of_joints(joints: Sequence[SwitchedJoint], contacts: Sequence[object], mode: ContactMode) -> Mode:
     """Modes of the switched joints that a mode of contacts implies."""
-    own = {joint.name: "free" for joint in joints}
+    joint_modes = {joint.name: "free" for joint in joints}
     for contact, acting in zip(contacts, mode, strict=True):
         if not isinstance(contact, JointContact) or acting.kind == "open":
             continue
         if contact.side:
-            own[contact.name] = "low" if contact.side > 0 else "high"
-        elif own[contact.name] in STOPPED:
+            joint_modes[contact.name] = "low" if contact.side > 0 else "high"
+        elif joint_modes[contact.name] in STOPPED:
             continue
         elif acting.kind == "stick":
-            own[contact.name] = "stick"
+            joint_modes[contact.name] = "stick"
         else:
             assert acting.along is not None  # one coordinate is one line
-            own[contact.name] = contact.joint.moving(acting.along[1])
-    return tuple(own.values())
+            joint_modes[contact.name] = contact.joint.moving(acting.along[1])
+    return tuple(joint_modes.values())

@@ -23,13 +23,13 @@ def rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[Ar
     """Force and outcome of friction without a normal, along a line or in a plane, while all other forces stay."""
     if sliding is not None:
         return np.array([0.0, *(-bound * sliding)]), "slip"
-    held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
-    size = float(np.linalg.norm(held))
+    force = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
+    size = float(np.linalg.norm(force))
     if size <= bound * (1 + AT_BOUND):
-        return held, "stick"
+        return force, "stick"
     low, high = np.linalg.eigvalsh(G[1:, 1:])
     if high - low <= AT_BOUND * high or low <= AT_BOUND * high:  # alike in all directions, or along a line alone
-        return held * (bound / size), "slip"
+        return force * (bound / size), "slip"
 
     def moved(t: Array) -> Array:
         return np.asarray((c[1:] - bound * (G[1:, 1:] @ t).T).T)
@@ -84,10 +84,11 @@ def force_of_one(
         return _held(G, c, sliding, place, least), "stick"
     if sliding is not None or not mu:
         return _pressing(G, c, mu, np.zeros(2) if sliding is None else sliding, place), "slip"
-    held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
-    rests = float(np.abs(c + G @ held).max()) <= least  # joints may let a contact that rebounds do nothing but slide
-    if rests and np.linalg.norm(held[1:]) <= static * held[0] * (1 + AT_BOUND):
-        return held, "stick"
+    sticking_force = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
+    # Joints may let a contact that rebounds do nothing but slide.
+    rests = float(np.abs(c + G @ sticking_force).max()) <= least
+    if rests and np.linalg.norm(sticking_force[1:]) <= static * sticking_force[0] * (1 + AT_BOUND):
+        return sticking_force, "stick"
 
     def moved(t: Array) -> Array:
         return np.asarray((c + G @ _pressing(G, c, mu, t, place))[1:])
@@ -105,12 +106,12 @@ def _held(G: Array, c: Array, sliding: Array | None, place: tuple[str, float], l
         Refused: the contact slides, or nothing can hold it.
         NotUnique: the contact would tear.
     """
-    held = np.asarray(-np.linalg.pinv(G, 1e-12, hermitian=True) @ c)
-    if sliding is not None or float(np.abs(c + G @ held).max()) > least:
+    sticking_force = np.asarray(-np.linalg.pinv(G, 1e-12, hermitian=True) @ c)
+    if sliding is not None or float(np.abs(c + G @ sticking_force).max()) > least:
         raise Refused("{} at t = {:.6g} s would slip, but has friction = inf; give it a number".format(*place))
-    if held[0] <= 0:
+    if sticking_force[0] <= 0:
         raise torn(*place)
-    return held
+    return sticking_force
 
 
 def _across(G: Array, c: Array, mu: float, place: tuple[str, float]) -> Array:

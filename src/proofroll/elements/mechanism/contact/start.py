@@ -136,15 +136,15 @@ def closed_and_still(
         [rate, *(float(np.linalg.norm(touch.slide)) / size for touch, size in zip(touching, lengths, strict=True))]
     )
     least = lengths * digits
-    closed = [
+    closed_mask = [
         not touch.absent and touch.gap <= size and abs(float(touch.normal @ touch.slide)) <= size * rate
         for touch, size in zip(touching, least, strict=True)
     ]
     resting = [
         shut and bool(np.linalg.norm(touch.slide) <= size * rate)
-        for shut, touch, size in zip(closed, touching, least, strict=True)
+        for shut, touch, size in zip(closed_mask, touching, least, strict=True)
     ]
-    return closed, resting
+    return closed_mask, resting
 
 
 def at_start(
@@ -154,8 +154,8 @@ def at_start(
     scale, kinds = natural_scale(mechanism), [joint.kind for joint in mechanism.joints]
     turns = [isinstance(c, JointContact) and kinds[c.joint.number] != JointKind.PRISMATIC for c in contacts]
     lengths = np.where(turns, 1.0, scale.length)
-    closed, resting = closed_and_still(touching, lengths, scale.rate, start_digits(contacts))
-    return modes_of(shut_by_pressing(contacts, closed), resting, tuple(touch.feature for touch in touching))
+    closed_mask, resting = closed_and_still(touching, lengths, scale.rate, start_digits(contacts))
+    return modes_of(shut_by_pressing(contacts, closed_mask), resting, tuple(touch.feature for touch in touching))
 
 
 def check_contacts(mechanism: Mechanism) -> None:

@@ -40,8 +40,8 @@ class ContactsNow:
     def free_slides(self) -> FreeSlides:
         """Slides of the contacts without their forces."""
         solution = self.solution
-        held = solution.C.T @ solution.multipliers
-        return free_slides(self.touching, self.J, self.bias, solution.acceleration, self.W, self.loose, held)
+        joint_force = solution.C.T @ solution.multipliers
+        return free_slides(self.touching, self.J, self.bias, solution.acceleration, self.W, self.loose, joint_force)
 
 
 @dataclass(frozen=True)

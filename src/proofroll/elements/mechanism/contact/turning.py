@@ -57,8 +57,8 @@ class TurningFriction:
 
     def resisted(self, normal: Array, turning: Array) -> Array:
         """Resisted part of angular velocities, (3,) or (3, velocities); 0 where it is round-off of the whole."""
-        along = np.outer(normal, normal)
-        part = (along if self.spins else np.eye(3) - along) @ turning
+        projection = np.outer(normal, normal)
+        part = (projection if self.spins else np.eye(3) - projection) @ turning
         return _without_round_off(part, np.linalg.norm(turning, axis=0))
 
     def resisted_rate(self, touch: Touching, turning: Array, rate: Array, fastest: float) -> Array:
@@ -84,13 +84,13 @@ def _without_round_off(part: Array, size: Any) -> Array:
 
 def turning_frictions(contacts: Sequence[BodyContact]) -> tuple[TurningFriction, ...]:
     """Friction against turning of each contact that has some."""
-    found = []
+    laws = []
     for k, contact in enumerate(contacts):
         for spins, size in ((False, contact.rolling_resistance), (True, contact.spinning_friction)):
             if size:
                 text = f"{contact.name} {'spin' if spins else 'roll'}"
-                found.append(TurningFriction(name=contact.name, pressed_by=k, spins=spins, friction=size, pair=text))
-    return tuple(found)
+                laws.append(TurningFriction(name=contact.name, pressed_by=k, spins=spins, friction=size, pair=text))
+    return tuple(laws)
 
 
 def moments_by_pressing(
@@ -120,19 +120,19 @@ def opened(contacts: Sequence[_Pressed], mode: ContactMode, k: int) -> ContactMo
     """Mode in which a contact opens, and friction against turning with it."""
     pairs = zip(contacts, mode, strict=True)
     return tuple(
-        OPEN._replace(feature=own.feature) if k in {number, contact.pressed_by} else own
-        for number, (contact, own) in enumerate(pairs)
+        OPEN._replace(feature=acting.feature) if k in {number, contact.pressed_by} else acting
+        for number, (contact, acting) in enumerate(pairs)
     )
 
 
-def shut_by_pressing(contacts: Sequence[_Pressed], closed: Sequence[bool]) -> list[bool]:
+def shut_by_pressing(contacts: Sequence[_Pressed], closed_mask: Sequence[bool]) -> list[bool]:
     """True for closed contacts; friction against turning is closed with the contact that presses."""
     return [
-        closed[contact.pressed_by] if contact.pressed_by is not None else shut
-        for contact, shut in zip(contacts, closed, strict=True)
+        closed_mask[contact.pressed_by] if contact.pressed_by is not None else shut
+        for contact, shut in zip(contacts, closed_mask, strict=True)
     ]
 
 
 def pressed_by(contacts: Sequence[_Pressed], which: Sequence[int]) -> list[int | None]:
     """Place among some contacts of that whose normal force bounds each; None: its own."""
-    return [None if (k := contacts[own].pressed_by) is None else list(which).index(k) for own in which]
+    return [None if (k := contacts[number].pressed_by) is None else list(which).index(k) for number in which]

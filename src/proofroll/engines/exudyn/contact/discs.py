@@ -133,11 +133,11 @@ class Discs(Redundant):
 
     def _lying(self, made: _Made) -> tuple[float, Array, Array]:
         """Gap [m], normal from b to a, and place [m] of a contact, read from Exudyn's joint."""
-        item, now = self.system.GetObject(made.item), exu.ConfigurationType.Current
-        plane, centre = (np.array(self.system.GetMarkerOutput(k, Output.Position, now)) for k in item["markerNumbers"])
+        item, kind = self.system.GetObject(made.item), exu.ConfigurationType.Current
+        plane, centre = (np.array(self.system.GetMarkerOutput(k, Output.Position, kind)) for k in item["markerNumbers"])
         normal, place = self._directions(made)[:, 2], np.array(self.system.GetObjectOutput(made.item, Output.Position))
         axis = np.reshape(
-            self.system.GetMarkerOutput(item["markerNumbers"][1], Output.RotationMatrix, now), (3, 3)
+            self.system.GetMarkerOutput(item["markerNumbers"][1], Output.RotationMatrix, kind), (3, 3)
         ) @ np.array(item["discAxis"])
         height = item["discRadius"] * np.linalg.norm(cross(axis, normal))
         return float(normal @ (centre - plane) - height), made.sign * normal, place

@@ -95,12 +95,12 @@ class Spheres(Redundant):
             start = dynamics.solve(*mechanism.start(), (OPEN,) * len(dynamics.contacts))
         lacking = 0.0
         for number, contact in enumerate(mechanism.contacts):
-            each = start.state.touching[number]
-            slip = each.slide - each.normal * (each.normal @ each.slide)
-            pressed, speed = max(float(start.force[number] @ each.normal), 0.0), float(np.linalg.norm(slip))
-            self._contacts.append(self._add_contact(contact, each.gap, pressed, speed, settings))
+            touch = start.state.touching[number]
+            slip = touch.slide - touch.normal * (touch.normal @ touch.slide)
+            pressed, speed = max(float(start.force[number] @ touch.normal), 0.0), float(np.linalg.norm(slip))
+            self._contacts.append(self._add_contact(contact, touch.gap, pressed, speed, settings))
             if speed < settings.penalty[1]:
-                lacking += float(np.linalg.norm(start.force[number] - pressed * each.normal))
+                lacking += float(np.linalg.norm(start.force[number] - pressed * touch.normal))
         moments = start.force[len(start.force) - len(dynamics.turning) :]
         for friction, moment in zip(dynamics.turning, moments, strict=True):
             lacking += self._add_turning(friction, moment, start.state.touching[friction.pressed_by], settings)
@@ -121,7 +121,7 @@ class Spheres(Redundant):
         sign = 1.0
         if isinstance(contact.shape_a, HalfSpace | CurvedWall):
             sides, sign = sides[::-1], -1.0
-        (body, shape), (other, second) = sides
+        (body, shape), (partner, second) = sides
         assert isinstance(shape, SphereShape)
         self._larger = max(self._larger, sunk / shape.radius)
         law: dict[str, Any] = {
@@ -131,12 +131,12 @@ class Spheres(Redundant):
             "dynamicFriction": min(contact.friction, _GRIP),
             "frictionProportionalZone": zone * _GRIP if np.isinf(contact.friction) else zone,
             "contactStiffness": stiffness,
-            "contactDamping": 2 * math.sqrt(stiffness * self._moved(body, other)),
+            "contactDamping": 2 * math.sqrt(stiffness * self._moved(body, partner)),
         }
         if isinstance(second, HalfSpace):
-            ball, plane = self._add_plane(second, other, shape, body)
-            wide = _WIDE if other == WORLD else _FOLLOWS * shape.radius
-            frame = self._turns[other] @ frame_of_axis(second.normal)
+            ball, plane = self._add_plane(second, partner, shape, body)
+            wide = _WIDE if partner == WORLD else _FOLLOWS * shape.radius
+            frame = self._turns[partner] @ frame_of_axis(second.normal)
             made = items.ObjectContactSphereTriangle(
                 markerNumbers=[ball, plane],
                 sphereRadius=shape.radius + sunk,
@@ -145,7 +145,7 @@ class Spheres(Redundant):
                 **law,
             )
         elif isinstance(second, CurvedWall):
-            hollow = self._add_hollow(second, other, shape, body)
+            hollow = self._add_hollow(second, partner, shape, body)
             self._following.append(hollow)
             made = items.ObjectContactSphereSphere(
                 markerNumbers=[hollow.sphere, hollow.marker],
@@ -156,7 +156,7 @@ class Spheres(Redundant):
         else:
             assert isinstance(second, SphereShape)
             made = items.ObjectContactSphereSphere(
-                markerNumbers=[self.marker(body, shape.centre), self.marker(other, second.centre)],
+                markerNumbers=[self.marker(body, shape.centre), self.marker(partner, second.centre)],
                 spheresRadii=[shape.radius + sunk, second.radius],
                 **law,
             )
@@ -254,22 +254,24 @@ class Spheres(Redundant):
     def _lying(self, made: _Made) -> tuple[float, Array, Array]:
         """Gap [m], normal from b to a, and place [m] of a contact, read from Exudyn's object."""
         item = self.system.GetObject(made.item)
-        now = exu.ConfigurationType.Current
-        one, two = (np.array(self.system.GetMarkerOutput(k, Output.Position, now)) for k in item["markerNumbers"])
+        kind = exu.ConfigurationType.Current
+        point_a, point_b = (
+            np.array(self.system.GetMarkerOutput(k, Output.Position, kind)) for k in item["markerNumbers"]
+        )
         if "spheresRadii" in item:
-            distance = float(np.linalg.norm(one - two))
-            n, (first, second) = (one - two) / distance, item["spheresRadii"]
+            distance = float(np.linalg.norm(point_a - point_b))
+            n, (radius_a, radius_b) = (point_a - point_b) / distance, item["spheresRadii"]
             if item["isHollowSphere1"]:
-                radius = first - made.sunk / 2
-                return second + made.sunk / 2 - radius - distance, -made.sign * n, one + radius * n
-            radius = first - made.sunk
-            return distance - radius - second, n, one - radius * n
-        R = np.reshape(self.system.GetMarkerOutput(item["markerNumbers"][1], Output.RotationMatrix, now), (3, 3))
+                radius = radius_a - made.sunk / 2
+                return radius_b + made.sunk / 2 - radius - distance, -made.sign * n, point_a + radius * n
+            radius = radius_a - made.sunk
+            return distance - radius - radius_b, n, point_a - radius * n
+        R = np.reshape(self.system.GetMarkerOutput(item["markerNumbers"][1], Output.RotationMatrix, kind), (3, 3))
         corners = np.array([item["trianglePoints"][k] for k in range(3)]) @ R.T  # iterated over, it never ends
         n = np.cross(corners[1] - corners[0], corners[2] - corners[0])
         n /= np.linalg.norm(n)
         radius = item["sphereRadius"] - made.sunk
-        return float(n @ (one - two - corners[0])) - radius, made.sign * n, one - radius * n
+        return float(n @ (point_a - point_b - corners[0])) - radius, made.sign * n, point_a - radius * n
 
 
 def _check(contact: BodyContact) -> None:

@@ -25,9 +25,9 @@ def add_turning(
 
     def wrench(system: Any, *_state: Any) -> list[float]:
         """Force and moment on the first marker, in its axes."""
-        now = exu.ConfigurationType.Current
-        w_a, w_b = (np.array(system.GetMarkerOutput(k, Output.AngularVelocity, now)) for k in markers)
-        R = np.reshape(system.GetMarkerOutput(markers[0], Output.RotationMatrix, now), (3, 3))
+        kind = exu.ConfigurationType.Current
+        w_a, w_b = (np.array(system.GetMarkerOutput(k, Output.AngularVelocity, kind)) for k in markers)
+        R = np.reshape(system.GetMarkerOutput(markers[0], Output.RotationMatrix, kind), (3, 3))
         N, normal = pressing()
         turning = friction.resisted(normal, w_a - w_b)
         moment = R.T @ turning * (-friction.friction * max(N, 0.0) / max(float(np.linalg.norm(turning)), zone))

@@ -151,11 +151,11 @@ def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:
 
 def _moving(mechanism: Mechanism) -> frozenset[str]:
     """Names of the bodies that are not fixed to the world."""
-    still = {WORLD}
+    fixed_bodies = {WORLD}
     for joint in mechanism.joints:  # sorted: the parent comes first
-        if not joint.nv and joint.parent in still:
-            still.add(joint.child)
-    return frozenset({body.name for body in mechanism.bodies} - still)
+        if not joint.nv and joint.parent in fixed_bodies:
+            fixed_bodies.add(joint.child)
+    return frozenset({body.name for body in mechanism.bodies} - fixed_bodies)
 
 
 class ContactsRead(NamedTuple):
@@ -308,8 +308,11 @@ class Contacts:
         assert slot is not None  # as of all of these
         bodies = [self._model.body(name).id for name in (contacts[number].body_a, contacts[number].body_b)]
         a, b = (Moving(data.xpos[body], data.xmat[body].reshape(3, 3), none, none) for body in bodies)
-        found = [touch(contacts[k], a, b) for k in range(number, number + slot.count)]
-        away = [np.inf if each.absent else float(np.linalg.norm(each.place - contact.pos)) for each in found]
+        candidates = [touch(contacts[k], a, b) for k in range(number, number + slot.count)]
+        away = [
+            np.inf if candidate.absent else float(np.linalg.norm(candidate.place - contact.pos))
+            for candidate in candidates
+        ]
         return number + int(np.argmin(away)), sign
 
     def add_turning(self, data: Any) -> None:
@@ -326,7 +329,7 @@ class Contacts:
         To be called like :meth:`correct`. See :attr:`.MujocoSettings.velocity_lag` and those after it.
         """
         contacts = [data.contact[index] for index in range(data.ncon)]
-        contacts = [each for each in contacts if each.efc_address >= 0 and self._number(each) in self._turned]
+        contacts = [item for item in contacts if item.efc_address >= 0 and self._number(item) in self._turned]
         if not contacts:
             return
         settings, lagging, turnings = self._settings, data.qvel.copy(), []
@@ -411,8 +414,8 @@ class Contacts:
                 friction[number] = contact.friction[0] if dim > 1 else 0.0
                 restitution[number] = -damping * model.opt.timestep - 1.0 if damping < 0 else 0.0
                 rows[number] = contact.frame.reshape(3, 3)[:dim].T @ all_rows[row : row + dim]
-        held = all_rows[: data.ne]
-        whole_rows = np.concatenate([rows.reshape(-1, model.nv), held])
+        equality_rows = all_rows[: data.ne]
+        whole_rows = np.concatenate([rows.reshape(-1, model.nv), equality_rows])
         to_joints = np.zeros_like(whole_rows)
         mujoco.mj_solveM(model, data, to_joints, whole_rows)
         whole = whole_rows @ to_joints.T

@@ -77,10 +77,10 @@ class MujocoGeoms(MujocoMechanism):
 
         An evaluation leaves the part ``share`` of an error of accelerations.
         """
-        now = self._data.qvel.copy()
+        velocities = self._data.qvel.copy()
         evaluate_behind(self._data, self._evaluate_step, self._settings.velocity_lag, share, _LAGS)
         self._walls.lift(self._contacts.depths(self._data))
-        self._data.qvel[:] = now
+        self._data.qvel[:] = velocities
         evaluate_behind(self._data, self._evaluate_step, self._settings.velocity_lag, share, _LAGS)
 
     def spec(self) -> Any:

@@ -67,7 +67,7 @@ def tangent(wall: CurvedWall, centre: Array) -> HalfSpace:
 
 def shapes_at_start(mechanism: Mechanism) -> Sequence[tuple[Shape, Shape]]:
     """Shapes of each contact, with planes tangent at the start in place of curved walls."""
-    motion, found = None, []
+    motion, pairs = None, []
     for contact in mechanism.contacts:
         shapes, end = [contact.shape_a, contact.shape_b], curved_end(contact)
         if end is not None:
@@ -76,8 +76,8 @@ def shapes_at_start(mechanism: Mechanism) -> Sequence[tuple[Shape, Shape]]:
             wall, sphere = _wall_and_sphere(contact, end)
             centre = motion.p_WB[ball] + motion.R_WB[ball] @ sphere.centre
             shapes[end] = tangent(wall, motion.R_WB[carrier].T @ (centre - motion.p_WB[carrier]))
-        found.append((shapes[0], shapes[1]))
-    return found
+        pairs.append((shapes[0], shapes[1]))
+    return pairs
 
 
 def _wall_and_sphere(contact: BodyContact, end: int) -> tuple[CurvedWall, SphereShape]:

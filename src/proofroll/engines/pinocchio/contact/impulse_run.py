@@ -104,14 +104,14 @@ class ImpulseRun(MechanismRun):
         )
         step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
         softened = dict[str, Regularised]()
-        now = Impulses(self.steps.v, *np.zeros((4, 0)))
-        still, errors = self._accelerations(now, span), self.steps.unsure(span)
-        off = [self._accelerations(now._replace(v=now.v + error), span) for error in errors]
+        impulses = Impulses(self.steps.v, *np.zeros((4, 0)))
+        accelerations, errors = self._accelerations(impulses, span), self.steps.unsure(span)
+        off = [self._accelerations(impulses._replace(v=impulses.v + error), span) for error in errors]
         for name, value in hard.items():
             size = longest(value) or 1.0  # 1 if all accelerations are zero
             others = twice[name], step[name], getattr(plain, name)
             apart = sum(longest(value - rival) for rival in others)
-            unsure = max((longest(shifted[name] - still[name]) for shifted in off), default=0.0)
+            unsure = max((longest(shifted[name] - accelerations[name]) for shifted in off), default=0.0)
             tolerance = _MARGIN * (unsure + apart) / size
             softened[name] = Regularised(tolerance, _PARTS if self._settings.convex else reason)
         return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)

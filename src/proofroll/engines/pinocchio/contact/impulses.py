@@ -249,15 +249,15 @@ class ImpulseSteps:
         A driven joint has the rate of its motion at the end of the step, and comes back to its place.
         """
         tree, rows = self._tree, self._tree.geared
-        now, tree.now = tree.now, self.t + late
+        time, tree.now = tree.now, self.t + late
         off = tree.apart(q)[0]
         tree.now = self.t + span
         rates = tree.apart(q)[1] - (_CLOSED if self._midpoint else 1.0) * off / self._dt
-        tree.now = now
+        tree.now = time
         into = inverse @ rows.T
-        held = into @ np.linalg.inv(rows @ into)
-        self._motions = np.array(np.linalg.solve(rows @ into, rates - rows @ free), dtype=float), held
-        return free + held @ (rates - rows @ free), inverse - held @ into.T
+        motor_responses = into @ np.linalg.inv(rows @ into)
+        self._motions = np.array(np.linalg.solve(rows @ into, rates - rows @ free), dtype=float), motor_responses
+        return free + motor_responses @ (rates - rows @ free), inverse - motor_responses @ into.T
 
     def unsure(self, span: float) -> Array:
         """Velocities by which errors of each row within the tolerance change those after a ``span`` [s], (rows, nv)."""
@@ -281,10 +281,11 @@ class ImpulseSteps:
     def _turning(self, q: Array, v: Array, touching: Sequence[Touching], span: float) -> Array:
         """Changes of slip and gap velocities within a ``span`` [s] in which joint velocities are constant (J̇v)."""
         later = pin.integrate(self._model, q, span * v)
-        there = self._touched(self._ahead, later, v, [contact.feature for contact in touching])
+        touching_later = self._touched(self._ahead, later, v, [contact.feature for contact in touching])
         changes = [
-            frame_of_axis(now.normal).T @ (_carried(then.slide, then.normal, now.normal) - now.slide)
-            for now, then in zip(touching, there, strict=True)
+            frame_of_axis(point.normal).T
+            @ (_carried(later_point.slide, later_point.normal, point.normal) - point.slide)
+            for point, later_point in zip(touching, touching_later, strict=True)
         ]
         return np.reshape(changes, (len(touching), 3))
 
@@ -296,10 +297,10 @@ class ImpulseSteps:
         velocity, pose = self._tree.velocity(data, frame), data.oMf[frame]
         return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)
 
-    def _posed(self, solver: _Solver, number: int, there: Touching) -> Array:
+    def _posed(self, solver: _Solver, number: int, contact_point: Touching) -> Array:
         """Poses the ``number``-th point of a solver and returns its rows, shape (3, nv)."""
         point, data = solver.points[number], self._data
-        place = pin.SE3(frame_of_axis(there.normal), there.place)
+        place = pin.SE3(frame_of_axis(contact_point.normal), contact_point.place)
         point.joint1_placement = data.oMi[point.joint1_id].actInv(place)
         point.joint2_placement = data.oMi[point.joint2_id].actInv(place)
         point.calc(self._model, data, solver.point_datas[number])
@@ -381,11 +382,11 @@ class ImpulseSteps:
             kick = self._solved(terms._replace(free=free + inverse @ impulses), shifts, span, convex=convex)
             kicks[:] = [kick]
             sizes = np.array([touch.normal @ push for touch, push in zip(touching, kick.impulse, strict=True)])
-            held = [np.zeros((0, len(v)))]
+            sticking_rows = [np.zeros((0, len(v)))]
             for k in np.flatnonzero(sizes > 0).tolist():
                 aside = np.linalg.norm(kick.impulse[k] - sizes[k] * touching[k].normal)
-                held.append(J[k] if aside < _INSIDE * self.contacts[k].friction * sizes[k] else J[k, 2:])
-            return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(held))
+                sticking_rows.append(J[k] if aside < _INSIDE * self.contacts[k].friction * sizes[k] else J[k, 2:])
+            return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(sticking_rows))
 
         moments, impulses = self._moments.found(rows, v, inverse, pressed, self.t)
         by_contact = np.zeros((count, 3))
@@ -402,15 +403,15 @@ class ImpulseSteps:
         rubs = count + len(self.joints.friction)
         gaps = [k for k in (*range(count), *range(rubs, len(blocks))) if np.isfinite(shifts[k, 2])]
         impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(blocks) - count), tuple(range(count, rubs))
-        changed, pushed = bool(which), np.zeros(len(free))
-        alone, held = self._motions
+        grown, pushed = bool(which), np.zeros(len(free))
+        alone, motor_responses = self._motions
         while True:
             # a speed that is round-off of its rows would be the unit of impulses, in which slips are huge
             closing = {k for k in gaps if blocks[k][-1] @ v + shifts[k, 2] < -_SMALL * np.abs(blocks[k] @ v).max()}
-            if closing <= set(which) and not changed:
-                driving = alone - held.T @ pushed
+            if closing <= set(which) and not grown:
+                driving = alone - motor_responses.T @ pushed
                 return Impulses(v=v, impulse=impulse, moment=np.zeros((count, 3)), along=along_rows, driving=driving)
-            which, changed = tuple(sorted({*which, *closing})), False
+            which, grown = tuple(sorted({*which, *closing})), False
             rows = np.concatenate([blocks[k] for k in which])
             to_joints = inverse @ rows.T
             g = rows @ free + np.concatenate([of_blocks[k] for k in which])

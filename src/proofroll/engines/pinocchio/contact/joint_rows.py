@@ -79,11 +79,11 @@ class JointRows:
         """
         forces = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
         total = {joint.number: 0.0 for joint in self.switched}
-        closed = {item.joint.number for item in self.stops if item.closed(q)}
+        closed_joints = {item.joint.number for item in self.stops if item.closed(q)}
         for item, size in zip((*self.friction, *self.stops), force, strict=True):
-            if item.limit is None or item.joint.number in closed:
+            if item.limit is None or item.joint.number in closed_joints:
                 total[item.joint.number] += item.sign * float(size)
         for joint in self.switched:
-            on = joint_force_shares(joint.number in closed, joint.friction, total[joint.number])
+            on = joint_force_shares(joint.number in closed_joints, joint.friction, total[joint.number])
             forces["friction"][joint.number], forces["stop"][joint.number] = on
         return forces

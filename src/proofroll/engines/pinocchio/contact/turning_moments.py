@@ -90,10 +90,10 @@ class TurningImpulses:
 
 def _stopping(row: Array, inverse: Array, outcome: Pressed) -> Array:
     """Moment that stops what still turns, while the contacts hold what they do [N m s]."""
-    ways, held = inverse @ row.T, outcome.held
+    ways, held_rows = inverse @ row.T, outcome.held
     free = row @ ways
-    into = held @ ways
-    response = free - into.T @ np.linalg.pinv(held @ inverse @ held.T, hermitian=True) @ into
+    into = held_rows @ ways
+    response = free - into.T @ np.linalg.pinv(held_rows @ inverse @ held_rows.T, hermitian=True) @ into
     ease = float(np.linalg.eigvalsh(response)[-1])
     if ease <= _HELD * np.trace(free):
         return np.zeros(3)

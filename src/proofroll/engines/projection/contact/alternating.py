@@ -156,12 +156,12 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         def at(t: float) -> Excess:
             return self._excess_over(end, self._stepper.inside(t))
 
-        now, begin = self._stepper.t, self._stepper.t_before
+        end_time, begin = self._stepper.t, self._stepper.t_before
         if end.closing > 0:
-            return now if end.size > 0 else None
-        if end.size < end.closing * (now - begin) or at(begin).closing <= -_CLOSES * end.closing:
+            return end_time if end.size > 0 else None
+        if end.size < end.closing * (end_time - begin) or at(begin).closing <= -_CLOSES * end.closing:
             return None
-        lowest = float(brentq(lambda t: at(t).closing, begin, now))
+        lowest = float(brentq(lambda t: at(t).closing, begin, end_time))
         return lowest if at(lowest).size > 0 else None
 
     def _crossing(self, end: Excess, high: float) -> float:

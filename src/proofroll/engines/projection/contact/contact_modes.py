@@ -117,13 +117,13 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._limited = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         start = np.append(equations.start, 0.0)
         self._limit_efforts(start)
-        now = self.at(start)
-        closed, resting = closed_and_still(
-            now.touching, scale.length / self._arms, scale.rate, start_digits(self.contacts)
+        instant = self.at(start)
+        closed_mask, resting = closed_and_still(
+            instant.touching, scale.length / self._arms, scale.rate, start_digits(self.contacts)
         )
-        refuse_rubbing_stops(self.contacts, closed, 0.0)
+        refuse_rubbing_stops(self.contacts, closed_mask, 0.0)
         self.mode = tuple(OPEN for _ in self.contacts)
-        self._enter(0.0, start, self._decided(now, closed, resting))
+        self._enter(0.0, start, self._decided(instant, closed_mask, resting))
 
     def _limit_efforts(self, y: Array) -> None:
         """Sets the mode of each effort with a limit: linear, or clamped if the state requires more."""
@@ -144,19 +144,19 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         touching = self._touching(x, moving)
         S, origin = spaces[0].S.reshape(-1, 4, 4), free.bodies.origin
         J, rate = np.zeros((len(touching), 3, len(S))), np.zeros((len(touching), 3))
-        for k, (contact, there) in enumerate(zip(self._bodies, touching, strict=False)):
-            lever = S[:, :3, :3] @ (there.place - origin) + S[:, :3, 3]
+        for k, (contact, point) in enumerate(zip(self._bodies, touching, strict=False)):
+            lever = S[:, :3, :3] @ (point.place - origin) + S[:, :3, 3]
             for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
                 i = self._index[body]
                 if i >= 0:
                     J[k] += sign * (equations.tree.moves[i][:, None] * lever).T
-                    rate[k] += sign * self._material(x, free, i, moving[body], there)
+                    rate[k] += sign * self._material(x, free, i, moving[body], point)
         for k, switch in enumerate(self._joints, len(self._bodies)):
             J[k, :, switch.joint.velocity] = switch.direction
             rate[k] = switch.direction * free.rates[switch.joint.velocity]
         fastest = max((float(np.linalg.norm(body.w)) for body in moving.values()), default=0.0)
         for k, friction in enumerate(self._turning, len(self._bodies) + len(self._joints)):
-            contact, there = self._bodies[friction.pressed_by], touching[friction.pressed_by]
+            contact, point = self._bodies[friction.pressed_by], touching[friction.pressed_by]
             spin, spin_rate = np.zeros((3, len(S))), np.zeros(3)
             for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
                 i = self._index[body]
@@ -164,9 +164,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                     axes = S[:, [2, 0, 1], [1, 2, 0]]  # of the velocities, from their matrices
                     spin += sign * (equations.tree.moves[i][:, None] * axes).T
                     spin_rate += sign * moving[body].R @ free.angular[i]
-            J[k] = friction.resisted(there.normal, spin)
+            J[k] = friction.resisted(point.normal, spin)
             relative = moving[contact.body_a].w - moving[contact.body_b].w
-            rate[k] = friction.resisted_rate(there, relative, spin_rate, fastest)
+            rate[k] = friction.resisted_rate(point, relative, spin_rate, fastest)
         flat = J.reshape(-1, J.shape[2]).T
         if equations.coupled:
             assert equations.split is not None  # of the last solution
@@ -200,52 +200,52 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                 moving[name] = Moving(r[i] - arm, R, v[i] - cross(w, arm), w)
         return moving
 
-    def _material(self, x: Array, free: SolvedState, i: int, body: Moving, there: Touching) -> Array:
+    def _material(self, x: Array, free: SolvedState, i: int, body: Moving, point: Touching) -> Array:
         """Rate of the velocity of a body's material at the contact point, which moves over the body."""
-        arm = there.place - self._equations.parts(x)[0][i]
+        arm = point.place - self._equations.parts(x)[0][i]
         turning = cross(body.R @ free.angular[i], arm) + cross(body.w, cross(body.w, arm))
-        return np.asarray(free.linear[i] + turning + cross(body.w, there.place_rate - body.velocity(there.place)))
+        return np.asarray(free.linear[i] + turning + cross(body.w, point.place_rate - body.velocity(point.place)))
 
-    def _rows(self, now: ContactsThere, mode: ContactMode) -> list[tuple[int, Array]]:
+    def _rows(self, instant: ContactsThere, mode: ContactMode) -> list[tuple[int, Array]]:
         """Directions in which closed contacts are constrained, with their contact."""
         return [
             (k, direction)
-            for k, (acting, touching) in enumerate(zip(mode, now.touching, strict=True))
+            for k, (acting, touching) in enumerate(zip(mode, instant.touching, strict=True))
             for direction in held_directions(acting, touching, presses=self._presses[k])
         ]
 
-    def forces(self, now: ContactsThere, mode: ContactMode) -> Array:
+    def forces(self, instant: ContactsThere, mode: ContactMode) -> Array:
         """Forces on body a of each contact in a mode [N], (contacts, 3); of friction against turning moments [N m].
 
         Raises:
             Diverged: friction makes a normal force negative (Painlevé).
         """
-        rows, force = self._rows(now, mode), np.zeros((len(mode), 3))
+        rows, force = self._rows(instant, mode), np.zeros((len(mode), 3))
         turning = list[tuple[int, int, Array]]()
         for k, contact in enumerate(self.contacts):
             if mode[k].kind == "slip" and not contact.presses:
-                heading = self._slipping.heading(k, now.touching[k])
+                heading = self._slipping.heading(k, instant.touching[k])
                 force[k] = -self._bounds[k] * heading
                 if contact.pressed_by is not None:
                     turning.append((k, contact.pressed_by, -self.friction[k] * heading))
         if not rows:
             return force
         directions = [
-            row - self.friction[k] * self._slipping.heading(k, now.touching[k]) if mode[k].kind == "slip" else row
+            row - self.friction[k] * self._slipping.heading(k, instant.touching[k]) if mode[k].kind == "slip" else row
             for k, row in rows
         ]
-        rate = now.rate + now.J @ np.einsum("nki,ki->n", now.response, force)
-        K = np.array([row @ now.J[k] for k, row in rows])
-        D = np.array([now.response[:, k] @ direction for (k, _), direction in zip(rows, directions, strict=True)])
+        rate = instant.rate + instant.J @ np.einsum("nki,ki->n", instant.response, force)
+        K = np.array([row @ instant.J[k] for k, row in rows])
+        D = np.array([instant.response[:, k] @ direction for (k, _), direction in zip(rows, directions, strict=True)])
         owned = [(k, direction) for (k, _), direction in zip(rows, directions, strict=True)]
-        moments = moments_by_pressing(turning, owned, [touching.normal for touching in now.touching])
+        moments = moments_by_pressing(turning, owned, [touching.normal for touching in instant.touching])
         for k, place, moment in moments:
-            D[place] += now.response[:, k] @ moment
+            D[place] += instant.response[:, k] @ moment
         targets = [-row @ rate[k] for k, row in rows]
         for i, (k, row) in enumerate(rows):
             if mode[k].kind == "slip":
-                targets[i] -= now.touching[k].normal_rate @ now.touching[k].slide
-                if row @ now.J[k] @ D[i] <= 0:
+                targets[i] -= instant.touching[k].normal_rate @ instant.touching[k].slide
+                if row @ instant.J[k] @ D[i] <= 0:
                     raise Diverged(str(torn(self.contacts[k].name, self.t)))
         sizes = np.linalg.lstsq(K @ D.T, np.array(targets), rcond=_RANK)[0]
         for size, (k, direction) in zip(sizes, owned, strict=True):
@@ -256,13 +256,13 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _settled(self, y: Array, mode: ContactMode) -> Array:
         """State without velocities that violate closed contacts."""
-        now = self.at(y)
-        rows = self._rows(now, mode)
+        instant = self.at(y)
+        rows = self._rows(instant, mode)
         if not rows:
             return y
-        K = np.array([row @ now.J[k] for k, row in rows])
-        D = np.array([now.response[:, k] @ row for k, row in rows])
-        left = np.array([row @ now.touching[k].slide for k, row in rows])
+        K = np.array([row @ instant.J[k] for k, row in rows])
+        D = np.array([instant.response[:, k] @ row for k, row in rows])
+        left = np.array([row @ instant.touching[k].slide for k, row in rows])
         return self._pushed(y, -D.T @ np.linalg.lstsq(K @ D.T, left, rcond=_RANK)[0])
 
     def _pushed(self, y: Array, change: Array) -> Array:
@@ -271,9 +271,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def solve(self) -> tuple[SolvedState, Array, tuple[Touching, ...]]:
         """Equations of motion solved now, contact forces [N], (contacts, 3), and geometry of the contacts."""
-        now = self.at(self._stepper.x)
-        force = self.forces(now, self.mode)
-        return self._equations.solve(self.x, np.einsum("kin,ki->n", now.J, force)), force, now.touching
+        instant = self.at(self._stepper.x)
+        force = self.forces(instant, self.mode)
+        return self._equations.solve(self.x, np.einsum("kin,ki->n", instant.J, force)), force, instant.touching
 
     def sampled(self, joints: int) -> dict[str, Array]:
         """Contact forces [N], (contacts, 3); forces of dry friction and stops along the coordinates of all joints."""
@@ -287,24 +287,24 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def read(self) -> dict[str, Any]:
         """Geometry and laws of the contacts now, for :class:`.MechanismBuilt`."""
-        now = self.at(self._stepper.x)
+        instant = self.at(self._stepper.x)
         count = len(self._bodies)
-        touching = now.touching[:count]
+        touching = instant.touching[:count]
         return {
             "contact_gap": np.array([contact.gap for contact in touching]),
             "contact_normal": np.array([contact.normal for contact in touching]),
             "contact_place": np.array([contact.place for contact in touching]),
             **coefficients_of(self._bodies),
-            "contact_response": np.einsum("kin,nlj->kilj", now.J[:count], now.response[:, :count]),
+            "contact_response": np.einsum("kin,nlj->kilj", instant.J[:count], instant.response[:, :count]),
         }
 
     def _rates(self, y: Array) -> Array:
-        now = self.at(y)
-        return self._pushed_rates(y, now, self.forces(now, self.mode))
+        instant = self.at(y)
+        return self._pushed_rates(y, instant, self.forces(instant, self.mode))
 
-    def _pushed_rates(self, y: Array, now: ContactsThere, force: Array) -> Array:
+    def _pushed_rates(self, y: Array, instant: ContactsThere, force: Array) -> Array:
         """Time derivative of x with contact forces."""
-        return self._equations.pushed_rates(y[:-1], now.free, np.einsum("nki,ki->n", now.response, force))
+        return self._equations.pushed_rates(y[:-1], instant.free, np.einsum("nki,ki->n", instant.response, force))
 
     def _look(self, y: Array) -> None:
         """Stores the directions of slips, to detect reversals."""
@@ -323,21 +323,21 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         super()._enter(t, x, mode)
 
     def _excess(self, x: Array) -> list[Excess]:
-        now = self.at(x)
-        force, ends = self.forces(now, self.mode), list[Excess]()
-        held: ContactMode = ()
+        instant = self.at(x)
+        force, ends = self.forces(instant, self.mode), list[Excess]()
+        decided_mode: ContactMode = ()
         stops = [isinstance(item, JointContact) and item.presses for item in self.contacts]
         shared = sum(
             acting.kind == "stick" or (acting.kind == "slip" and s) for acting, s in zip(self.mode, stops, strict=True)
         )
-        for k, (acting, item) in enumerate(zip(self.mode, now.touching, strict=True)):
+        for k, (acting, item) in enumerate(zip(self.mode, instant.touching, strict=True)):
             by = self.contacts[k].pressed_by
             if acting.kind == "open":
                 if by is None:
                     size = -item.gap - self._overlap[k]
                     ends.append(Excess(k, EventKind.IMPACT, size, -float(item.normal @ item.slide)))
                 continue
-            N = float((item if by is None else now.touching[by]).normal @ force[k if by is None else by])
+            N = float((item if by is None else instant.touching[by]).normal @ force[k if by is None else by])
             if self._presses[k]:
                 ends.append(Excess(k, EventKind.LIFT_OFF, -N))
             if acting.kind == "slip" and self._rubs[k]:
@@ -347,10 +347,12 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                 beyond = float(np.linalg.norm(force[k] - item.normal * (item.normal @ force[k]))) - bound
                 if beyond > 0 and shared > 1:
                     # forces shared by several contacts are not unique: others may hold what this one cannot
-                    held = held or self._decided(
-                        now, [part.kind != "open" for part in self.mode], [part.kind == "stick" for part in self.mode]
+                    decided_mode = decided_mode or self._decided(
+                        instant,
+                        [part.kind != "open" for part in self.mode],
+                        [part.kind == "stick" for part in self.mode],
                     )
-                    beyond = -beyond if held[k].kind == "stick" else beyond
+                    beyond = -beyond if decided_mode[k].kind == "stick" else beyond
                 ends.append(Excess(k, EventKind.SLIP, beyond))
         modes, efforts = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
         return ends + ends_of_efforts(self._limited.values(), modes, efforts, len(self.mode))
@@ -363,54 +365,56 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             return x, old_mode, happened
         if kind == EventKind.LIFT_OFF:
             x = self._settled(x, old_mode)  # a closing speed that the method left would hit at once
-        now, closed = self.at(x), [acting.kind != "open" for acting in old_mode]
+        instant, closed_mask = self.at(x), [acting.kind != "open" for acting in old_mode]
         resting = [acting.kind == "stick" for acting in old_mode]
         if kind == EventKind.IMPACT:
-            x, closed, settles = self._struck(x, now, k)
+            x, closed_mask, settles = self._struck(x, instant, k)
             self._limit_efforts(x)  # the effort that a servo requires jumps with the velocity
             happened = [(EventKind.SETTLE if settles else EventKind.IMPACT, self.contacts[k].name)]
-            now = self.at(x)
-            resting = [slip <= self._still for slip in self._slips(now)]
+            instant = self.at(x)
+            resting = [slip <= self._still for slip in self._slips(instant)]
         elif kind == "still":
-            slips = self._slips(now)
+            slips = self._slips(instant)
             resting = [stuck or number == k or slips[number] <= self._faint for number, stuck in enumerate(resting)]
-        mode = self._leaving(now, k) if kind == EventKind.SLIP else self._decided(now, closed, resting)
+        mode = self._leaving(instant, k) if kind == EventKind.SLIP else self._decided(instant, closed_mask, resting)
         if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped
-            mode = self._decided(now, closed, [stands and number != k for number, stands in enumerate(resting)])
+            mode = self._decided(
+                instant, closed_mask, [stands and number != k for number, stands in enumerate(resting)]
+            )
         names = {name for _, name in happened}
         happened += [
             event for event in changes(self.contacts, old_mode, mode, self._stands(x, mode)) if event[1] not in names
         ]
         return x, mode, happened
 
-    def _slips(self, now: ContactsThere) -> list[float]:
+    def _slips(self, instant: ContactsThere) -> list[float]:
         """Slip speed of each contact [m/s]; of turning joints at the natural length."""
-        pairs = zip(self._arms, now.touching, strict=True)
+        pairs = zip(self._arms, instant.touching, strict=True)
         return [float(arm * np.linalg.norm(slip_velocity(touching))) for arm, touching in pairs]
 
     def _stands(self, y: Array, mode: ContactMode) -> bool:
         """True if velocities and accelerations in a mode are zero within round-off."""
         if self._timed or any(acting.kind == "slip" for acting in mode):
             return False
-        now = self.at(y := self._settled(y, mode))
-        n, rate = len(self._equations.mass), self._pushed_rates(y, now, self.forces(now, mode))
+        instant = self.at(y := self._settled(y, mode))
+        n, rate = len(self._equations.mass), self._pushed_rates(y, instant, self.forces(instant, mode))
         sizes = np.repeat([1.0, self._unit / self._rate], 3 * n)  # for velocities and angular velocities
         moves, will = (float(np.abs(sizes * part[7 * n : 13 * n]).max()) for part in (y, rate))
         return moves <= self._still and will <= _STANDS * self._unit * self._rate
 
-    def _leaving(self, now: ContactsThere, k: int) -> ContactMode:
+    def _leaving(self, instant: ContactsThere, k: int) -> ContactMode:
         """Mode in which a contact starts to slip, opposite to the friction that held it."""
-        force, n = self.forces(now, self.mode)[k], now.touching[k].normal
-        held = force - n * (n @ force)
-        x, y, z = (-held / np.linalg.norm(held)).tolist()
+        force, n = self.forces(instant, self.mode)[k], instant.touching[k].normal
+        friction = force - n * (n @ force)
+        x, y, z = (-friction / np.linalg.norm(friction)).tolist()
         line = None if self.mode[k].along is None else (x, y, z)
         return (*self.mode[:k], Acting("slip", line, (x, y, z)), *self.mode[k + 1 :])
 
-    def _struck(self, x: Array, now: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
+    def _struck(self, x: Array, instant: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
         """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
         which = [k for k, acting in enumerate(self.mode) if (acting.kind != "open" or k == hit) and self._presses[k]]
-        frames, J, response = self._framed(now, which)
-        c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
+        frames, J, response = self._framed(instant, which)
+        c = np.concatenate([frame.T @ instant.touching[k].slide for frame, k in zip(frames, which, strict=True)])
         place, law = 3 * which.index(hit), self.contacts[hit]
         speed, e = -c[place], law.restitution
         settles = self._settles(hit, speed * self._arms[hit] / self._unit, e)
@@ -420,22 +424,22 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         x = self._pushed(x, response @ impulse.ravel())
         # by the speed, not the impulse: of a contact that the impact leaves alone that is round-off, of either sign
         parts = [float(touching.normal @ touching.slide) for touching in self.at(x).touching] * self._arms
-        closed = [
+        closed_mask = [
             bool(self._bounds[k]) or (k in which and parts[k] <= self._still and not (k == hit and e))
             for k in range(len(self.mode))
         ]
-        closed = shut_by_pressing(self.contacts, closed)
+        closed_mask = shut_by_pressing(self.contacts, closed_mask)
         try:
-            refuse_rubbing_stops(self.contacts, closed, self.t)
+            refuse_rubbing_stops(self.contacts, closed_mask, self.t)
         except Refused as error:
             raise Diverged(str(error)) from None
-        return x, closed, settles
+        return x, closed_mask, settles
 
-    def _framed(self, now: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
+    def _framed(self, instant: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
         """Normal and two tangents of some contacts; J along them, and response to forces along them."""
-        frames = [frame_of_axis(now.touching[k].normal)[:, [2, 0, 1]] for k in which]
-        J = np.concatenate([frame.T @ now.J[k] for frame, k in zip(frames, which, strict=True)])
-        response = np.concatenate([now.response[:, k] @ frame for frame, k in zip(frames, which, strict=True)], 1)
+        frames = [frame_of_axis(instant.touching[k].normal)[:, [2, 0, 1]] for k in which]
+        J = np.concatenate([frame.T @ instant.J[k] for frame, k in zip(frames, which, strict=True)])
+        response = np.concatenate([instant.response[:, k] @ frame for frame, k in zip(frames, which, strict=True)], 1)
         return frames, J, response
 
     def _law(self, G: Array, c: Array, which: Sequence[int], sliding: Sequence[Array | None]) -> tuple[Array, Any]:
@@ -456,26 +460,26 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         except Refused as error:
             raise Diverged(str(error)) from None
 
-    def _decided(self, now: ContactsThere, closed: Sequence[bool], resting: Sequence[bool]) -> ContactMode:
+    def _decided(self, instant: ContactsThere, closed_mask: Sequence[bool], resting: Sequence[bool]) -> ContactMode:
         """Mode that follows from the forces, for contacts that are closed, and at rest where ``resting``."""
-        closed = shut_by_pressing(self.contacts, closed)
-        which, mode = [k for k, shut in enumerate(closed) if shut], [OPEN for _ in closed]
+        closed_mask = shut_by_pressing(self.contacts, closed_mask)
+        which, mode = [k for k, shut in enumerate(closed_mask) if shut], [OPEN for _ in closed_mask]
         if not which:
             return tuple(mode)
-        frames, J, response = self._framed(now, which)
+        frames, J, response = self._framed(instant, which)
         c, sliding = np.zeros(3 * len(which)), list[Array | None]()
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
-            there = now.touching[k]
-            c[3 * place : 3 * place + 3] = frame.T @ now.rate[k]
+            point = instant.touching[k]
+            c[3 * place : 3 * place + 3] = frame.T @ instant.rate[k]
             if self._presses[k]:
-                c[3 * place] += there.normal_rate @ there.slide
-            slip = frame[:, 1:].T @ there.slide
+                c[3 * place] += point.normal_rate @ point.slide
+            slip = frame[:, 1:].T @ point.slide
             sliding.append(slip / np.linalg.norm(slip) if self._rubs[k] and not resting[k] else None)
         G = J @ response
         force, done = self._law(G, c, which, sliding)
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
             part, slides = slice(3 * place, 3 * place + 3), sliding[place]
-            response = line_response(self.contacts[k], frame @ G[part, part] @ frame.T, now.touching)
+            response = line_response(self.contacts[k], frame @ G[part, part] @ frame.T, instant.touching)
             direction = -force[place, 1:] if slides is None else slides
             mode[k] = first_mode(done[place], frame, direction, frame.T @ response @ frame)
         return tuple(mode)

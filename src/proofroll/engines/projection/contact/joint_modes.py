@@ -75,9 +75,9 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         happened = [*changes(self._joints, old_mode, mode)]
         pairs = zip(self._limited.values(), old_mode[count:], mode[count:], strict=True)
         happened += [
-            (EventKind.RELEASE if now == "linear" else EventKind.SATURATE, item.name)
-            for item, old, now in pairs
-            if now != old
+            (EventKind.RELEASE if new == "linear" else EventKind.SATURATE, item.name)
+            for item, old, new in pairs
+            if new != old
         ]
         self.events += [
             Event(kind=kind, time=t, time_low=t, time_high=t, name=name) for kind, name in happened if t > 0

@@ -32,22 +32,22 @@ class SlipDirections:
     def look(self, t: float, mode: Sequence[Acting], touching: Sequence[Touching]) -> None:
         """Stores the directions of slips at the time ``t`` [s]."""
         span, self._time = t - self._time, t
-        for k, (contact_mode, there) in enumerate(zip(mode, touching, strict=True)):
+        for k, (contact_mode, touch) in enumerate(zip(mode, touching, strict=True)):
             if contact_mode.kind != "slip":
                 continue
-            speed = float(np.linalg.norm(slip_velocity(there)))
+            speed = float(np.linalg.norm(slip_velocity(touch)))
             self._last_step[k] = False
-            self._toward[k] = self.heading(k, there)
+            self._toward[k] = self.heading(k, touch)
             self._last_step[k] = 0.0 < speed * span <= (self._speeds[k] - speed) * self._step
             self._speeds[k] = speed
 
-    def passed(self, k: int, there: Touching) -> float:
+    def passed(self, k: int, touch: Touching) -> float:
         """Speed against the direction at the start of the step [m/s]; positive: the slip has ended."""
-        return -float(slip_velocity(there) @ self._toward[k])
+        return -float(slip_velocity(touch) @ self._toward[k])
 
-    def heading(self, k: int, there: Touching) -> Array:
+    def heading(self, k: int, touch: Touching) -> Array:
         """Direction of a slip; of one that counts as rest, and after its end within a step, the direction before."""
-        slip, toward = slip_velocity(there), self._toward[k]
+        slip, toward = slip_velocity(touch), self._toward[k]
         speed = float(np.linalg.norm(slip))
         if self._last_step[k] or speed <= self._still[k]:
             return toward

@@ -146,9 +146,9 @@ def run_in_air(
     """
     steps = [*itertools.islice(steps_in_air(robot, law, start, step, scheme), count + 1)]
     names = ("q", "v", "efforts", "target", "action")
-    q, v, efforts, targets, actions = (np.array([getattr(each, name) for each in steps]) for name in names)
+    q, v, efforts, targets, actions = (np.array([getattr(item, name) for item in steps]) for name in names)
     time = np.asarray(step * np.arange(count + 1), float)
-    seen = tuple(each.observation for each in steps if each.observation is not None)
+    seen = tuple(item.observation for item in steps if item.observation is not None)
     return AirRun(time=time, q=q, v=v, efforts=efforts, targets=targets, actions=actions, observations=seen)
 
 
@@ -187,13 +187,13 @@ def steps_in_air(
 
 
 def _stepped(
-    robot: AirRobot, law: ControlLaw, at: tuple[Array, Array], acting: tuple[Array, Array], h: float, scheme: Scheme
+    robot: AirRobot, law: ControlLaw, state: tuple[Array, Array], acting: tuple[Array, Array], h: float, scheme: Scheme
 ) -> tuple[Array, Array]:
     """Coordinates and velocities after a step of ``h`` [s], for efforts at its begin and targets."""
-    q, v = at
+    q, v = state
     efforts, target = acting
     if scheme == "rk4":
-        return _rk4(robot, law, at, (efforts, target), h)
+        return _rk4(robot, law, state, (efforts, target), h)
     acceleration = robot.equations.solve(q, v, load=robot.load(efforts)).acceleration
     if scheme.startswith("implicit"):
         # What is clamped or held does not follow the velocity.
@@ -230,20 +230,20 @@ def _moved(
 
 
 def _rk4(
-    robot: AirRobot, law: ControlLaw, at: tuple[Array, Array], acting: tuple[Array, Array], h: float
+    robot: AirRobot, law: ControlLaw, state: tuple[Array, Array], acting: tuple[Array, Array], h: float
 ) -> tuple[Array, Array]:
     """State after a step of RK4, with targets held, or efforts."""
-    held, target = acting
-    nq = len(at[0])
+    start_efforts, target = acting
+    nq = len(state[0])
 
     def rates(y: Array) -> Array:
         q, v = y[:nq], y[nq:]
         moving = law.effort(target, q[robot.driven[:, 0]], v[robot.driven[:, 1]])
-        efforts = held if law.hold_effort else moving
+        efforts = start_efforts if law.hold_effort else moving
         solution = robot.equations.solve(q, v, load=robot.load(efforts))
         return np.concatenate([robot.equations.tree.rate(q, v), solution.acceleration])
 
-    y = np.concatenate(at)
+    y = np.concatenate(state)
     k1 = rates(y)
     k2 = rates(y + h / 2 * k1)
     k3 = rates(y + h / 2 * k2)

@@ -178,7 +178,7 @@ class ControlLaw:
         R = R.T if self.turned_back else R
         body = Rotation.from_quat(state.q_WB, scalar_first=True).as_matrix()
         order = self._entries[1]
-        q, v, velocity, spin, before = self.factors
+        q, v, velocity, spin, action_factor = self.factors
         moving = state.v_WB + self.at_centre * np.cross(state.w_WB, body @ self.centre)
         return Observation(
             time=state.time,
@@ -189,7 +189,7 @@ class ControlLaw:
             v_WB_W=velocity * (_turned(body, self.velocity_turns) @ moving),
             w_WB_B=spin * (_turned(body, self.spin_turns) @ state.w_WB),
             gravity_B=self.gravity_sign * (R.T @ self.down),
-            last=before * last,
+            last=action_factor * last,
         )
 
     @property
@@ -198,10 +198,10 @@ class ControlLaw:
         turns = (self.scalar_last, self.turned_back, self.gravity_sign, self.velocity_turns, self.spin_turns)
         return (*turns, self.observed_order, self.factors, self.pose_observed, self.at_centre)
 
-    def smoothed(self, action: Array, before: Array) -> Array:
-        """Part of an action that counts, clipped, beside what counted at the instant ``before``."""
+    def smoothed(self, action: Array, previous: Array) -> Array:
+        """Part of an action that counts, clipped, beside what counted at the instant ``previous``."""
         clipped = np.clip(action, -self.clip, self.clip)
-        return np.asarray(clipped if self.smoothing == 1 else before + self.smoothing * (clipped - before), float)
+        return np.asarray(clipped if self.smoothing == 1 else previous + self.smoothing * (clipped - previous), float)
 
     def target(self, action: Array | None, time: float) -> Array:
         """Targets of the joints for an action, shape (n,), before any delay; without a policy those of ``time``."""

@@ -103,11 +103,11 @@ def changed(law: ControlLaw, chosen: Sequence[Mistake], sizes: Sequence[float]) 
 
 def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
     for steps, words in ((1, "longer"), (-1, "shorter")):
-        said = f"the time between two instants of the controller is one step {words}"
-        yield _fixed("decimation", said, "instants", extra_steps=steps)
+        sentence = f"the time between two instants of the controller is one step {words}"
+        yield _fixed("decimation", sentence, "instants", extra_steps=steps)
     for factor, words in ((0.5, "half"), (0.25, "a quarter of"), (2.0, "twice"), (4.0, "four times")):
-        said = f"the controller acts at {factor * law.rate:.4g} Hz, {words} its rate"
-        yield _fixed("rate", said, "instants", rate=factor * law.rate)
+        sentence = f"the controller acts at {factor * law.rate:.4g} Hz, {words} its rate"
+        yield _fixed("rate", sentence, "instants", rate=factor * law.rate)
     if law.policy is not None:
         yield from _of_observations(law)
         yield from _of_actions(law)
@@ -260,10 +260,10 @@ def orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:
     seen = {tuple(range(len(joints)))}
     for words, order in _orders(joints):
         back = tuple(np.argsort(order).tolist())
-        for said, way in ((words, order), (f"{words}, the other way around", back)):
+        for sentence, way in ((words, order), (f"{words}, the other way around", back)):
             if way not in seen:
                 seen.add(way)
-                yield said, way
+                yield sentence, way
 
 
 def _orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:
@@ -277,10 +277,10 @@ def _orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:
     yield "reversed", tuple(reversed(numbers))
     members = {limb: [k for k in numbers if limbs[k] == limb] for limb in dict.fromkeys(limbs)}
     names = list(members)
-    for at, one in enumerate(names):
-        for two in names[at + 1 :]:
-            if len(members[one]) == len(members[two]):
-                yield f"{one} and {two} swapped", _swapped(joints, [(members[one], members[two])])
+    for place, group in enumerate(names):
+        for partner in names[place + 1 :]:
+            if len(members[group]) == len(members[partner]):
+                yield f"{group} and {partner} swapped", _swapped(joints, [(members[group], members[partner])])
     if len(names) > 3 and len(names) % 2 == 0 and len({len(item) for item in members.values()}) == 1:
         pairs = [(members[a], members[b]) for a, b in zip(names[::2], names[1::2], strict=True)]
         yield "neighbouring limbs swapped", _swapped(joints, pairs)
@@ -288,8 +288,8 @@ def _orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:
 
 def _swapped(joints: tuple[str, ...], pairs: list[tuple[list[int], list[int]]]) -> tuple[int, ...]:
     order = list(range(len(joints)))
-    for one, two in pairs:
-        for a, b in zip(one, two, strict=True):
+    for group, partner in pairs:
+        for a, b in zip(group, partner, strict=True):
             order[a], order[b] = order[b], order[a]
     return tuple(order)
 

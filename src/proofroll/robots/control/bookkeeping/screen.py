@@ -69,12 +69,12 @@ class MistakeScreen:
         weightless = AirRobot(replace(mechanism, gravity=(0.0, 0.0, 0.0)), bare)
         self._states, self._coupled = [*self._between(q, v)], bool(self._robot.equations.rank)
         mass, inertial, weight, free = [], [], [], []
-        for at in self._states[:-1]:
-            M = self._robot.equations.inertial(self._robot.equations.tree.at(*at))[1]
+        for state in self._states[:-1]:
+            M = self._robot.equations.inertial(self._robot.equations.tree.at(*state))[1]
             mass.append(M)
-            inertial.append(M @ weightless.equations.solve(*at).acceleration)
-            weight.append(M @ self._robot.equations.solve(*at).acceleration - inertial[-1])
-            free.append(null_space(self._robot.equations.rows(at[0]).C) if self._coupled else np.eye(len(M)))
+            inertial.append(M @ weightless.equations.solve(*state).acceleration)
+            weight.append(M @ self._robot.equations.solve(*state).acceleration - inertial[-1])
+            free.append(null_space(self._robot.equations.rows(state[0]).C) if self._coupled else np.eye(len(M)))
         self._mass, self._inertial, self._weight = np.array(mass), np.array(inertial), np.array(weight)
         self._free = np.array(free)  # directions that couplings allow, (steps, nv, freedoms)
         self._roots = np.linalg.cholesky(self._mass[::stride])
@@ -101,12 +101,12 @@ class MistakeScreen:
         period = max(1, whole_steps(0.0, 1 / law.rate, self.step) + law.extra_steps)
         key = (period, *law.observing)
         if key not in self._actions:
-            answer, (last, _), found = law.answer(), law.waiting(), []
+            answer, (last, _), actions = law.answer(), law.waiting(), []
             assert answer is not None  # the caller knows that there is a policy
             for k in range(0, len(self._states), period):
                 last = answer(law.observed(self._robot.state(law.begins + k * self.step, *self._states[k]), last))
-                found.append(last)
-            self._actions[key] = found
+                actions.append(last)
+            self._actions[key] = actions
         return self._actions[key]
 
     def _targets(self, law: ControlLaw) -> Array:
@@ -145,15 +145,17 @@ class MistakeScreen:
         )
         for k in range(self.stride):
             rows = slice(k, None, self.stride)
-            now = q, v[..., self._at_v]
-            held = self._instants(laws, rows) if holds.any() else None
+            state = q, v[..., self._at_v]
+            instants = self._instants(laws, rows) if holds.any() else None
             inertial = self._inertial[rows] + gravity * self._weight[rows]
             inverse = None if treatment == "implicit" else self._inverses(rows, armature[:, 0])
 
             def efforts(
-                seen: tuple[Array, Array], held: tuple[Array, Array] | None = held, rows: slice = rows
+                seen: tuple[Array, Array], instants: tuple[Array, Array] | None = instants, rows: slice = rows
             ) -> Array:
-                at_q, at_v = seen if held is None else (np.where(holds, *pair) for pair in zip(held, seen, strict=True))
+                at_q, at_v = (
+                    seen if instants is None else (np.where(holds, *pair) for pair in zip(instants, seen, strict=True))
+                )
                 return np.asarray(factor * np.clip(kp * (targets[:, rows] - at_q) - kd * at_v, -limit, limit))
 
             def accelerated(
@@ -166,18 +168,18 @@ class MistakeScreen:
                 free = (np.abs(acting) < limit) & ~holds  # what is clamped does not follow
                 return self._solved(rows, armature + h * np.where(free, kd, 0.0), load)
 
-            acting = efforts((np.where(lag, late[0], now[0]), np.where(lag, late[1], now[1])))
+            acting = efforts((np.where(lag, late[0], state[0]), np.where(lag, late[1], state[1])))
             if treatment != "rk4":
                 v = v + h * accelerated(acting)
                 q = q + h * v[..., self._at_v]
             else:
-                rates = [(now[1], accelerated(acting))]
+                rates = [(state[1], accelerated(acting))]
                 for part in (h / 2, h / 2, h):
-                    moved = now[1] + part * rates[-1][1][..., self._at_v]
+                    moved = state[1] + part * rates[-1][1][..., self._at_v]
                     rates.append((moved, accelerated(efforts((q + part * rates[-1][0], moved)))))
                 q = q + h / 6 * (rates[0][0] + 2 * rates[1][0] + 2 * rates[2][0] + rates[3][0])
                 v = v + h / 6 * (rates[0][1] + 2 * rates[1][1] + 2 * rates[2][1] + rates[3][1])
-            late = now
+            late = state
         unexplained = np.einsum("kji,hkj->hki", self._roots, v - self._seen)
         return np.asarray(unexplained.reshape(len(laws), -1))
 
@@ -215,17 +217,17 @@ class MistakeScreen:
         """Choices with their sizes in each treatment of gains, those that leave least first."""
         trials = [(chosen, sizes) for chosen in choices for sizes in itertools.product(*map(self._sizes, chosen))]
         laws = [changed(self.law, *trial) for trial in trials]
-        found: list[Screened] = []
+        screened: list[Screened] = []
         for treatment in TREATMENTS:
             left = np.square(self.left(laws, treatment)).mean(axis=1)
             ranked: dict[tuple[str, ...], Screened] = {}
-            for at in np.argsort(left):
-                chosen, sizes = trials[at]
-                item = Screened(mistakes=chosen, sizes=sizes, treatment=treatment, left=float(left[at]))
+            for number in np.argsort(left):
+                chosen, sizes = trials[number]
+                item = Screened(mistakes=chosen, sizes=sizes, treatment=treatment, left=float(left[number]))
                 ranked.setdefault(tuple(mistake.words for mistake in chosen), item)
             several = [*ranked.values()]
-            found += self._fitted(several[:_REFINED], treatment) + several[_REFINED:]
-        return sorted(found, key=lambda item: item.left)
+            screened += self._fitted(several[:_REFINED], treatment) + several[_REFINED:]
+        return sorted(screened, key=lambda item: item.left)
 
     def _sizes(self, item: Mistake) -> tuple[float, ...]:
         return item.trials or _FACTORS if item.sized else (1.0,)
@@ -236,7 +238,7 @@ class MistakeScreen:
             trials = []  # number of the choice, number of the changed size or -1, and sizes
             for number, item in enumerate(items):
                 for k in [-1, *item.sized] if item.sized else []:
-                    sizes = [size + _change(size) * (at == k) for at, size in enumerate(item.sizes)]
+                    sizes = [size + _change(size) * (place == k) for place, size in enumerate(item.sizes)]
                     trials.append((number, k, sizes))
             if not trials:
                 break
@@ -274,10 +276,10 @@ class MistakeScreen:
                 squares_by_number.min(axis=1) < best[1], np.array(_ALONE)[squares_by_number.argmin(axis=1)], best[0]
             )
             starts = [best[0], trials[int(np.argmin(squares))], several]
-            found = min((self._descended(law, start, treatment) for start in starts), key=lambda pair: pair[1])
-            if found[1] > _HELPS * best[1]:
+            descent = min((self._descended(law, start, treatment) for start in starts), key=lambda pair: pair[1])
+            if descent[1] > _HELPS * best[1]:
                 break
-            best = found
+            best = descent
         return best
 
     def _descended(self, law: Callable[[Array], ControlLaw], start: Array, treatment: Treatment) -> tuple[Array, float]:

@@ -119,11 +119,11 @@ def explained(
     search = LawMotions(mechanism, law, seen, step)
     plain = {scheme: search.distance(law, scheme) for scheme in search.schemes}
     scheme = min(plain, key=lambda name: plain[name])
-    before = plain[scheme]
-    right = before <= seen.bar
-    trial = None if right else _Trial(search, before, scheme, time or SearchTime())
+    distance = plain[scheme]
+    right = distance <= seen.bar
+    trial = None if right else _Trial(search, distance, scheme, time or SearchTime())
     return MistakeSearch(
-        before=before,
+        before=distance,
         scheme=scheme,
         spread=search.spread(),
         explanations=() if trial is None else tuple(_explanations(trial, depth)),
@@ -142,26 +142,26 @@ def _explanations(trial: _Trial, depth: Depth) -> list[MistakesFound]:
     """Explanations, the best first; the simplest are tried first, until nothing is left to explain."""
     law, step = trial.search.law, trial.search.step
     every = [item for item in mistakes(law) if item.id != "rate" or _divides(step, 1 / item.changed(law, 1.0).rate)]
-    found = trial.best([(item,) for item in every], len(every) * len(TREATMENTS))
-    if depth != "a mistake" and not trial.settled(found) and not trial.time.over:
+    explanations = trial.best([(item,) for item in every], len(every) * len(TREATMENTS))
+    if depth != "a mistake" and not trial.settled(explanations) and not trial.time.over:
         both = [pair for pair in itertools.combinations(every, 2) if _together(*pair)]
-        found = _sorted([*found, *trial.best(both, _PAIRS)])
-    if depth != "a mistake" and not trial.settled(found) and not trial.time.over:
-        found = _sorted([*found, *trial.other_pose([None])])
-    if depth == "a pair with a pose" and not trial.settled(found) and not trial.time.over:
+        explanations = _sorted([*explanations, *trial.best(both, _PAIRS)])
+    if depth != "a mistake" and not trial.settled(explanations) and not trial.time.over:
+        explanations = _sorted([*explanations, *trial.other_pose([None])])
+    if depth == "a pair with a pose" and not trial.settled(explanations) and not trial.time.over:
         seconds = [item for item in every if item.id != "pose_missing" and math.isfinite(item.none)]
-        found = _sorted([*found, *trial.other_pose(seconds)])
-    return found
+        explanations = _sorted([*explanations, *trial.other_pose(seconds)])
+    return explanations
 
 
-def _together(one: Mistake, other: Mistake) -> bool:
+def _together(mistake: Mistake, second: Mistake) -> bool:
     """True if two mistakes can be made at once, and do not undo each other."""
-    return one.id != other.id and {one.id, other.id} != {"clamp", "clamp_missing"}
+    return mistake.id != second.id and {mistake.id, second.id} != {"clamp", "clamp_missing"}
 
 
-def _sorted(found: Sequence[MistakesFound]) -> list[MistakesFound]:
+def _sorted(explanations: Sequence[MistakesFound]) -> list[MistakesFound]:
     """Explanations, the best first; a second mistake, or a pose, has to close what a single one leaves."""
-    return sorted(found, key=lambda item: item.after * _burden(item))
+    return sorted(explanations, key=lambda item: item.after * _burden(item))
 
 
 def _burden(item: MistakesFound) -> float:
@@ -178,21 +178,21 @@ def explained_start(mechanism: Mechanism, law: ControlLaw, acceleration: Array) 
 
     def off(trial: ControlLaw) -> Array:
         robot = AirRobot(mechanism, trial)
-        first = next(steps_in_air(robot, trial, (q, v), 1 / trial.rate, "explicit"))
-        return robot.equations.solve(q, v, load=robot.load(first.efforts)).acceleration - acceleration
+        step = next(steps_in_air(robot, trial, (q, v), 1 / trial.rate, "explicit"))
+        return robot.equations.solve(q, v, load=robot.load(step.efforts)).acceleration - acceleration
 
-    before = float(np.abs(off(law)).max())
-    found = []
+    distance = float(np.abs(off(law)).max())
+    explanations = []
     for item in mistakes(law):
         sizes = [1.0]
         if item.sized:
             sizes = [fitted(lambda size, item=item: off(item.changed(law, size)), start) for start in item.starts]  # type: ignore[misc]  # bound now
         pairs = [(float(np.abs(off(item.changed(law, size))).max()), size) for size in sizes]
-        after, size = min(pairs)
-        if after <= _CLOSES_AT_START * before and _differs(item, size):
-            found.append(MistakesFound((item,), (size,), "explicit", after))
-    found.sort(key=lambda item: item.after * (_FOR_A_SIZE if item.fitted else 1))
-    return MistakeSearch(before, "explicit", 0.0, tuple(found))
+        left, size = min(pairs)
+        if left <= _CLOSES_AT_START * distance and _differs(item, size):
+            explanations.append(MistakesFound((item,), (size,), "explicit", left))
+    explanations.sort(key=lambda item: item.after * (_FOR_A_SIZE if item.fitted else 1))
+    return MistakeSearch(distance, "explicit", 0.0, tuple(explanations))
 
 
 class _Trial:
@@ -209,24 +209,24 @@ class _Trial:
         alone: words of the mistakes that were tried alone.
     """
 
-    def __init__(self, search: LawMotions, before: float, scheme: Scheme, time: SearchTime) -> None:
-        self.search, self.before, seen, self.time = search, before, search.seen, time
+    def __init__(self, search: LawMotions, distance: float, scheme: Scheme, time: SearchTime) -> None:
+        self.search, self.before, seen, self.time = search, distance, search.seen, time
         self.alone: set[str] = set()
         self.screen = MistakeScreen(search.mechanism, search.law, seen.q, seen.v, search.step, search.stride)
         count = len(seen.time)
         largest = [float(np.abs(item).max()) for item in search.differences(search.law, scheme, count)]
-        shows = next((row for row, size in enumerate(largest) if size >= _SHOWS * before), count - 1)
+        shows = next((row for row, size in enumerate(largest) if size >= _SHOWS * distance), count - 1)
         self.window = min(count, max(_LEAST, shows + 2))
         self.treatments: tuple[Treatment, ...] = TREATMENTS
-        self.plain = max(largest[: self.window], default=before)
+        self.plain = max(largest[: self.window], default=distance)
 
-    def settled(self, found: Sequence[MistakesFound]) -> bool:
+    def settled(self, explanations: Sequence[MistakesFound]) -> bool:
         """True if the best explanation leaves nothing to explain."""
-        return bool(found) and found[0].after <= max(EXACT * self.before, self.search.seen.bar)
+        return bool(explanations) and explanations[0].after <= max(EXACT * self.before, self.search.seen.bar)
 
     def best(self, choices: Sequence[tuple[Mistake, ...]], most: int) -> list[MistakesFound]:
         """Explanations by these choices, the best first; ``most`` are tried, until nothing is left to explain."""
-        found: dict[tuple[str, ...], MistakesFound] = {}
+        explanations: dict[tuple[str, ...], MistakesFound] = {}
         enough = math.inf
         for item in self.screen.best(choices)[:most]:
             if item.left > enough or self.time.over:
@@ -235,10 +235,10 @@ class _Trial:
             tried = min(self.tried(item), key=lambda trial: trial.after, default=None)
             if tried is not None and all(map(_differs, tried.mistakes, tried.sizes)):
                 name = tuple(mistake.words for mistake in item.mistakes)
-                found[name] = min(found.get(name, tried), tried, key=lambda trial: trial.after)
+                explanations[name] = min(explanations.get(name, tried), tried, key=lambda trial: trial.after)
                 if self.settled([tried]):
                     enough = min(enough, _ALIKE * item.left)
-        return _sorted([*found.values()])
+        return _sorted([*explanations.values()])
 
     def tried(self, item: Screened) -> Iterator[MistakesFound]:
         """Explanations by mistakes at once, with the schemes of a treatment with which they come near in the window."""
@@ -254,10 +254,10 @@ class _Trial:
             if item.sized:
                 sizes = search.fitted(chosen, sizes, scheme, self.window, rounds=3)
                 sizes = search.fitted(chosen, sizes, scheme, count, rounds=3)
-            after = search.distance(changed(search.law, chosen, sizes), scheme, bound)
-            if math.isfinite(after):
-                yield MistakesFound(chosen, sizes, scheme, after)
-                if after <= search.seen.bar:
+            distance = search.distance(changed(search.law, chosen, sizes), scheme, bound)
+            if math.isfinite(distance):
+                yield MistakesFound(chosen, sizes, scheme, distance)
+                if distance <= search.seen.bar:
                     break
 
     def other_pose(self, seconds: Sequence[Mistake | None]) -> list[MistakesFound]:
@@ -273,7 +273,7 @@ class _Trial:
             size = len(law.joints) + int(second is not None and second.sized)
             fits.append((*self.screen.numbers(moved, size, treatment), moved, second, treatment))
         self.treatments = (min(fits, key=lambda fit: fit[1])[-1],)
-        found = []
+        explanations = []
         for near, _, moved, second, treatment in sorted(fits, key=lambda fit: fit[1])[:_POSES]:
             for scheme in (name for name in search.schemes if name.startswith(treatment)):
                 if self.time.over:
@@ -281,32 +281,34 @@ class _Trial:
                 if math.isinf(search.distance(moved(near), scheme, _NEAR * self.before)):
                     continue
                 values = search.fit(moved, near, scheme, count, 4)
-                after = search.distance(moved(values), scheme, _CLOSES * self.before)
-                if not math.isfinite(after):
+                distance = search.distance(moved(values), scheme, _CLOSES * self.before)
+                if not math.isfinite(distance):
                     continue
                 offsets = values[: len(law.joints)]
                 change = partial(_scaled_by, partial(_moved, law, None), offsets)
-                told = offsets_told(law.joints, offsets, self._clamped(moved, values, scheme, after))
+                told = offsets_told(law.joints, offsets, self._clamped(moved, values, scheme, distance))
                 item = Mistake(id="pose", words=told, layer="target", changed=change, numbers=len(offsets))
                 both = (item,) if second is None else (item, second)
                 sizes = (1.0, _size(second, values))[: len(both)]
-                found.append(MistakesFound(both, sizes, scheme, after))
-                if self.settled(found[-1:]):
-                    return found[-1:]
-        return _sorted([item for item in found if all(map(_differs, item.mistakes, item.sizes))])[:1]
+                explanations.append(MistakesFound(both, sizes, scheme, distance))
+                if self.settled(explanations[-1:]):
+                    return explanations[-1:]
+        return _sorted([item for item in explanations if all(map(_differs, item.mistakes, item.sizes))])[:1]
 
-    def _clamped(self, moved: Callable[[Array], ControlLaw], values: Array, scheme: Scheme, after: float) -> list[int]:
+    def _clamped(
+        self, moved: Callable[[Array], ControlLaw], values: Array, scheme: Scheme, distance: float
+    ) -> list[int]:
         """Joints for which half of the offset explains a motion as well as all of it."""
         halved = {k: values * (1 - 0.5 * (np.arange(len(values)) == k)) for k in range(len(self.search.law.joints))}
-        bound = max(2 * after, self.search.seen.bar)
+        bound = max(2 * distance, self.search.seen.bar)
         return [k for k, less in halved.items() if math.isfinite(self.search.distance(moved(less), scheme, bound))]
 
 
 def _moved(law: ControlLaw, second: Mistake | None, values: Array) -> ControlLaw:
     """The law with another pose, off by the first values, and a second mistake, whose size the last value changes."""
     offsets = values[: len(law.joints)]
-    held = law.targets if law.policy is not None else tuple((np.array(law.targets) + offsets).tolist())
-    law = law.change(pose=law.pose + offsets, targets=held)
+    targets = law.targets if law.policy is not None else tuple((np.array(law.targets) + offsets).tolist())
+    law = law.change(pose=law.pose + offsets, targets=targets)
     return law if second is None else second.changed(law, _size(second, values))
 
 

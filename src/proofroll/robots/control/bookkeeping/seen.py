@@ -77,10 +77,10 @@ class LawMotions:
         self.stride = round(float(self.seen.time[1] - self.seen.time[0]) / self.step)
         self.turning = np.zeros(self.mechanism.nq, dtype=bool)
         self.quaternions = []
-        for joint, at in zip(self.mechanism.joints, self.mechanism.q_slices, strict=True):
-            self.turning[at] = joint.kind == JointKind.REVOLUTE
+        for joint, place in zip(self.mechanism.joints, self.mechanism.q_slices, strict=True):
+            self.turning[place] = joint.kind == JointKind.REVOLUTE
             if joint.kind in WITH_QUATERNION:
-                self.quaternions.append(slice(at.stop - 4, at.stop))
+                self.quaternions.append(slice(place.stop - 4, place.stop))
         self.schemes: list[Scheme] = [name for name in SCHEMES if self.quaternions or not name.endswith("_base")]
 
     def robot(self, law: ControlLaw) -> AirRobot:
@@ -94,28 +94,34 @@ class LawMotions:
         """Differences between a state and the one seen at a sample."""
         off = q - self.seen.q[row]
         off[self.turning] = (off[self.turning] + math.pi) % (2 * math.pi) - math.pi
-        for at in self.quaternions:
-            off[at] = 2 * (q[at] * np.sign(q[at] @ self.seen.q[row][at]) - self.seen.q[row][at])
+        for place in self.quaternions:
+            off[place] = 2 * (q[place] * np.sign(q[place] @ self.seen.q[row][place]) - self.seen.q[row][place])
         return np.concatenate([off, _RATES * (v - self.seen.v[row])])
 
     def differences(self, law: ControlLaw, scheme: Scheme, count: int, bound: float = math.inf) -> list[Array]:
         """Differences at the first samples, until one exceeds the bound or the motion blows up."""
-        found: list[Array] = []
+        differences: list[Array] = []
         start = (self.seen.q[0].copy(), self.seen.v[0].copy())
         steps = steps_in_air(self.robot(law), law, start, self.step, scheme)
         try:
             for row, item in enumerate(itertools.islice(steps, 0, self.stride * (count - 1) + 1, self.stride)):
-                found.append(self.apart(row, item.q, item.v))
-                if not np.abs(found[-1]).max() <= bound:
+                differences.append(self.apart(row, item.q, item.v))
+                if not np.abs(differences[-1]).max() <= bound:
                     break
         except (Diverged, Refused):
             pass
-        return found
+        return differences
 
     def spread(self) -> float:
         """Distance between motions under the law by explicit and by implicit steps."""
-        one, other = (np.array(self.differences(self.law, name, len(self.seen.time))) for name in _OPPOSITE)
-        return float(np.abs(one - other).max()) if one.shape == other.shape else math.inf
+        differences_a, differences_b = (
+            np.array(self.differences(self.law, name, len(self.seen.time))) for name in _OPPOSITE
+        )
+        return (
+            float(np.abs(differences_a - differences_b).max())
+            if differences_a.shape == differences_b.shape
+            else math.inf
+        )
 
     def imitated(self, scheme: Scheme) -> bool:
         """True if explicit kd with an armature of h kd more moves as implicit kd does."""
@@ -127,26 +133,26 @@ class LawMotions:
     def distance(self, law: ControlLaw, scheme: Scheme, bound: float = math.inf) -> float:
         """Largest difference at all samples; infinite if it exceeds the bound."""
         count = len(self.seen.time)
-        found = self.differences(law, scheme, count, bound)
-        if len(found) < count:
+        differences = self.differences(law, scheme, count, bound)
+        if len(differences) < count:
             return math.inf
-        largest = max(float(np.abs(item).max()) for item in found)
+        largest = max(float(np.abs(item).max()) for item in differences)
         return largest if largest <= bound else math.inf
 
     def fitted(
         self, chosen: Sequence[Mistake], sizes: Sequence[float], scheme: Scheme, count: int, rounds: int = 8
     ) -> tuple[float, ...]:
         """Sizes of mistakes with which the first samples fit best."""
-        at, found = [k for k, item in enumerate(chosen) if item.sized], np.array(sizes, dtype=float)
+        sized, fitted_sizes = [k for k, item in enumerate(chosen) if item.sized], np.array(sizes, dtype=float)
 
         def law(values: Array) -> ControlLaw:
-            trial = found.copy()
-            trial[at] = np.maximum(values, 0.0)
+            trial = fitted_sizes.copy()
+            trial[sized] = np.maximum(values, 0.0)
             return changed(self.law, chosen, trial.tolist())
 
-        if at:
-            found[at] = np.maximum(self.fit(law, found[at], scheme, count, rounds), 0.0)
-        return tuple(found.tolist())
+        if sized:
+            fitted_sizes[sized] = np.maximum(self.fit(law, fitted_sizes[sized], scheme, count, rounds), 0.0)
+        return tuple(fitted_sizes.tolist())
 
     def fit(self, law: Callable[[Array], ControlLaw], start: Array, scheme: Scheme, count: int, rounds: int) -> Array:
         """Numbers of a law with which the first samples fit best."""
