@@ -102,10 +102,10 @@ class Search:
         """Causes and first unexplained layer, searched at the states of ``truth``; see :meth:`causes`."""
         step = self._begun(truth)
         while (layer := first_failing(step.found, self.tolerances)) is not None:
-            closed = self._closed(step, layer)
-            if closed is None:
+            closed_step = self._closed(step, layer)
+            if closed_step is None:
                 return step.causes, layer
-            step = closed
+            step = closed_step
         return step.causes, None
 
     def _closed(self, step: _Step, layer: str) -> _Step | None:

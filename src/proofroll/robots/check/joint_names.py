@@ -50,41 +50,41 @@ def proposed_patterns(robot: Robot, rival: Robot, matched: Mapping[str, str]) ->
     lonely_there = [joint.name for joint in rival.moving if joint.name not in partners]
     best: tuple[str, dict[str, str]] = ("", {})
     tried: set[_Patterns] = set()
-    for patterns in (pair for name in lonely for two in lonely_there for pair in _differences(name, two)):
+    for patterns in (pair for name in lonely for partner in lonely_there for pair in _differences(name, partner)):
         if patterns in tried:
             continue
         tried.add(patterns)
-        fitting = {name: two for name, two in _pairs(patterns, robot, rival).items() if name in lonely}
+        fitting = {name: partner for name, partner in _pairs(patterns, robot, rival).items() if name in lonely}
         if set(fitting.values()) <= set(lonely_there) and _same_tree({**matched, **fitting}, fitting, robot, rival):
             best = max(best, ("=".join(patterns), fitting), key=lambda item: len(item[1]))
     return best
 
 
-def _differences(name: str, two: str) -> Iterator[_Patterns]:
+def _differences(name: str, partner: str) -> Iterator[_Patterns]:
     """Patterns of two names with a common end, and of two names with a common beginning."""
-    if back := _common(name[::-1], two[::-1]):
-        yield name[:-back] + _ANY, two[:-back] + _ANY
-    if front := _common(name, two):
-        yield _ANY + name[front:], _ANY + two[front:]
+    if back := _common(name[::-1], partner[::-1]):
+        yield name[:-back] + _ANY, partner[:-back] + _ANY
+    if front := _common(name, partner):
+        yield _ANY + name[front:], _ANY + partner[front:]
 
 
-def _common(text: str, two: str) -> int:
+def _common(text: str, second: str) -> int:
     """Number of equal characters at the beginning of two texts."""
     return next(
-        (count for count, (a, b) in enumerate(zip(text, two, strict=False)) if a != b), min(len(text), len(two))
+        (count for count, (a, b) in enumerate(zip(text, second, strict=False)) if a != b), min(len(text), len(second))
     )
 
 
 def _pairs(patterns: _Patterns, robot: Robot, rival: Robot) -> dict[str, str]:
     """Joints of two robots whose names fit two patterns with the same part in place of ``*``."""
     front, _, back = patterns[0].partition(_ANY)
-    there = {joint.name for joint in rival.moving}
+    rival_names = {joint.name for joint in rival.moving}
     pairs: dict[str, str] = {}
     for joint in robot.moving:
         name = joint.name
         if len(name) >= len(front) + len(back) and name.startswith(front) and name.endswith(back):
             image = patterns[1].replace(_ANY, name[len(front) : len(name) - len(back)])
-            pairs |= {name: image} if image in there else {}
+            pairs |= {name: image} if image in rival_names else {}
     return pairs
 
 

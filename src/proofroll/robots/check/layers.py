@@ -142,8 +142,8 @@ def _moves_alike(robot: Robot, rival: Robot) -> bool:
         and robot.gravity is rival.gravity
         and len(robot.joints) == len(rival.joints)
         and all(
-            getattr(joint, name) is getattr(two, name)
-            for joint, two in zip(robot.joints, rival.joints, strict=True)
+            getattr(joint, name) is getattr(partner, name)
+            for joint, partner in zip(robot.joints, rival.joints, strict=True)
             for name in _MOTION
         )
     )

@@ -207,27 +207,27 @@ def _unlike(robot: Robot, rival: Robot) -> Iterator[UnlikeValue]:
         }
         pairs["follows"] = (follows[0].get(joint.name), follows[1].get(joint.name))
         pairs["mass that it carries"] = (groups[0][joint.name].mass, groups[1][joint.name].mass)
-        for quantity, (here, there) in pairs.items():
-            if _apart(here, there):
-                yield UnlikeValue(joint.name, quantity, here, there)
+        for quantity, (value, rival_value) in pairs.items():
+            if _apart(value, rival_value):
+                yield UnlikeValue(joint.name, quantity, value, rival_value)
 
 
 def _written(mimic: Mimic) -> str:
     return f"{mimic.multiplier:g} · {mimic.other} + {mimic.offset:g}"
 
 
-def _apart(here: Any, there: Any) -> bool:
-    if isinstance(here, float) and isinstance(there, float):
-        return not math.isclose(here, there, rel_tol=_ROUNDING, abs_tol=_ROUNDING)
-    return bool(here != there)
+def _apart(value: Any, rival_value: Any) -> bool:
+    if isinstance(value, float) and isinstance(rival_value, float):
+        return not math.isclose(value, rival_value, rel_tol=_ROUNDING, abs_tol=_ROUNDING)
+    return bool(value != rival_value)
 
 
-def _same_digits(here: Any, there: Any) -> bool:
+def _same_digits(value: Any, rival_value: Any) -> bool:
     """True for two numbers that differ by at most one unit of the last digit with which one of them is written."""
-    if not (isinstance(here, float) and isinstance(there, float)) or not math.isfinite(here - there):
+    if not (isinstance(value, float) and isinstance(rival_value, float)) or not math.isfinite(value - rival_value):
         return False
-    last = max(_last_digit(here), _last_digit(there))
-    return abs(here - there) <= min(last * (1 + _ROUNDING), _WRITTEN * max(abs(here), abs(there)))
+    last = max(_last_digit(value), _last_digit(rival_value))
+    return abs(value - rival_value) <= min(last * (1 + _ROUNDING), _WRITTEN * max(abs(value), abs(rival_value)))
 
 
 def _last_digit(value: float) -> float:

@@ -116,7 +116,7 @@ class _Rows:
 
 
 def acceleration_fit(
-    record: ControlRecord, law: ControlLaw, mechanism: Mechanism, efforts: Array, held: Array
+    record: ControlRecord, law: ControlLaw, mechanism: Mechanism, efforts: Array, held_mask: Array
 ) -> AirFit | str:
     """Fit of a record with a row for each step or a few steps, or the reason why there is none.
 
@@ -125,20 +125,20 @@ def acceleration_fit(
         law: the law as it should be.
         mechanism: the robot.
         efforts: of the joints from each row on, (times, n).
-        held: True at rows at which no target changes, (times,).
+        held_mask: True at rows at which no target changes, (times,).
     """
     robot = AirRobot(mechanism, law.change(armature=np.zeros(len(law.joints)), gravity=1.0))
     motion = _motion(record, robot)
     if isinstance(motion, str):
         return motion
-    at, velocities, base_axes = motion
+    states, velocities, base_axes = motion
     # A method adds steps to the velocity of a floating base along the world's axes, or along the base's.
-    moving = [(velocities, base_axes)] + ([] if robot.base is None else [(np.array([v for _, v in at]), None)])
-    table = _Table(record, law, robot, mechanism, at, efforts)
+    moving = [(velocities, base_axes)] + ([] if robot.base is None else [(np.array([v for _, v in states]), None)])
+    table = _Table(record, law, robot, mechanism, states, efforts)
     trials: list[tuple[bool, _Rows]] = []
     try:
         for central, (rated, axes) in itertools.product((False, True), moving):
-            rows = np.flatnonzero(held[1:-1]) + 1 if central else np.arange(len(record.time) - 1)
+            rows = np.flatnonzero(held_mask[1:-1]) + 1 if central else np.arange(len(record.time) - 1)
             if len(rows) < _FEWEST_ROWS:
                 continue
             rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(_MOST_ROWS, len(rows))).astype(int))]
@@ -206,9 +206,9 @@ def _numbers(rows: _Rows, law: ControlLaw) -> Iterator[LayerCause]:
             continue
         change = float(column @ rows.left) / square
         remainder, value = rows.left - change * column, right.get(name, 0.0) + change
-        distance, closed = _rms(remainder), rows.shown(column, remainder)
-        bar = _SAFETY * (rows.rounding if closed else max(rows.rounding, distance)) / np.sqrt(square) + _ROUND_OFF
-        if not (closed or rows.explained(distance)) or abs(change) <= bar or (name != "effort" and value < -bar):
+        distance, matched = _rms(remainder), rows.shown(column, remainder)
+        bar = _SAFETY * (rows.rounding if matched else max(rows.rounding, distance)) / np.sqrt(square) + _ROUND_OFF
+        if not (matched or rows.explained(distance)) or abs(change) <= bar or (name != "effort" and value < -bar):
             continue
         text, interval = with_bar(value, bar, 1)
         in_unit = "kg m² or kg" if name == "armature" and not law.armature.any() else unit
@@ -222,7 +222,7 @@ def _cause(name: str, sentence: str, value: float, rows: _Rows, distance: float)
 
 def _heavier(rows: _Rows, robot: AirRobot) -> Iterator[LayerCause]:
     """A body that weighs more: a mass at a point of it, else any inertia."""
-    found: list[tuple[float, str, float, str]] = []
+    heavier_bodies: list[tuple[float, str, float, str]] = []
     for body, columns in rows.added.items():
         sizes = np.linalg.norm(columns, axis=0)
         seen = sizes > _ROUND_OFF * sizes.max()
@@ -241,12 +241,12 @@ def _heavier(rows: _Rows, robot: AirRobot) -> Iterator[LayerCause]:
         if rows.explained(distance) and numbers[0] > 0:
             place = ", ".join(f"{x:.3g}" for x in (numbers[1:] / numbers[0]).round(4).tolist())
             words = f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"
-            found.append((distance, body, float(numbers[0]), words))
+            heavier_bodies.append((distance, body, float(numbers[0]), words))
         elif values[0] > 0:
             distance = _rms(rows.left - columns @ values)
             words = f"mass, centre and inertia of {body} are others, {values[0]:+.3g} kg"
-            found.append((_SAFETY * distance, body, float(values[0]), words))
-    for distance, _, mass, words in sorted(found)[:1]:
+            heavier_bodies.append((_SAFETY * distance, body, float(values[0]), words))
+    for distance, _, mass, words in sorted(heavier_bodies)[:1]:
         yield _cause("payload", words, mass, rows, distance)
 
 
@@ -279,16 +279,16 @@ def _motion(record: ControlRecord, robot: AirRobot) -> tuple[list[tuple[Array, A
 
     The velocity of the base is along the world's axes, and its angular velocity along its own.
     """
-    at = states_of(record, robot)
-    if isinstance(at, str):
-        return at
-    velocities, rotations = np.array([v for _, v in at]), np.tile(np.eye(3), (len(at), 1, 1))
+    states = states_of(record, robot)
+    if isinstance(states, str):
+        return states
+    velocities, rotations = np.array([v for _, v in states]), np.tile(np.eye(3), (len(states), 1, 1))
     if robot.base is not None:
-        attitude = np.array([q[robot.base[0]][3:] for q, _ in at])
+        attitude = np.array([q[robot.base[0]][3:] for q, _ in states])
         rotations = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
         linear = velocities[:, robot.base[1]][:, :3]
         velocities[:, robot.base[1].start : robot.base[1].start + 3] = np.einsum("tij,tj->ti", rotations, linear)
-    return at, velocities, rotations
+    return states, velocities, rotations
 
 
 class _Table:
@@ -300,10 +300,10 @@ class _Table:
         law: ControlLaw,
         robot: AirRobot,
         mechanism: Mechanism,
-        at: list[tuple[Array, Array]],
+        states: list[tuple[Array, Array]],
         efforts: Array,
     ) -> None:
-        self.law, self.robot, self.at, self.efforts = law, robot, at, efforts
+        self.law, self.robot, self.at, self.efforts = law, robot, states, efforts
         self.step = float(np.diff(record.time).mean())
         bare = law.change(armature=0.0 * law.armature)
         self.weightless = AirRobot(replace(mechanism, gravity=(0.0, 0.0, 0.0)), bare)
@@ -336,8 +336,8 @@ class _Table:
             implicit: True if kd acts at the velocity after a step.
         """
         law, robot, h = self.law, self.robot, self.step
-        before, width = (rows - 1, 2 * h) if central else (rows, h)
-        rates = (rated[rows + 1] - rated[before]) / width
+        previous, width = (rows - 1, 2 * h) if central else (rows, h)
+        rates = (rated[rows + 1] - rated[previous]) / width
         late = np.minimum(rows + 1, len(rated) - 2)
         ahead = (rated[late + 1] - rated[late]) / h
         added = law.armature if law.armature.any() else np.ones(len(law.joints))

@@ -58,19 +58,19 @@ class RecordJudgement:
 
     def lines(self) -> Iterator[str]:
         """Lines of text: a headline, one for each layer, and the causes at the first that does not hold."""
-        first = next((layer for layer in self.layers if not layer.holds), None)
+        failed_layer = next((layer for layer in self.layers if not layer.holds), None)
         rows = f"{counted(self.rows, 'rows')} every {self.step:.4g} s, {self.base} base"
         if self.step_bound:
             yield f"{self.step_bound}."
         if not self.looked_at:
             yield f"{self.record} ({rows}): no layer could be looked at"
-        elif first is None:
+        elif failed_layer is None:
             yield f"{self.record} ({rows}): every layer that was looked at holds"
         else:
-            yield f"{self.record} ({rows}): the {first.name} is the first layer that does not hold"
+            yield f"{self.record} ({rows}): the {failed_layer.name} is the first layer that does not hold"
         for layer in self.layers:
             yield f"  {_mark(layer)} {layer.name} ({LAYERS[layer.name]}): {_found(layer)}"
-            if not layer.holds and (layer is first or layer.causes):
+            if not layer.holds and (layer is failed_layer or layer.causes):
                 yield from (f"       {cause.sentence}" for cause in layer.causes[:3])
                 if not layer.causes:
                     yield f"       {_unexplained(layer)}"
@@ -118,8 +118,8 @@ def judge_record(
         if names:
             raise InputError("--map", ", ".join(names), f"--as {layout} names the arrays; leave one of both out")
         arrays, scenes = read_arrays(record), ControlledScenes(control)
-        held = scenes.of_record(robot, free=False).mechanism
-        free = floats(arrays, layout, sum(joint.nq == 1 for joint in held.joints))
+        fixed_robot = scenes.of_record(robot, free=False).mechanism
+        free = floats(arrays, layout, sum(joint.nq == 1 for joint in fixed_robot.joints))
         model = scenes.of_record(robot, free=free)
         driven = ControlLaw.of(model.mechanism).joints
         time, columns = columns_of(record, arrays, layout, model.mechanism, driven)
@@ -162,10 +162,10 @@ def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[st
     for joint, limit in speeds.items():
         sizes = np.abs(record.columns.get(f"v.{joint}", np.zeros(1)))
         if sizes.max() > limit:
-            at = record.time[int(np.argmax(sizes > limit))]
+            instant = record.time[int(np.argmax(sizes > limit))]
             yield (
-                f"v.{joint} passes the velocity limit {limit:.4g} of the robot's file at {at:.4g} s; a program that "
-                "clamps velocities moves it otherwise"
+                f"v.{joint} passes the velocity limit {limit:.4g} of the robot's file at {instant:.4g} s; a program "
+                "that clamps velocities moves it otherwise"
             )
 
 

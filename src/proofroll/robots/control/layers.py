@@ -159,24 +159,24 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
     assert not isinstance(compared, str)  # the layer was looked at
     order = list(LAYERS)
     shown = [*(name for name in order[: order.index(layer.name)] if name in skipped), layer.name]
-    before = _norm(evidence, layer.name, evidence.law)
+    distance = _norm(evidence, layer.name, evidence.law)
     rounding = float((_bars(layer.name, evidence, compared) / compared.sizes).max())
-    found: list[tuple[float, LayerCause]] = []
+    ranked: list[tuple[float, LayerCause]] = []
     if "target" in shown and not isinstance(offset := _offset(evidence, layer.name), str):
-        found.append((2 * offset.after, offset))  # a pose has many numbers: a mistake with fewer goes before
-    tried, known = 0, [item for item in mistakes(evidence.law) if _shows(item, shown)]
-    for mistake in known:
+        ranked.append((2 * offset.after, offset))  # a pose has many numbers: a mistake with fewer goes before
+    tried, candidates = 0, [item for item in mistakes(evidence.law) if _shows(item, shown)]
+    for mistake in candidates:
         if time.over:
             break
         tried += 1
-        size, after = _best_size(mistake, layer.name, evidence)
-        if after <= max(_HELPS * before, min(rounding, 0.5 * before)):
-            cause = LayerCause(mistake.id, mistake.sentence(size), size if mistake.sized else None, after)
-            found.append((after * (_FOR_A_SIZE if mistake.sized else 1.0), cause))
-    causes = [cause for _, cause in sorted(found, key=lambda item: item[0])]
+        size, residual = _best_size(mistake, layer.name, evidence)
+        if residual <= max(_HELPS * distance, min(rounding, 0.5 * distance)):
+            cause = LayerCause(mistake.id, mistake.sentence(size), size if mistake.sized else None, residual)
+            ranked.append((residual * (_FOR_A_SIZE if mistake.sized else 1.0), cause))
+    causes = [cause for _, cause in sorted(ranked, key=lambda item: item[0])]
     if layer.name == "instants" and not causes:
         causes = [*_missed(evidence)]
-    return {"causes": tuple(causes), "tried": tried, "known": len(known)}
+    return {"causes": tuple(causes), "tried": tried, "known": len(candidates)}
 
 
 def _shows(mistake: Mistake, layers: Sequence[str]) -> bool:
@@ -210,10 +210,10 @@ def _offset(evidence: _Evidence, name: str) -> LayerCause | str:
     law = evidence.law
     pose = law.pose + law.signs * offsets
     targets = law.targets if law.policy is not None else tuple((law.signs * pose).tolist())
-    after = _norm(evidence, name, law.change(pose=pose, targets=targets))
-    if after > _HELPS * _norm(evidence, name, law):
+    distance = _norm(evidence, name, law.change(pose=pose, targets=targets))
+    if distance > _HELPS * _norm(evidence, name, law):
         return "no constant offset"
-    return LayerCause("pose", offsets_told(law.joints, offsets), None, after)
+    return LayerCause("pose", offsets_told(law.joints, offsets), None, distance)
 
 
 def _best_size(mistake: Mistake, layer: str, evidence: _Evidence) -> tuple[float, float]:
@@ -225,8 +225,8 @@ def _best_size(mistake: Mistake, layer: str, evidence: _Evidence) -> tuple[float
 
     sizes = [fitted(residual, start) for start in mistake.starts] if mistake.sized else [1.0]
     pairs = [(_norm(evidence, layer, mistake.changed(evidence.law, size)), size) for size in sizes]
-    after, size = min(pairs)
-    return size, after
+    distance, size = min(pairs)
+    return size, distance
 
 
 def _norm(evidence: _Evidence, name: str, law: ControlLaw) -> float:
@@ -237,10 +237,10 @@ def _norm(evidence: _Evidence, name: str, law: ControlLaw) -> float:
     return float(np.abs(compared.difference / compared.sizes).max())
 
 
-def _compared(columns: list[str], time: Array, given: Array, computed: Array) -> _Compared:
-    sizes = np.maximum(np.abs(given).max(axis=0, initial=0.0), np.abs(computed).max(axis=0, initial=0.0))
+def _compared(columns: list[str], time: Array, recorded: Array, computed: Array) -> _Compared:
+    sizes = np.maximum(np.abs(recorded).max(axis=0, initial=0.0), np.abs(computed).max(axis=0, initial=0.0))
     sizes = np.maximum(sizes, 1e-3 * sizes.max(initial=0.0))
-    return _Compared(tuple(columns), time, given - computed, np.where(sizes > 0, sizes, 1.0))
+    return _Compared(tuple(columns), time, recorded - computed, np.where(sizes > 0, sizes, 1.0))
 
 
 def _told(record: ControlRecord) -> list[str]:
@@ -255,8 +255,8 @@ def instant_rows(record: ControlRecord, law: ControlLaw) -> Any:
         near = np.abs(record.time * law.rate - np.round(record.time * law.rate)) < _SAME_TIME
         return np.flatnonzero(near)
     values = np.stack([record.columns[name] for name in names], axis=1)
-    changed = np.any(np.abs(np.diff(values, axis=0)) > 0, axis=1)
-    later = 1 + np.flatnonzero(changed)
+    changes = np.any(np.abs(np.diff(values, axis=0)) > 0, axis=1)
+    later = 1 + np.flatnonzero(changes)
     if record.time[0] != 0 and len(later):  # a record may begin between two instants
         periods = (record.time[later[0]] - record.time[0]) * law.rate
         if abs(periods - np.round(periods)) > _SAME_TIME:
@@ -273,12 +273,12 @@ def _due(record: ControlRecord, law: ControlLaw) -> Any:
         return rows[:0]
     part = record.part(rows)
     for kind, computed in (("action", _actions), ("target", _targets)):
-        given = record.stacked(kind, law.joints)
-        values = None if given is None or (kind == "action" and law.policy is None) else computed(part, law)
-        if given is not None and values is not None and not isinstance(values, str):
-            before, rounding = given[rows - 1], 4 * record.rounding_of(kind, law.joints)[rows]
-            values = np.clip(values, given.min(axis=0), given.max(axis=0))  # what is clipped does not change
-            return rows[np.any(np.abs(values - before) > rounding + _ROUND_OFF, axis=1)]
+        recorded = record.stacked(kind, law.joints)
+        values = None if recorded is None or (kind == "action" and law.policy is None) else computed(part, law)
+        if recorded is not None and values is not None and not isinstance(values, str):
+            previous, rounding = recorded[rows - 1], 4 * record.rounding_of(kind, law.joints)[rows]
+            values = np.clip(values, recorded.min(axis=0), recorded.max(axis=0))  # what is clipped does not change
+            return rows[np.any(np.abs(values - previous) > rounding + _ROUND_OFF, axis=1)]
     return rows[:0]
 
 
@@ -296,16 +296,16 @@ def _instants(record: ControlRecord, law: ControlLaw) -> _Compared | str:
     due = record.time[_due(record, law)]
     due = due[due <= time[-1] + (1 + _SAME_TIME) * period]  # what comes later may hold on purpose
     lacking = np.array([np.abs(time - instant).min() for instant in due])
-    at = np.concatenate([time[1:], due])
-    return _Compared(("time",), at, np.concatenate([(time - expected)[1:], lacking])[:, None], sizes)
+    instants = np.concatenate([time[1:], due])
+    return _Compared(("time",), instants, np.concatenate([(time - expected)[1:], lacking])[:, None], sizes)
 
 
 def held_rows(record: ControlRecord, law: ControlLaw) -> Any:
     """True at rows at which no action or target changes."""
-    held = np.ones(len(record.time), bool)
+    mask = np.ones(len(record.time), bool)
     if _told(record) or law.policy is not None:
-        held[instant_rows(record, law)[1:]] = False
-    return held
+        mask[instant_rows(record, law)[1:]] = False
+    return mask
 
 
 def states(record: ControlRecord, law: ControlLaw) -> list[RobotState] | str:
@@ -313,14 +313,14 @@ def states(record: ControlRecord, law: ControlLaw) -> list[RobotState] | str:
     q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
     if q is None or v is None:
         return f"the record has no columns {'q' if q is None else 'v'}.JOINT"
-    still = {"p_WB": np.zeros(3), "q_WB": np.array([1.0, 0, 0, 0]), "v_WB": np.zeros(3), "w_WB": np.zeros(3)}
+    base_at_rest = {"p_WB": np.zeros(3), "q_WB": np.array([1.0, 0, 0, 0]), "v_WB": np.zeros(3), "w_WB": np.zeros(3)}
     base = {name: record.stacked(name, tuple(axes)) for name, axes in BASE.items()}
     return [
         RobotState(
             time=float(time),
             q=q[row],
             v=v[row],
-            **{name: still[name] if item is None else item[row] for name, item in base.items()},
+            **{name: base_at_rest[name] if item is None else item[row] for name, item in base.items()},
         )
         for row, time in enumerate(record.time)
     ]
@@ -334,46 +334,46 @@ def _observed(record: ControlRecord, law: ControlLaw) -> tuple[dict[str, Array],
     """Recorded parts of observations, each (times, entries), and all of their columns."""
     parts = {name: record.stacked(f"{OBSERVED}.{name}", law.joints) for name in ("q", "v", "last")}
     parts |= {name: record.stacked(f"{OBSERVED}.{name}", tuple("xyz")) for name in VECTORS}
-    given = {name: item for name, item in parts.items() if item is not None}
-    labels = {name: law.joints if name in {"q", "v", "last"} else tuple("xyz") for name in given}
-    return given, [f"{OBSERVED}.{name}.{label}" for name in given for label in labels[name]]
+    recorded = {name: item for name, item in parts.items() if item is not None}
+    labels = {name: law.joints if name in {"q", "v", "last"} else tuple("xyz") for name in recorded}
+    return recorded, [f"{OBSERVED}.{name}.{label}" for name in recorded for label in labels[name]]
 
 
 def _observation(record: ControlRecord, law: ControlLaw) -> _Compared | str:
     record = record.part(instant_rows(record, law))
-    given, columns = _observed(record, law)
+    recorded, columns = _observed(record, law)
     actions = record.stacked("action", law.joints)
     if actions is None or record.time[0] != 0:
-        given.pop("last", None)
+        recorded.pop("last", None)
         columns = [name for name in columns if not name.startswith(f"{OBSERVED}.last.")]
-    if not given:
+    if not recorded:
         return f"the record has no columns {OBSERVED}.…"
-    at = states(record, law)
-    if isinstance(at, str):
-        return at
-    if not at:
+    instants = states(record, law)
+    if isinstance(instants, str):
+        return instants
+    if not instants:
         return "no row lies at an instant of the controller"
-    still = np.zeros((1, len(law.joints)))
-    last = np.tile(still, (len(at), 1)) if actions is None else np.concatenate([still, actions[:-1]])
-    seen = [law.observed(state, before) for state, before in zip(at, last, strict=True)]
-    computed = np.concatenate([np.stack([_part(item, name) for item in seen]) for name in given], axis=1)
-    return _compared(columns, record.time, np.concatenate([*given.values()], axis=1), computed)
+    no_action = np.zeros((1, len(law.joints)))
+    last = np.tile(no_action, (len(instants), 1)) if actions is None else np.concatenate([no_action, actions[:-1]])
+    seen = [law.observed(state, action) for state, action in zip(instants, last, strict=True)]
+    computed = np.concatenate([np.stack([_part(item, name) for item in seen]) for name in recorded], axis=1)
+    return _compared(columns, record.time, np.concatenate([*recorded.values()], axis=1), computed)
 
 
 def _actions(record: ControlRecord, law: ControlLaw) -> Array | str:
     """Actions of the policy at the rows of a record of instants, from recorded observations where there are some."""
     answer = law.answer()
     assert answer is not None  # the caller knows that there is a policy
-    given = _observed(record, law)[0]
-    at = states(record, law)
-    if isinstance(at, str):
-        return at
+    observed = _observed(record, law)[0]
+    instants = states(record, law)
+    if isinstance(instants, str):
+        return instants
     recorded = record.stacked("action", law.joints)
     last = np.zeros(len(law.joints))
     actions = []
-    for row, state in enumerate(at):
-        seen = law.observed(state, given["last"][row] if "last" in given else last)
-        seen = dataclasses.replace(seen, **{name: item[row] for name, item in given.items()})
+    for row, state in enumerate(instants):
+        seen = law.observed(state, observed["last"][row] if "last" in observed else last)
+        seen = dataclasses.replace(seen, **{name: item[row] for name, item in observed.items()})
         actions.append(np.clip(answer(seen), -law.clip, law.clip))
         last = actions[-1] if recorded is None else recorded[row]
     return np.array(actions)
@@ -381,15 +381,15 @@ def _actions(record: ControlRecord, law: ControlLaw) -> Array | str:
 
 def _action(record: ControlRecord, law: ControlLaw) -> _Compared | str:
     record = record.part(instant_rows(record, law))
-    given = record.stacked("action", law.joints)
-    if law.policy is None or given is None:
+    recorded = record.stacked("action", law.joints)
+    if law.policy is None or recorded is None:
         return "the controller has no policy" if law.policy is None else "the record has no columns action.JOINT"
     computed = _actions(record, law)
     if isinstance(computed, str):
         return computed
     columns = [f"action.{name}" for name in law.joints]
     late = int(record.time[0] > 0 and f"{OBSERVED}.last.{law.joints[0]}" not in record.columns)
-    return _compared(columns, record.time[late:], given[late:], computed[late:])
+    return _compared(columns, record.time[late:], recorded[late:], computed[late:])
 
 
 def _targets(record: ControlRecord, law: ControlLaw) -> Array | str:
@@ -400,20 +400,20 @@ def _targets(record: ControlRecord, law: ControlLaw) -> Array | str:
         computed = _actions(record, law) if actions is None else actions
         if isinstance(computed, str):
             return computed
-        before = np.zeros(len(law.joints)) if record.time[0] == 0 else computed[0]
+        smoothed = np.zeros(len(law.joints)) if record.time[0] == 0 else computed[0]
         for row, action in enumerate(computed):
-            counts[row] = before = law.smoothed(action, before)
+            counts[row] = smoothed = law.smoothed(action, smoothed)
     times = record.time
     # An action that equals the one before has no row of its own.
     source = np.searchsorted(times, times - (law.delay - _SAME_TIME) / law.rate, side="right") - 1
-    targets = [law.pose if at < 0 else law.target(counts[at], float(times[at])) for at in source.tolist()]
+    targets = [law.pose if row < 0 else law.target(counts[row], float(times[row])) for row in source.tolist()]
     return np.array(targets)
 
 
 def _target(record: ControlRecord, law: ControlLaw) -> _Compared | str:
     record = record.part(instant_rows(record, law))
-    given = record.stacked("target", law.joints)
-    if given is None:
+    recorded = record.stacked("target", law.joints)
+    if recorded is None:
         return "the record has no columns target.JOINT"
     computed = _targets(record, law)
     if isinstance(computed, str):
@@ -421,7 +421,7 @@ def _target(record: ControlRecord, law: ControlLaw) -> _Compared | str:
     late = record.time - record.time[0] > (law.delay - 0.5) / law.rate
     counts = np.ones(len(late), bool) if record.time[0] == 0 else late
     columns = [f"target.{name}" for name in law.joints]
-    return _compared(columns, record.time[counts], given[counts], computed[counts])
+    return _compared(columns, record.time[counts], recorded[counts], computed[counts])
 
 
 def _efforts(record: ControlRecord, law: ControlLaw) -> Array | str:
@@ -430,15 +430,15 @@ def _efforts(record: ControlRecord, law: ControlLaw) -> Array | str:
     if q is None or v is None:
         return "the record has no columns q.JOINT and v.JOINT"
     target, rows, instants = record.stacked("target", law.joints), np.arange(len(q)), instant_rows(record, law)
-    at = np.searchsorted(instants, rows, side="right") - 1
+    places = np.searchsorted(instants, rows, side="right") - 1
     if target is None:
         if record.time[0] != 0 or (law.policy is None and not _told(record) and not len(instants)):
             return "the record has no columns target.JOINT"
         computed = _targets(record.part(instants), law)
         if isinstance(computed, str):
             return computed
-        target = computed[at]
-    seen = np.where(at < 0, -1, instants[at]) if law.hold_effort else rows
+        target = computed[places]
+    seen = np.where(places < 0, -1, instants[places]) if law.hold_effort else rows
     seen = seen - law.lag
     efforts = law.effort(target, q[seen], v[seen])
     efforts[seen < 0] = np.nan
@@ -446,15 +446,15 @@ def _efforts(record: ControlRecord, law: ControlLaw) -> Array | str:
 
 
 def _effort(record: ControlRecord, law: ControlLaw) -> _Compared | str:
-    given = record.stacked("effort", law.joints)
-    if given is None:
+    recorded = record.stacked("effort", law.joints)
+    if recorded is None:
         return "the record has no columns effort.JOINT"
     computed = _efforts(record, law)
     if isinstance(computed, str):
         return computed
     rows = np.isfinite(computed).all(axis=1)
     columns = [f"effort.{name}" for name in law.joints]
-    return _compared(columns, record.time[rows], given[rows], computed[rows])
+    return _compared(columns, record.time[rows], recorded[rows], computed[rows])
 
 
 _DIFFERENCES: dict[str, Callable[[ControlRecord, ControlLaw], _Compared | str]] = {

@@ -124,8 +124,8 @@ def motion_layer(
         return Layer("motion", reason=motion)
     if isinstance(begun := _begun(record, law), str):
         return Layer("motion", reason=begun)
-    first, law = begun
-    q, v = (np.array(part) for part in zip(*motion[first:], strict=True))
+    start, law = begun
+    q, v = (np.array(part) for part in zip(*motion[start:], strict=True))
     if len(q) < _FEWEST:
         return Layer("motion", reason="too few rows follow the first instant of the controller")
     every = float(np.diff(record.time).mean())

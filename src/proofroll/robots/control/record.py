@@ -47,15 +47,15 @@ class ControlRecord:
         Raises:
             InputError: some of them are there, and others are not.
         """
-        wanted = [f"{kind}.{name}" for name in names]
-        absent = [name for name in wanted if name not in self.columns]
-        if len(absent) == len(wanted):
+        columns = [f"{kind}.{name}" for name in names]
+        absent = [name for name in columns if name not in self.columns]
+        if len(absent) == len(columns):
             return None
         if absent:
             raise InputError(
                 str(self.path), absent[0], f"the record has no such column; it has {choices(list(self.columns))}"
             )
-        return np.stack([self.columns[name] for name in wanted], axis=1)
+        return np.stack([self.columns[name] for name in columns], axis=1)
 
     def rounding_of(self, kind: str, names: Sequence[str]) -> Array:
         """Rounding errors of the columns of :meth:`stacked`, (times, names)."""

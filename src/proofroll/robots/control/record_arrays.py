@@ -113,10 +113,10 @@ def floats(arrays: Mapping[str, Array], layout: str, joints: int) -> bool:
         InputError: there is no such layout, or no array of the state.
     """
     require_known("--as", layout, LAYOUTS, "choose the program whose arrays these are, from")
-    found = _named(arrays, LAYOUTS[layout])
-    if "qpos" in found:
-        return bool(found["qpos"].shape[1] == joints + _POSE)
-    return "base" in found
+    named = _named(arrays, LAYOUTS[layout])
+    if "qpos" in named:
+        return bool(named["qpos"].shape[1] == joints + _POSE)
+    return "base" in named
 
 
 def columns_of(
@@ -135,46 +135,46 @@ def columns_of(
         InputError: an array is lacking, or has another number of columns than the robot has joints.
     """
     kind = LAYOUTS[layout]
-    found = _named(arrays, kind)
-    times = _times(path, arrays, len(next(iter(found.values()), ())))
+    quantities = _named(arrays, kind)
+    times = _times(path, arrays, len(next(iter(quantities.values()), ())))
     joints = _in_order(mechanism, arrays, by_level=kind.by_level)
-    _require_shapes(path, kind, arrays, found, len(joints), len(times))
-    if "qpos" in found and "qvel" in found:
-        positions, rates = found.pop("qpos"), found.pop("qvel")
+    _require_shapes(path, kind, arrays, quantities, len(joints), len(times))
+    if "qpos" in quantities and "qvel" in quantities:
+        positions, rates = quantities.pop("qpos"), quantities.pop("qvel")
         if positions.shape[1] == len(joints) + _POSE:
-            found["base"] = np.concatenate([positions[:, :_POSE], rates[:, :_TWIST]], axis=1)
-        found["q"], found["v"] = positions[:, -len(joints) :], rates[:, -len(joints) :]
+            quantities["base"] = np.concatenate([positions[:, :_POSE], rates[:, :_TWIST]], axis=1)
+        quantities["q"], quantities["v"] = positions[:, -len(joints) :], rates[:, -len(joints) :]
     for name in ("q", "v"):
-        if name not in found:
-            wanted = choices(kind.names.get(name, ("qpos", "qvel")))
-            raise InputError(str(path), name, f"{layout} calls it {wanted}; the file has {choices(list(arrays))}")
+        if name not in quantities:
+            names = choices(kind.names.get(name, ("qpos", "qvel")))
+            raise InputError(str(path), name, f"{layout} calls it {names}; the file has {choices(list(arrays))}")
     columns: dict[str, Array] = {}
     moved = [joint for joint in joints if joint in driven]
     for name in ("q", "v", "action", "target", "effort"):
-        if name not in found:
+        if name not in quantities:
             continue
-        width = found[name].shape[1]
+        width = quantities[name].shape[1]
         labels = joints if width == len(joints) else moved
         if width != len(labels):
             advice = f"it has {width} columns; the robot has {len(joints)} joints, of which {len(moved)} are driven"
             raise InputError(str(path), name, advice)
-        columns |= {f"{name}.{label}": found[name][:, k] for k, label in enumerate(labels)}
-    if "base" in found:
-        if not np.all(np.any(found["base"][:, 3:_POSE], axis=1)):
+        columns |= {f"{name}.{label}": quantities[name][:, k] for k, label in enumerate(labels)}
+    if "base" in quantities:
+        if not np.all(np.any(quantities["base"][:, 3:_POSE], axis=1)):
             raise InputError(str(path), "quaternion of the base", "it is zero in a row, which is no orientation")
-        columns |= _base(found["base"], kind, mechanism)
+        columns |= _base(quantities["base"], kind, mechanism)
     return times, columns
 
 
 def _require_shapes(
-    path: Path, layout: Layout, arrays: Mapping[str, Array], found: Mapping[str, Array], joints: int, rows: int
+    path: Path, layout: Layout, arrays: Mapping[str, Array], quantities: Mapping[str, Array], joints: int, rows: int
 ) -> None:
     """Raises InputError for an array with another number of rows than times, or of columns than its state has."""
     widths = {"base": (_POSE + _TWIST,), "qpos": (joints, joints + _POSE), "qvel": (joints, joints + _TWIST)}
-    if "qpos" in found and found["qpos"].shape[1] in widths["qpos"]:
-        floating = found["qpos"].shape[1] == joints + _POSE
+    if "qpos" in quantities and quantities["qpos"].shape[1] in widths["qpos"]:
+        floating = quantities["qpos"].shape[1] == joints + _POSE
         widths["qvel"] = (joints + _TWIST * floating,)
-    for quantity, values in found.items():
+    for quantity, values in quantities.items():
         name = next(name for name in layout.names[quantity] if name in arrays)
         if len(values) != rows:
             raise InputError(str(path), name, f"it has {counted(len(values), 'rows')}, and the file {rows} times")
@@ -187,14 +187,14 @@ def _require_shapes(
 
 def _named(arrays: Mapping[str, Array], layout: Layout) -> dict[str, Array]:
     """Quantity -> its array, (times, numbers); of several environments the first one."""
-    found = {}
+    quantities = {}
     for quantity, names in layout.names.items():
         name = next((name for name in names if name in arrays), None)
         if name is not None:
             values = np.asarray(arrays[name], float)
             values = values[:, 0] if values.ndim > 2 else values
-            found[quantity] = values[:, None] if values.ndim == 1 else values
-    return found
+            quantities[quantity] = values[:, None] if values.ndim == 1 else values
+    return quantities
 
 
 def _times(path: Path, arrays: Mapping[str, Array], count: int) -> Array:
@@ -213,9 +213,9 @@ def _times(path: Path, arrays: Mapping[str, Array], count: int) -> Array:
 def _in_order(mechanism: Mechanism, arrays: Mapping[str, Array], *, by_level: bool) -> list[str]:
     """Joints in the order of the arrays: that of ``joint_names`` among them, if there is one."""
     single = [joint for joint in mechanism.joints if joint.nq == 1]
-    given = next((arrays[name] for name in ("joint_names", "dof_names") if name in arrays), None)
-    if given is not None:
-        names = [item.decode() if isinstance(item, bytes) else str(item) for item in np.ravel(given).tolist()]
+    names_array = next((arrays[name] for name in ("joint_names", "dof_names") if name in arrays), None)
+    if names_array is not None:
+        names = [item.decode() if isinstance(item, bytes) else str(item) for item in np.ravel(names_array).tolist()]
         for name in names:
             require_known("joint_names", name, [joint.name for joint in single], "the robot has no such joint; it has")
         return names

@@ -105,13 +105,13 @@ def _gains(tag: str, attributes: Mapping[str, str]) -> tuple[float, float]:
     return (-bias[1], -bias[2]) if plain else (-1.0, -1.0)
 
 
-def _merged(actuator: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any] | None:
+def _merged(actuator: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any] | None:
     """Merges a position actuator and a damper (target velocity 0) of one joint; None: it is another pair."""
-    by_kind = {item["kind"]: item for item in (actuator, two)}
+    by_kind = {item["kind"]: item for item in (actuator, second)}
     if (
         set(by_kind) != {"position", "velocity"}
-        or actuator["gear"] != two["gear"]
-        or {"limit"} & (actuator.keys() | two.keys())
+        or actuator["gear"] != second["gear"]
+        or {"limit"} & (actuator.keys() | second.keys())
     ):
         return None
     if by_kind["velocity"]["target"]:

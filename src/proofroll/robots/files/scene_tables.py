@@ -79,8 +79,8 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
             advice = f"it {body.impossible}; correct it, or take the bodies of each joint as one by possible=0"
             raise InputError(f"{path}: <link {link}> inertia", body.moments.tolist(), advice)
     names = _names(robot)
-    held = bool(values["couplings"])
-    following = _following(robot) if held else frozenset()
+    with_couplings = bool(values["couplings"])
+    following = _following(robot) if with_couplings else frozenset()
     gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])
     bodies = [(names[joint.child], robot.groups[joint.name]) for joint in robot.moving]
     carriers = {robot.welded[joint.parent][0] for joint in robot.moving}
@@ -94,15 +94,15 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
             _joint(robot, joint, names, start, values) | (_guess(joint, start) if joint.name in following else {})
             for joint in robot.moving
         ],
-        "loops": [_loop(robot, link, names) for link in _links(robot)] if held else [],
+        "loops": [_loop(robot, link, names) for link in _links(robot)] if with_couplings else [],
         "points": [
             {"name": name, "body": name, "position": body.com.tolist()}
             for joint, (name, body) in zip(robot.moving, bodies, strict=True)
             if joint.name not in carriers
         ],
-        "couplings": list(_coupled(robot)) if held else [],
+        "couplings": list(_coupled(robot)) if with_couplings else [],
         "unmodelled": [
-            *(f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if held),
+            *(f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if with_couplings),
             *(
                 f"the {law} of the {joint.kind} joint {joint.name} ({law}=0 leaves all out)"
                 for joint in robot.moving
@@ -250,9 +250,9 @@ def held_start(robot: Robot, start: RobotStates) -> RobotStates:
     """First of some states, with the joints that move an end of a cord at rest in the pose of the file."""
     joints = {joint.name: joint for joint in robot.moving}
     names = set().union(*(_between(robot, cord) for cord in robot.cords))
-    held = {name: joints[name] for name in names}
-    poses = {name: robot.sources[joint.child] for name, joint in held.items() if joint.kind == JointKind.FREE}
-    turning = {name for name, joint in held.items() if joint.kind == JointKind.SPHERICAL}
+    held_joints = {name: joints[name] for name in names}
+    poses = {name: robot.sources[joint.child] for name, joint in held_joints.items() if joint.kind == JointKind.FREE}
+    turning = {name for name, joint in held_joints.items() if joint.kind == JointKind.SPHERICAL}
     return replace(
         start,
         angle=start.angle | {name: np.zeros(1) for name in names & start.angle.keys()},
@@ -260,7 +260,7 @@ def held_start(robot: Robot, start: RobotStates) -> RobotStates:
         | {name: np.eye(3)[None] for name in turning}
         | {name: np.array(pose["rotation"])[None] for name, pose in poses.items()},
         position=start.position | {name: np.array(pose["position"])[None] for name, pose in poses.items()},
-        velocity=start.velocity | {name: np.zeros((1, joint.dofs)) for name, joint in held.items()},
+        velocity=start.velocity | {name: np.zeros((1, joint.dofs)) for name, joint in held_joints.items()},
     )
 
 
