@@ -112,7 +112,7 @@ class ContactWalks(ABC):
 
     @property
     def integrators(self) -> str:
-        """Names of the integrators that this route has used."""
+        """Names of the integrators that this route has used, with what failed where one stood in for another."""
         return " and ".join(self._used) or "DOP853"
 
     def _symbols(self) -> ModeSymbols | None:
@@ -245,13 +245,15 @@ class ContactWalks(ABC):
 
     def _walked(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """Stretch by a compiled mode, or by DOP853 where there is none, and near singular poses, where it fails."""
-        compiled = self.by_symbols(state, mode)
+        compiled, by_states = self.by_symbols(state, mode), "DOP853"
         if compiled is not None:
+            name = "collocation" if self._by_collocation else "Taylor series"
             with suppress(Diverged):
                 stretch = compiled.walk(self._law(state, mode, self._signs), mode, time, state, until)
-                self._used.setdefault("collocation" if self._by_collocation else "Taylor series")
+                self._used.setdefault(name)
                 return stretch
-        self._used.setdefault("DOP853")
+            by_states = f"DOP853 where {name} failed"
+        self._used.setdefault(by_states)
         stretch = integrate_to_guard(
             self._law(state, mode, self._signs), mode, time, state, until, self._tolerance, self._span
         )

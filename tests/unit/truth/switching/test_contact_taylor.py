@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import Force, Mechanism, Spring
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.scene.drives import Actuator
@@ -211,3 +212,16 @@ def test_a_slip_lands_on_the_end_of_its_stretch_but_for_round_off(monkeypatch: p
     monkeypatch.setattr(contact_taylor.CompiledMode, "_places", places)
     sled = load_scene("sled").elements[0].mechanism  # type: ignore[attr-defined]
     assert not any("DOP853" in route for route in truth_of(sled, np.array([0.0, 0.05])).routes)
+
+
+def test_a_route_names_the_compiled_integrator_that_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stretch that its compiled integrator gives up is followed by DOP853, and the name of the route says so."""
+    pytest.importorskip("heyoka")
+
+    def fails(*_: object) -> None:
+        raise Diverged("its steps became too short")
+
+    monkeypatch.setattr(contact_taylor.CompiledMode, "walk", fails)
+    mechanism = load_scene("falling_rod").elements[0].mechanism  # type: ignore[attr-defined]
+    names = [route.split(", ")[1] for route in truth_of(mechanism, np.array([0.0, 0.1])).routes]
+    assert names == ["DOP853 where collocation failed", "DOP853 where Taylor series failed"]
