@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from air_robots import start_of
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.robots.control.bookkeeping.air import AirRobot, Scheme, run_in_air
+from proofroll.robots.control.bookkeeping.air import AirRobot, Scheme, steps_in_air
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import ControlRecord, record_of
 
@@ -26,17 +28,21 @@ def recorded(
     ``digits``: of the file: ``single`` precision, a number of decimals, or all.
     """
     robot = AirRobot(mechanism, law)
-    run = run_in_air(robot, law, robot.coordinates(*start_of(right)), step, count, scheme)
-    states = [robot.state(time, q, v) for time, q, v in zip(run.time, run.q, run.v, strict=True)]
+    steps = steps_in_air(robot, law, robot.coordinates(*start_of(right)), step, scheme)
+    run, times = [*itertools.islice(steps, count + 1)], step * np.arange(count + 1)
+    states = [robot.state(time, item.q, item.v) for time, item in zip(times, run, strict=True)]
     columns = {}
     for k, joint in enumerate(law.joints):
         columns |= {f"q.{joint}": [item.q[k] for item in states], f"v.{joint}": [item.v[k] for item in states]}
-        columns |= {f"action.{joint}": run.actions[:, k], f"target.{joint}": run.targets[:, k]}
-        columns[f"effort.{joint}"] = run.efforts[:, k]
+        columns |= {
+            f"action.{joint}": [item.action[k] for item in run],
+            f"target.{joint}": [item.target[k] for item in run],
+        }
+        columns[f"effort.{joint}"] = [item.efforts[k] for item in run]
     for name, axes in (("p_WB", "xyz"), ("q_WB", "wxyz"), ("v_WB", "xyz"), ("w_WB", "xyz")):
         columns |= {f"{name}.{axis}": [getattr(item, name)[k] for item in states] for k, axis in enumerate(axes)}
     period = round(1 / law.rate / step) + law.extra_steps
-    seen = [run.observations[row // period] for row in range(len(run.time))]
+    seen = [run[row - row % period].observation for row in range(len(run))]
     for name in ("q", "v"):
         columns |= {
             f"observed.{name}.{joint}": [getattr(item, name)[k] for item in seen] for k, joint in enumerate(law.joints)
@@ -50,4 +56,4 @@ def recorded(
         arrays = {name: values.astype(np.float32).astype(float) for name, values in arrays.items()}
     elif digits:
         arrays = {name: np.round(values, int(digits)) for name, values in arrays.items()}
-    return record_of(np.round(run.time, 9), arrays)
+    return record_of(np.round(times, 9), arrays)

@@ -6,7 +6,8 @@ M comes column by column. Source: Featherstone, Rigid Body Dynamics Algorithms, 
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.robots.check.two_formulations import Dynamics, armature, skew, turned_armature, within
+from proofroll.elements.mechanism.scene.rotations import skews
+from proofroll.robots.check.two_formulations import Dynamics, armature, turned_armature, within
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import RobotStates
 
@@ -33,7 +34,7 @@ def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity:
     for joint in robot.joints:
         r, R = within(joint, states)
         E = R.transpose(0, 2, 1)
-        X[joint.child] = np.block([[E, np.zeros_like(E)], [-E @ skew(r), E]])
+        X[joint.child] = np.block([[E, np.zeros_like(E)], [-E @ skews(r), E]])
         velocity[joint.child] = velocity[joint.parent] @ X[joint.child].transpose(0, 2, 1)
         acceleration[joint.child] = acceleration[joint.parent] @ X[joint.child].transpose(0, 2, 1)
         if joint.dofs:
@@ -70,14 +71,14 @@ def _subspace(joint: RobotJoint, R: Array) -> Array:
     if joint.kind == JointKind.PRISMATIC:
         subspace = np.concatenate([np.zeros(3), joint.axis])[:, None]
     else:
-        turning = np.vstack([np.eye(3), zero + skew(joint.child_position)])
+        turning = np.vstack([np.eye(3), zero + skews(joint.child_position)])
         subspace = turning if joint.kind == JointKind.SPHERICAL else turning @ joint.axis[:, None]
     return np.broadcast_to(subspace, (len(R), *subspace.shape))
 
 
 def _spatial(body: RobotBody) -> Array:
     """Spatial inertia at the origin of the body's frame, shape (6, 6)."""
-    C = skew(body.com)
+    C = skews(body.com)
     moment = body.mass * C
     return np.block([[body.inertia + moment @ C.T, moment], [moment.T, body.mass * np.eye(3)]])
 

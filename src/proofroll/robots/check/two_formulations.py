@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.rotations import skews
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotJoint
 from proofroll.robots.states import RobotStates
 
@@ -94,14 +95,6 @@ def _rotate(R: Array, r: Array) -> Array:
     return np.asarray(np.einsum("sij,sj->si", R, r))
 
 
-def skew(r: Array) -> Array:
-    """Matrix of the cross product r × for each vector, shape (..., 3, 3)."""
-    matrix = np.zeros((*r.shape[:-1], 3, 3))
-    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -r[..., 2], r[..., 1], -r[..., 0]
-    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = r[..., 2], -r[..., 1], r[..., 0]
-    return matrix
-
-
 @dataclasses.dataclass
 class _Motion:
     """Motion of a body in world axes: Jacobians, angular velocity, accelerations at zero joint accelerations."""
@@ -134,7 +127,7 @@ def world_jacobians(robot: Robot, states: RobotStates, frames: Frames | None = N
         inertia = R @ np.array([body.inertia for body in bodies])[:, None] @ R.swapaxes(2, 3)
         moving = [motions[joint.child] for joint in robot.joints]
         Jv, Jw, w, a, alpha = (np.array([getattr(motion, name) for motion in moving]) for name in vars(moving[0]))
-        Jc = Jv - skew(r[..., 0]) @ Jw
+        Jc = Jv - skews(r[..., 0]) @ Jw
         ac = a + _swung(w, alpha, r[..., 0])
         Iw, Ialpha = (np.einsum("bsij,bsj->bsi", inertia, rate) for rate in (w, alpha))
         M = _summed(mass[..., None, None] * Jc, Jc) + _summed(inertia @ Jw, Jw)
@@ -173,7 +166,7 @@ def turned_armature(robot: Robot, v: Array) -> Array:
 def _carried(robot: Robot, joint: RobotJoint, parent: _Motion, frames: Frames, v: Array) -> _Motion:
     (p_parent, R_parent), (p, R) = frames[joint.parent], frames[joint.child]
     r = p - p_parent
-    Jv, Jw = parent.Jv - skew(r) @ parent.Jw, parent.Jw.copy()
+    Jv, Jw = parent.Jv - skews(r) @ parent.Jw, parent.Jw.copy()
     if joint.kind == JointKind.FIXED:
         return _Motion(Jv=Jv, Jw=Jw, w=parent.w, a=parent.a + _swung(parent.w, parent.alpha, r), alpha=parent.alpha)
     columns = robot.columns[joint.name]
@@ -188,7 +181,7 @@ def _carried(robot: Robot, joint: RobotJoint, parent: _Motion, frames: Frames, v
         a = parent.a + _swung(parent.w, parent.alpha, r) + 2 * cross(parent.w, relative)
         return _Motion(Jv=Jv, Jw=Jw, w=parent.w, a=a, alpha=parent.alpha)
     anchor = p_parent + _rotate(R_parent, np.broadcast_to(joint.position, p.shape))
-    Jw[:, :, columns], Jv[:, :, columns] = u, -skew(p - anchor) @ u
+    Jw[:, :, columns], Jv[:, :, columns] = u, -skews(p - anchor) @ u
     w, alpha = parent.w + relative, parent.alpha + cross(parent.w, relative)
     a = parent.a + _swung(parent.w, parent.alpha, anchor - p_parent) + _swung(w, alpha, p - anchor)
     return _Motion(Jv=Jv, Jw=Jw, w=w, a=a, alpha=alpha)

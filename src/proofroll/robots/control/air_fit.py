@@ -21,6 +21,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.number_format import error as short
 from proofroll.core.number_format import with_bar
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.scene.rotations import skew
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import BASE, ControlRecord
@@ -390,22 +391,17 @@ class _Table:
             R, J = motion.R_WB[k], motion.J[k]
             acceleration = J @ rate + motion.bias[k]
             pull, turning, spin = R.T @ (acceleration[:3] - gravity), R.T @ acceleration[3:], R.T @ motion.w_WB[k]
-            moved = _skew(turning) + _skew(spin) @ _skew(spin)
+            moved = skew(turning) + skew(spin) @ skew(spin)
             wrench = np.zeros((6, 10))
             wrench[:3, 0], wrench[:3, 1:4] = pull, moved
-            wrench[3:, 1:4] = -_skew(pull)
-            wrench[3:, 4:] = _inertial(turning) + _skew(spin) @ _inertial(spin)
+            wrench[3:, 1:4] = -skew(pull)
+            wrench[3:, 4:] = _inertial(turning) + skew(spin) @ _inertial(spin)
             yield J[:3].T @ R @ wrench[:3] + J[3:].T @ R @ wrench[3:]
 
 
 def _largest(record: ControlRecord, kinds: tuple[str, ...]) -> float:
     """Largest rounding of columns whose names begin so; 0 without one."""
     return max((float(item.max()) for name, item in record.rounding.items() if name.startswith(kinds)), default=0.0)
-
-
-def _skew(a: Array) -> Array:
-    x, y, z = a
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _inertial(a: Array) -> Array:

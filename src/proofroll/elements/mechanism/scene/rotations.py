@@ -30,8 +30,8 @@ _SKEW = np.array([skew(e) for e in _UNIT]).reshape(3, 9)
 
 
 def skews(a: Array) -> Array:
-    """:func:`skew` of each of n vectors, (n, 3, 3)."""
-    matrices: Array = (a @ _SKEW).reshape(-1, 3, 3)
+    """:func:`skew` of each vector of an array (..., 3), shape (..., 3, 3)."""
+    matrices: Array = (a @ _SKEW).reshape(*a.shape, 3)
     return matrices
 
 

@@ -98,32 +98,14 @@ class AirRobot:
 
 
 @dataclass(frozen=True)
-class AirRun:
-    """Motion in the air.
-
-    Attributes:
-        time: of the samples [s].
-        q, v: coordinates and velocities of the mechanism, (times, nq) and (times, nv).
-        efforts: of the driven joints, (times, n); those that act from each sample on.
-        targets: of the driven joints, (times, n).
-        actions: of the policy, (times, n); zeros without a policy.
-        observations: one for each instant; with its time.
-    """
-
-    time: Array
-    q: Array
-    v: Array
-    efforts: Array
-    targets: Array
-    actions: Array
-    observations: tuple[Observation, ...]
-
-
-@dataclass(frozen=True)
 class AirStep:
-    """Instant between two steps of a motion in the air; see :class:`AirRun` for its arrays at one time.
+    """Instant between two steps of a motion in the air.
 
     Attributes:
+        q, v: coordinates and velocities of the mechanism, (nq) and (nv).
+        efforts: of the driven joints, (n); those that act from here on.
+        target: of the driven joints, (n).
+        action: of the policy, (n); zeros without a policy.
         observation: of the policy, at an instant of the controller; None between.
     """
 
@@ -133,23 +115,6 @@ class AirStep:
     target: Array
     action: Array
     observation: Observation | None
-
-
-def run_in_air(
-    robot: AirRobot, law: ControlLaw, start: tuple[Array, Array], step: float, count: int, scheme: Scheme
-) -> AirRun:
-    """Motion of a robot in the air over ``count`` steps [s], sampled after each.
-
-    Raises:
-        InputError: the step does not divide the time between instants.
-        Diverged: the motion blows up.
-    """
-    steps = [*itertools.islice(steps_in_air(robot, law, start, step, scheme), count + 1)]
-    names = ("q", "v", "efforts", "target", "action")
-    q, v, efforts, targets, actions = (np.array([getattr(item, name) for item in steps]) for name in names)
-    time = np.asarray(step * np.arange(count + 1), float)
-    seen = tuple(item.observation for item in steps if item.observation is not None)
-    return AirRun(time=time, q=q, v=v, efforts=efforts, targets=targets, actions=actions, observations=seen)
 
 
 def steps_in_air(
