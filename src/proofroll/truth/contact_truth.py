@@ -115,7 +115,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     by_tree, by_bodies = (units.record(mechanism, replace(record, time=asked)) for record in (by_tree, by_bodies))
     left = None
     if cut is not None:
-        earlier = cut[0].stretch_at(times)
+        earlier = at_times(cut[0], counterparts((paths[0], cut[0]), stretches, kinds), times, kinds)
         early_works = work_along(mechanism, units, tree, cut[0]).at(seconds, earlier)
         early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier, early_works)
         early = early._replace(record=on_same_turns(scaled, tree_states.record, early.record))

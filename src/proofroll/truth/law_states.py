@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import ContactMode, features_of, headed, slip_velocity
+from proofroll.elements.mechanism.contact.acting import ContactMode, features_of
 from proofroll.elements.mechanism.contact.joint_laws import JointContact, mode_of_joints
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.contact.turning import TurningFriction
@@ -19,16 +19,6 @@ from proofroll.truth.switching.contact_guards import Touchable, borne_forces
 from proofroll.truth.tree.contact_tree import ContactTree
 
 _FIELDS = "effort", "drive", "coupling"  # named forces of a record, in its order
-_KNOWN = 1e-13  # slip speed in natural units above which the direction of a slip is that of its velocity
-
-
-def _present(mode: ContactMode, touching: Sequence[Touching]) -> ContactMode:
-    """Mode with present directions of slips: those by which a slip is integrated, however slow."""
-    pairs = zip(mode, touching, strict=True)
-    return tuple(
-        headed(acting, touch) if not acting.leads and float(np.linalg.norm(slip_velocity(touch))) > _KNOWN else acting
-        for acting, touch in pairs
-    )
 
 
 def by_the_tree(route: ContactTree, state: Array, mode: ContactMode) -> Array:
@@ -37,7 +27,6 @@ def by_the_tree(route: ContactTree, state: Array, mode: ContactMode) -> Array:
     m, contacts = dynamics.mechanism, dynamics.contacts
     q, v, time = dynamics.parts(state)
     q = dynamics.equations.tree.normalised(q)
-    mode = _present(mode, dynamics.at(q, v, time, features_of(mode)).touching)
     solution = dynamics.solve(q, v, mode, time)
     motion, named, loops = solution.state.solution.motion, np.zeros(0), np.zeros(0)
     forces = borne_forces(contacts, solution.state.touching, solution)
@@ -66,7 +55,6 @@ def by_the_bodies(route: ContactBodies, second: MaximalCoordinates, state: Array
     equations, m = route.equations, route.equations.mechanism
     state = np.append(equations.equations.normalised(state[:-1]), state[-1])
     bodies = equations.at(state, features_of(mode))
-    mode = _present(mode, bodies.touching)
     solution, named, loops = equations.accelerated(bodies, mode), np.zeros(0), np.zeros(0)
     force = borne_forces(equations.contacts, bodies.touching, solution)
     if _has_named(m):

@@ -1024,3 +1024,15 @@ def test_a_box_that_bounces_flat_comes_to_rest_when_its_rebounds_are_summed() ->
     settled = [event.time for event in found.events if event.kind == "settle"]
     assert settled == [pytest.approx(3 * falls, abs=DIGITS)] * 4
     assert found.record.p_WB[2, 0] == pytest.approx([0, 0, 0.1], abs=DIGITS)
+
+
+def test_what_begins_to_move_slowly_beside_bodies_at_rest_is_followed() -> None:
+    """A pole 1e-11 rad from upright falls away from there while a ball rests: q = q0 cosh(t sqrt(m g s / I))."""
+    pole, ball = Body("pole", 1.0, com=(0.0, 0.0, 0.5), inertia=(0.1,) * 3), Body("ball", 1.0, inertia=(0.01,) * 3)
+    hinge = Joint("hinge", "revolute", "world", "pole", axis=(0.0, 1.0, 0.0), q0=(1e-11,))
+    free = Joint("free", "free", "world", "ball", q0=(5.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0))
+    shapes = Geometry("floor", "world", "plane"), Geometry("skin", "ball", "sphere", radius=0.1)
+    pairs = (Pair("touch", ("skin", "floor"), friction=0.5),)
+    mechanism = Mechanism((pole, ball), (hinge, free), geometries=shapes, pairs=pairs, gravity=(0.0, 0.0, -9.81))
+    found = truth_of(mechanism, np.array([0.0, 1.5]))
+    assert found.record.q[-1, 0] == pytest.approx(1e-11 * np.cosh(1.5 * np.sqrt(9.81 * 0.5 / 0.35)), rel=1e-3)

@@ -5,13 +5,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from proofroll.core.errors import NotUnique
-from proofroll.elements.mechanism.contact.acting import ContactMode, Features, closed_in, features_of
+from proofroll.elements.mechanism.contact.acting import REST, ContactMode, Features, closed_in, features_of
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.box_features import BoxSlot
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 
-# Gap, relative to the mechanism's size, and speed along the normal, in natural units, with which a contact is closed.
+# Gap, relative to the mechanism's size, with which a contact is closed.
 _TOUCHES = 1e-9
 
 
@@ -65,7 +65,8 @@ def passed_boxes(
                     f"a corner of {contacts[k].pair} meets a side of the other box at t = {time:.6g} s, below its "
                     "edge, which is not followed; end before"
                 )
-            closed_mask[number] = bool(max(abs(touch.gap) / size, abs(float(touch.normal @ touch.slide))) <= _TOUCHES)
+            parting = abs(float(touch.normal @ touch.slide))
+            closed_mask[number] = abs(touch.gap) <= _TOUCHES * size and parting <= REST
     return list(np.array(closed_mask, dtype=bool).tolist()), tuple(features)
 
 

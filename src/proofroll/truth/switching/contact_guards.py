@@ -26,9 +26,6 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.truth.followed_paths import time_accuracy
 
-# Acceleration, in natural units (natural_units.py), too small to start a motion: both routes stop there, so that they
-# do not integrate the round-off of a state at rest.
-STANDS = 1e-9
 _UNLOADED = 1e-11  # normal force, in natural units, that is round-off where a contact leaves
 # Value of Painlevé's measure (1 without friction) that counts as zero.
 LEAST_RESPONSE = 1e-3

@@ -8,6 +8,7 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique
 from proofroll.core.number_format import number
+from proofroll.elements.mechanism.contact.acting import REST
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.scene.rotations import Array
 
@@ -17,7 +18,6 @@ Strike = Callable[[Array, Array, list[int]], Array]
 
 _CLOSES = 4e-15  # normal speed, relative to the largest slide before an impact, that counts as none
 _ALIKE = 1e-9  # difference of normal speeds, relative to the largest slide, with which a face lands flat
-_ROUND_OFF = 1e-13  # speed that is round-off, in natural units
 # Difference of outcomes, relative to the largest jump of a velocity, up to which an impact has an outcome. Feet of a
 # robot that land together differ by 3e-5.
 SPREAD = 1e-3
@@ -52,7 +52,7 @@ def groups_of(pairs: Sequence[str], slides: Array, *, together: bool) -> list[li
     """
     if together:
         return [list(range(len(pairs)))]
-    least = max(_ALIKE * float(np.abs(slides).max()), _ROUND_OFF)
+    least = max(_ALIKE * float(np.abs(slides).max()), REST)
     groups: list[list[int]] = []
     for k, pair in enumerate(pairs):
         alike = (g for g in groups if pairs[g[0]] == pair and abs(slides[3 * g[0]] - slides[3 * k]) <= least)

@@ -19,6 +19,7 @@ from proofroll.core.events import EventKind
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.acting import (
+    FAINT,
     OPEN,
     Acting,
     ContactMode,
@@ -104,7 +105,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._rubs = self.friction + self._bounds > 0
         scale = natural_scale(mechanism)
         self._unit = math.prod(scale)  # natural speed
-        self._still, self._rate, self._length = scale.speed, scale.rate, scale.length
+        self._still, self._rate, self._length = FAINT * self._unit, scale.rate, scale.length
         # overlap of each contact when it opened, an error of the method: it is no impact
         self._overlap = np.zeros(len(self.contacts))
         slides = [mechanism.joints[switch.joint.number].kind == JointKind.PRISMATIC for switch in self._joints]
