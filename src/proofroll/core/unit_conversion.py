@@ -20,6 +20,7 @@ _CONVERTED: Mapping[str, tuple[str, float]] = {
     "deg/s": ("rad/s", math.pi / 180),
     "deg/s^2": ("rad/s^2", math.pi / 180),
     "rpm": ("rad/s", math.pi / 30),
+    "g": ("kg", 1e-3),
     "km": ("m", 1e3),
     "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),

@@ -69,7 +69,7 @@ class Compared:
         if not np.isfinite(judgement.error):
             counts = judgement.reason.removeprefix("the question is ill-posed here; ").partition(";")[0]
             unlike = f"has {counts}" if " values, the truth has " in counts else "is not finite"
-            difference = f"{judgement.observable} {unlike}"
+            difference = f"{judgement.observable} {unlike}{when}"
         bar = f"the truth is known to {number(judgement.truth_error_bar)}{unit}"
         if judgement.verdict is Verdict.NOT_JUDGED:
             bar = f"not judged, for {bar} only"
@@ -426,9 +426,10 @@ def _compared(
 
 
 def _farthest(run: RunCurve, true: FloatArray, times: FloatArray) -> float | None:
-    """Time of the largest difference of two curves [s]; None if it is undefined."""
+    """Time of the largest difference of two curves, or of the first that is not finite [s]; None if undefined."""
     values = run.values
     if values.shape != true.shape or not values.size or len(values) not in {len(times), len(times) - 1}:
         return None
     apart = magnitudes(values - true, run.vectors).max(axis=1, initial=0.0)
-    return float(times[len(times) - len(values) :][int(np.argmax(apart))]) if np.all(np.isfinite(apart)) else None
+    finite, sampled = np.isfinite(apart), times[len(times) - len(values) :]
+    return float(sampled[int(np.argmax(apart) if finite.all() else np.argmin(finite))])

@@ -115,3 +115,13 @@ def test_a_sample_on_a_bounce_may_be_of_either_side() -> None:
         velocities[3, 2] = down
         run = {"time": times, "v_WB": velocities}
         assert proofroll.judge(run, scene, {"v_WB": "1e-6 m/s"}, because="round-off").agrees is agrees
+
+
+def test_a_number_that_is_not_finite_is_named_with_its_time() -> None:
+    """Of a coordinate without a number at 0.2 s and behind, the line names the first time."""
+    run = proofroll.simulate("pendulum", "projection", until=0.4, every=0.1)
+    angles = run["q.pivot"].to_numpy().copy()
+    angles[2:] = np.nan
+    judged = proofroll.judge({"time": run["time"].to_numpy(), "q.pivot": angles}, "pendulum")
+    assert not judged.agrees
+    assert "q.pivot is not finite at 0.2 s; " in str(judged)
