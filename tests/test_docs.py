@@ -58,7 +58,12 @@ def commands(text: str) -> list[tuple[list[str], int]]:
 
 
 # Makes what a command does take less long; programs of findings are run by tests/unit/studies/test_findings.py.
-SHORTER = {"recommend": ["--until", "0.05"], "ladder": ["--rounds", "2"], "findings": ["--list"]}
+SHORTER = {
+    "recommend": ["--until", "0.05"],
+    "ladder": ["--rounds", "2"],
+    "findings": ["--list"],
+    "fuzz": ["--minutes", "1e-3"],  # one scene
+}
 
 
 # What these commands do on a cluster is run by tests/unit/running/test_cluster.py and tests/test_versions.py.

@@ -10,7 +10,7 @@ from typer.core import TyperGroup
 GROUPS = {
     "Ask": ("scenes", "run", "plot", "replay", "compare", "recommend", "report"),
     "Bring your own scene, engine or trajectory": ("new", "vocabulary", "check", "judge", "export"),
-    "Study": ("tradeoff", "stability", "ladder", "balance"),
+    "Study": ("tradeoff", "stability", "ladder", "fuzz", "balance"),
     "Blajer's article (2006)": ("onset", "regimes", "figures"),
     "Maintain": ("engines", "versions", "findings", "cite", "bench", "drill"),
 }

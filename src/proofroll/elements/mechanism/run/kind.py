@@ -21,6 +21,7 @@ from proofroll.elements.mechanism.scene.spring_law import IN_LAWS
 
 if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis
+    from proofroll.core.drawing import SceneFamily
 
 
 # A mechanism without laws of joints, and a law of each kind, which changes its motion by far more than a step does
@@ -147,6 +148,13 @@ class MechanismKind:
             "held_targets": (_changed(held, f"{held.name}-held", control=Control(_RATE, (servo.name,))), resting),
             "restitution": (spheres[0], spheres[1]),
         }
+
+    @staticmethod
+    def scene_families() -> Mapping[str, SceneFamily]:
+        """See :class:`proofroll.core.drawing.DrawsScenes`."""
+        from proofroll.elements.mechanism.drawn.families import FAMILIES
+
+        return FAMILIES
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:

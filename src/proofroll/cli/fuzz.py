@@ -1,0 +1,82 @@
+"""Command ``fuzz``: random scenes in which an engine is held against the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from proofroll.cli import options
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from proofroll.studies.fuzz.hunt import Hunt
+
+_LONGEST = 300  # characters of a message in the table
+
+
+def fuzz(
+    engine: Annotated[
+        str,
+        typer.Argument(help="An engine, e.g. mujoco[formulation=joints]; or truth.", autocompletion=options.runs_like),
+    ],
+    minutes: Annotated[float, typer.Option(help="Processor time [min], compilation included.")] = 10.0,
+    seed: Annotated[int, typer.Option(help="Seed of the first scene; the next ones have the seeds behind it.")] = 0,
+    family: Annotated[
+        list[str] | None, typer.Option(help="Family of scenes, e.g. loop; repeat. All by default.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for scenes with a surprise; earlier hunts in it are known.")] = Path(
+        "out/fuzz"
+    ),
+    jobs: options.Jobs = None,
+    as_json: options.Json = False,
+) -> None:
+    """Run random scenes in an engine, hold them against the truth, and list the kinds of surprises.
+
+    Exits with 1 if a kind is new in this folder.
+    """
+    from proofroll.studies.fuzz.hunt import hunt
+
+    with options.progress_bar("scenes") as advance:
+        result = hunt(
+            engine,
+            out,
+            minutes=minutes,
+            seed=seed,
+            families=tuple(family or ()),
+            jobs=jobs,
+            progress=lambda current: advance(f"{len(current.kinds)} kinds of surprises, {current.new} new; scenes"),
+        )
+    options.show(result, as_json, lambda: _parts(result))
+    if result.interrupted:
+        raise typer.Exit(options.INTERRUPTED)
+    raise typer.Exit(options.CONTRADICTED if result.new else options.OK)
+
+
+def _parts(result: Hunt) -> Iterator[Table | str]:
+    from rich.table import Table
+    from rich.text import Text
+
+    last = result.first_seed + max(result.drawn, 1) - 1
+    yield f"{result.engine}: {result.run} random scenes, seeds {result.first_seed} to {last}, {result.seconds:.0f} s"
+    if result.unfit:
+        yield f"{result.unfit} further scenes need what no formulation of {result.engine} provides."
+    if result.invalid:
+        yield f"{len(result.invalid)} scenes were refused by the reader: seeds {', '.join(map(str, result.invalid))}"
+    if not result.kinds:
+        yield "No surprise."
+        return
+    table = Table(box=None, pad_edge=False)
+    for heading in ("", "kind", "scenes", "seed", "scene"):
+        table.add_column(heading, justify="right" if heading in {"scenes", "seed"} else "left")
+    for item in result.kinds:
+        sign = "new" if item.new else ""
+        table.add_row(sign, Text(item.kind), str(item.count), str(item.seed), Text(f"{item.folder}/scene.toml"))
+    yield table
+    for item in result.kinds:
+        yield ""
+        yield Text(f"{item.kind}: {item.largest.message[:_LONGEST]}")  # type: ignore[misc]  # a renderable, too
+    yield f"Show one again: proofroll compare {result.kinds[0].folder}"

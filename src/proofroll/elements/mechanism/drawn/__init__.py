@@ -1,0 +1,1 @@
+"""Random scenes of mechanisms, valid by construction, with each feature of the vocabulary."""

@@ -1,0 +1,1 @@
+"""Random scenes held against the truth: surprises of an engine, by kind."""

@@ -1,0 +1,146 @@
+"""Runs one random scene in an engine and the truth, and tells what should not be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from proofroll.core.comparison import Band, Comparison, Row
+from proofroll.core.errors import InputError
+from proofroll.core.plugins import parse_engine
+from proofroll.core.scene import Scene
+from proofroll.core.verdict import Verdict
+from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
+from proofroll.files.toml_text import toml_text
+from proofroll.running.case import EngineFacts, Status
+from proofroll.running.engine_questions import resolve, resolve_with_truth
+from proofroll.running.process import processor_seconds
+from proofroll.running.runner import Runner
+from proofroll.running.store import write_text
+from proofroll.studies.cases import case_of
+from proofroll.studies.comparison.compare import evaluate
+from proofroll.studies.comparison.default_comparison import able, bounds
+from proofroll.studies.comparison.planning import Plan, plan, point_name
+from proofroll.studies.fuzz.surprises import TRUTH, Surprise, surprises
+
+_TIGHT = 1e-4  # part of its scale by which the limit of small steps of an observable may be off
+_OF_STEPS, _OF_TOLERANCES = [2.0, 1.0, 0.5], [4.0, 2.0, 1.0]  # an engine may refuse a tighter tolerance
+_NAME = "random"
+_BECAUSE = "a random scene: limits of small steps are the same for all who solve it"
+
+
+@dataclass(frozen=True)
+class EvaluatedScene:
+    """Result of a random scene in an engine and the truth.
+
+    Attributes:
+        invalid: message of the reader; empty: the scene is valid.
+        fits: False if no formulation of the engine can represent the scene, which was not run then.
+        truth: status of the truth; None: it was not run.
+        surprises: the largest first.
+        seconds: processor time [s].
+    """
+
+    invalid: str = ""
+    fits: bool = True
+    truth: Status | None = None
+    surprises: tuple[Surprise, ...] = ()
+    seconds: float = 0.0
+
+
+def write_scene(folder: Path, tables: Mapping[str, Any]) -> None:
+    """Writes the ``scene.toml`` of a random scene into a folder of its own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / "scene.toml", toml_text(tables))
+
+
+def evaluate_scene(folder: Path, engine: str, runner: Runner, limit: float) -> EvaluatedScene:
+    """Runs the scene in a folder in every able formulation of an engine at three steps, and in the truth.
+
+    Args:
+        folder: of the scene, whose file has ``duration``, ``dt`` and ``every``.
+        engine: ``name`` or ``name[key=value,…]``; ``truth``: the truth alone.
+        runner: of the cases.
+        limit: wall time of one run [s].
+
+    Raises:
+        InputError: there is no such engine or setting.
+    """
+    begin = processor_seconds()
+    try:
+        scene, file = load_scene(str(folder)), read_scene_file(str(folder))
+    except InputError as error:
+        return EvaluatedScene(invalid=str(error), seconds=processor_seconds() - begin)
+    rows = _rows(engine, scene, file, runner)
+    if not rows and engine != TRUTH:
+        return EvaluatedScene(fits=False, seconds=processor_seconds() - begin)
+    comparison = _comparison(folder, scene, file, rows, limit)
+    planned = plan(comparison, workers=runner.workers) if rows else _truth_alone(comparison, scene, file, runner)
+    results = runner.run(planned.stages[0])
+    (truth,) = results.values()
+    if truth.status is Status.DONE:
+        results |= runner.run(planned.cases)
+        outcome = evaluate(planned, results, runner)
+    else:
+        outcome = evaluate(replace(planned, runs=[]), results, runner)
+    shown = tuple(surprises(outcome))
+    return EvaluatedScene(truth=truth.status, surprises=shown, seconds=processor_seconds() - begin)
+
+
+def _truth_alone(comparison: Comparison, scene: Scene, file: SceneFile, runner: Runner) -> Plan:
+    """Plan of a comparison without rows."""
+    _, facts = resolve_with_truth([], runner.workers, scene.requires)
+    case = case_of(
+        comparison.scene,
+        scene.fully_asked,
+        (),
+        facts,
+        comparison.until,
+        comparison.every,
+        time_limit=comparison.time_limit,
+    )
+    name = point_name({})
+    return Plan(comparison=comparison, scene=scene, file=file, scenes={name: scene}, truths={name: case}, runs=[])
+
+
+def _rows(engine: str, scene: Scene, file: SceneFile, runner: Runner) -> list[Row]:
+    """A row for each able formulation of an engine, at the scene's step and at its double and half."""
+    if engine == TRUTH:
+        return []
+    spec = parse_engine(engine)
+    texts = able(scene, runner.workers, names=[spec.name])
+    if "formulation" in spec.options:
+        texts = [text for text in texts if parse_engine(text).options["formulation"] == spec.options["formulation"]]
+    specs = [replace(spec, options={**parse_engine(text).options, **spec.options}) for text in texts]
+    rows = []
+    facts = resolve([(item.name, item.options) for item in specs], runner.workers, scene.requires)
+    for item, answer in zip(specs, facts, strict=True):
+        if isinstance(answer, InputError):
+            raise answer
+        stepped = isinstance(answer, EngineFacts) and answer.step is not None and "dt" not in item.options
+        row = replace(item, options={**item.options, "dt": f"{file.dt:.15g}"}) if stepped else item
+        ladder = _OF_STEPS if stepped else _OF_TOLERANCES
+        rows.append(Row(str(row), _NAME, list(Verdict), because=_BECAUSE, ladder=ladder))
+    return rows
+
+
+def _comparison(folder: Path, scene: Scene, file: SceneFile, rows: Sequence[Row], limit: float) -> Comparison:
+    assert file.duration is not None  # every drawn scene has them
+    assert file.every is not None
+    tolerances = {
+        name: replace(item, value=_TIGHT) if item.relative else item for name, item in bounds(scene, file.every).items()
+    }
+    return Comparison(
+        name=folder.name,
+        title=file.title,
+        question="",
+        scene=str(folder),
+        until=file.duration,
+        every=file.every,
+        bands={_NAME: Band(_BECAUSE, tolerances)},
+        rows=[*rows],
+        time_limit=limit,
+        timed=False,
+    )

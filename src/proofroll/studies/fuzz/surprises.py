@@ -1,0 +1,186 @@
+"""Surprises of an engine or the truth in a scene: undeclared behaviour, from the outcome of a comparison."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from proofroll.core.arrays import magnitudes
+from proofroll.core.errors import ProofrollError
+from proofroll.core.verdict import Judgement, LimitResult, Verdict
+from proofroll.running.case import Result, Status
+from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
+from proofroll.studies.judging import run_values
+from proofroll.studies.judging.reference import Reference
+
+TRUTH = "truth"
+_PARTED = 0.1  # part of the largest difference from which on a run has parted from the truth
+_LARGE = 0.03  # part of its scale by which an observable without a shown limit may be off
+_EVENTFUL = 100.0  # by which the limit of small steps of a run with events may be farther off
+_FALLEN = 0.8  # largest ratio of the errors at the shortest and the longest step that counts as falling
+_FEW = 2  # samples that count as the start of a run
+# Status of a run -> kind of surprise and its size [decades]: the worst first in a table of kinds.
+_OF_STATUS = {
+    Status.CRASHED: ("crashes", 9.0),
+    Status.TIMEOUT: ("hangs", 8.0),
+    Status.WRONG_MODEL: ("wrong model", 5.0),
+    Status.DIVERGED: ("stops", 5.0),
+    Status.ANOTHER_SCENE: ("another scene", 1.0),
+    Status.REFUSED: ("refuses", 0.0),
+}
+_NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class SurpriseKind:
+    """Kind of a surprise; two with the same kind probably have the same cause.
+
+    Attributes:
+        formulation: engine and formulation, ``mujoco joints``; or ``truth``.
+        surprise: its sign, in a few words.
+        quantity: first word of the observable that shows it, or of the message without numbers.
+        phase: of the run when it shows: ``start``, the last event before, or ``underway``; empty: before the run.
+    """
+
+    formulation: str
+    surprise: str
+    quantity: str = ""
+    phase: str = ""
+
+    def __str__(self) -> str:
+        """Text for a table, and key of what is known from earlier hunts."""
+        return "; ".join(filter(None, (self.formulation, self.surprise, self.quantity, self.phase)))
+
+
+@dataclass(frozen=True)
+class Surprise:
+    """A surprise in one scene.
+
+    Attributes:
+        kind: of it.
+        size: decades by which an error exceeds what is allowed; fixed for others, see the table of kinds.
+        message: one sentence with its numbers.
+    """
+
+    kind: SurpriseKind
+    size: float
+    message: str
+
+
+def surprises(outcome: Outcome) -> list[Surprise]:
+    """All surprises of a comparison of one scene, the largest first."""
+    (point,) = outcome.points.values()
+    shown = [*_of_truth(point)]
+    if point.result.status is Status.DONE and point.reference is not None:
+        for run in outcome.runs:
+            shown += _of_run(run, point.reference)
+    return sorted(shown, key=lambda item: -item.size)
+
+
+def _of_truth(point: ComparedPoint) -> Iterator[Surprise]:
+    """Surprises of the truth: it has none, ends early, or calls the question ill-posed."""
+    result = point.result
+    if result.status is not Status.DONE:
+        yield _failed(TRUTH, result)
+    elif point.reference is not None:
+        for surprise, text in (("ends", point.reference.ended), ("ill-posed", point.reference.ill_posed)):
+            if text:
+                yield Surprise(SurpriseKind(TRUTH, surprise, _words(text)), 0.0, text)
+
+
+def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
+    """Largest surprise of a run; no surprise where it does what its formulation declares."""
+    formulation = formulation_of(run)
+    if run.result.status is not Status.DONE:
+        if run.result.status in _OF_STATUS:
+            yield _failed(formulation, run.result)
+        return
+    for rung in run.rungs:
+        if rung.result.status in {Status.CRASHED, Status.TIMEOUT}:
+            yield _failed(formulation, rung.result)
+            return
+    if reference.ill_posed:
+        return
+    judged = [item for item in run.judgements if item.verdict not in {Verdict.NOT_JUDGED, Verdict.ILL_POSED}]
+    wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _falls(run, item))]
+    if wrong:
+        worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item)))
+        surprise = "another limit" if worst.limit is LimitResult.ANOTHER else "no limit"
+        quantity, phase = worst.observable.partition(".")[0], _phase(run, worst.observable, reference)
+        kind = SurpriseKind(formulation, surprise, quantity, phase)
+        causes = "".join(f"; {cause.sentence}" for cause in run.diagnosis)
+        yield Surprise(kind, _size(worst), f"{worst.observable}: {worst.reason}{causes}")
+
+
+def _falls(run: Run, judgement: Judgement) -> bool:
+    """True if the error of an observable falls from the longest step, or loosest tolerance, to the other end."""
+    assert run.facts is not None  # it has run
+    if run.facts.resolution is None:
+        return False
+    errors = {rung.value: rung.errors.get(judgement.observable, math.inf) for rung in run.rungs}
+    errors[float(run.facts.settings[run.facts.resolution])] = judgement.error
+    return errors[min(errors)] < _FALLEN * errors[max(errors)]
+
+
+def _is_wrong(judgement: Judgement, eventful: bool, falls: bool) -> bool:
+    """True if small steps lead to another motion than the true one, or nowhere.
+
+    An event that falls between two steps leaves errors whose order three steps do not show, so that more is allowed.
+    """
+    if judgement.limit is LimitResult.ANOTHER and judgement.limit_error is not None:
+        allowed = judgement.tolerance * (_EVENTFUL if eventful else 1.0)
+        return not judgement.limit_error - (judgement.limit_doubt or 0.0) <= allowed
+    large = not judgement.error <= max(_LARGE * judgement.scale, judgement.tolerance)
+    return judgement.limit is LimitResult.NOT_SHOWN and large and not falls
+
+
+def _size(judgement: Judgement) -> float:
+    """Decades by which an error exceeds its tolerance; the error of the limit of small steps, if there is one."""
+    error = judgement.limit_error if judgement.limit is LimitResult.ANOTHER else judgement.error
+    if error is None or not math.isfinite(error):
+        return max(size for _, size in _OF_STATUS.values())
+    return math.log10(max(error / judgement.tolerance, 1e-9))
+
+
+def _failed(formulation: str, result: Result) -> Surprise:
+    """Surprise of a run without a result."""
+    surprise, size = _OF_STATUS.get(result.status, (result.status.value, 1.0))
+    return Surprise(SurpriseKind(formulation, surprise, _words(result.message)), size, result.message)
+
+
+def _words(message: str) -> str:
+    """Beginning of a message without numbers and names of parts, so that it is alike in scenes alike."""
+    words = re.sub(r"\b[a-z]{3}\d+\b", "…", message)
+    return " ".join(_NUMBER.sub("#", words).split()[:12])
+
+
+def formulation_of(run: Run) -> str:
+    """Engine and formulation of a run, for a table."""
+    engine = run.row.engine.partition("[")[0]
+    return engine if run.facts is None else f"{engine} {run.facts.settings.get('formulation', '')}".strip()
+
+
+def _phase(run: Run, observable: str, reference: Reference) -> str:
+    """Phase in which a run parts from the truth: the start, behind a kind of event, or underway."""
+    if run.trajectory is None:
+        return ""
+    try:
+        reference, cut = reference.common_span({0: run.trajectory.dataset})
+        values = run_values.observables_of(reference, cut[0])[observable]
+        true = reference.true(observable, values).values
+    except (KeyError, ProofrollError):
+        return ""
+    times = reference.dataset["time"].to_numpy()
+    if values.shape != true.shape or not 0 < len(values) <= len(times):
+        return ""
+    apart = magnitudes(np.nan_to_num(values - true, nan=np.inf), reference.vectors(observable)).max(axis=1, initial=0.0)
+    index = int(np.argmax(apart > _PARTED * apart.max()))
+    parted = times[len(times) - len(values) :][index]
+    events = [event for event in reference.events if event.time <= parted]
+    if events:
+        return f"after {events[-1].kind.replace('_', '-')}"
+    return "start" if index < _FEW else "underway"
