@@ -237,7 +237,7 @@ def _judgements(
         run_curve = run_values.run_curve(reference, name, curve, trajectories[1.0], facts.precision)
         limit = _limit(run, facts, name, curves, run_curve, longest)
         if limit is not None:
-            finest = run.row.ladder[-1]
+            finest = [factor for factor in run.row.ladder if factor in trajectories][-1]
             step = None if facts.step is None else facts.step * finest
             beside = reference.beside(name, limit.values, trajectories[finest], step)
             if not limit.regular:

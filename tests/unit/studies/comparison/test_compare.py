@@ -223,6 +223,16 @@ def test_a_run_is_judged_by_its_own_ladder(tmp_path: Path) -> None:
     assert "no limit shown: dt 0.00025 diverged: NaN" in run.contradictions[0]  # which step is missing, and why
 
 
+def test_a_tolerance_that_the_engine_refuses_is_no_rung(tmp_path: Path) -> None:
+    """Where a half of the tolerance is tighter than any that the engine takes, those before it are judged."""
+    band = Band("round-off", {"q.pivot": Tolerance(1e-9, False, "rad")})
+    row = Row("projection[formulation=dependent,integrator=dop853,rtol=4e-14]", "band", ladder=[2.0, 1.0, 0.5])
+    comparison = Comparison("c", "t", "q", "pendulum", 0.1, 0.05, bands={"band": band}, rows=[row])
+    (run,) = compare(comparison, Runner(Store(tmp_path), jobs=1)).runs
+    assert run.verdict is Verdict.AGREES
+    assert len(run.rungs) == 1
+
+
 def test_the_error_of_a_rung_is_that_between_its_samples_too(tmp_path: Path) -> None:
     """A coarser run that is right in its samples and a millimetre off between them has that error in the ladder."""
 
