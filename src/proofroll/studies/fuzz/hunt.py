@@ -153,14 +153,14 @@ def hunt(
         try:
             while result.seconds < 60 * minutes:
                 number = seed + result.drawn
-                place = folder / str(number)
-                write_scene(place, drawn_scene(chosen, number).tables)
-                evaluated = evaluate_scene(place, engine, runner, _LIMIT)
+                drawn, place = Path(temporary) / str(number), folder / str(number)
+                write_scene(drawn, drawn_scene(chosen, number).tables)
+                evaluated = evaluate_scene(drawn, engine, runner, _LIMIT)
                 result = _with_scene(result, evaluated, number, place, known_kinds)
                 if evaluated.invalid or any(item.seed == number for item in result.kinds):
+                    shutil.copytree(drawn, place, dirs_exist_ok=True)
                     _remember(folder, result, known_kinds)
-                else:
-                    shutil.rmtree(place)
+                shutil.rmtree(drawn)
                 shutil.rmtree(Path(temporary) / "cases", ignore_errors=True)
                 runner.store.folder.mkdir()
                 progress(result)

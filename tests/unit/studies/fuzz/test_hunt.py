@@ -57,6 +57,15 @@ def test_a_hunt_counts_kinds_and_keeps_their_scenes(tmp_path: Path) -> None:
     assert sorted(path.parent.name for path in tmp_path.glob("out/*/scene.toml")) == ["41", "43", "45"]
 
 
+@pytest.mark.usefixtures("evaluated")
+def test_a_folder_that_was_there_is_left_alone(tmp_path: Path) -> None:
+    """A hunt deletes nothing in the folder that it writes to, where a person's folders may have numbers for names."""
+    (tmp_path / "40").mkdir()
+    (tmp_path / "40" / "notes.txt").write_text("mine")
+    hunt("truth", tmp_path, minutes=1, seed=40)
+    assert (tmp_path / "40" / "notes.txt").read_text() == "mine"
+
+
 def test_a_kind_is_new_once(evaluated: list[Any], tmp_path: Path) -> None:
     """A later hunt in the same folder knows the kinds of the earlier one, and ranks new ones before them."""
     hunt("truth", tmp_path, minutes=0.5)
