@@ -26,6 +26,9 @@ from proofroll.running.recording import record
 if TYPE_CHECKING:
     import xarray as xr
 
+# Methods of a run, which the class of most engines has itself.
+_OF_A_RUN = ("advance", "sample", "built")
+
 
 def build(scene: Scene, engine: Any, **settings: Any) -> Any:
     """Engine with the scene at time 0, after checking that it can represent the scene.
@@ -47,7 +50,9 @@ def build(scene: Scene, engine: Any, **settings: Any) -> Any:
 def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any, Any]:
     """Class and complete settings of an engine. Raises InputError as :func:`build` does."""
     if not isinstance(engine, str):
-        if lacking := lacking_of(engine, "advance", "sample", "built"):
+        # The ``build`` of a class with none of a run's methods returns runs of another class.
+        other_runs = hasattr(engine, "build") and not any(hasattr(engine, name) for name in _OF_A_RUN)
+        if lacking := lacking_of(engine, *(() if other_runs else _OF_A_RUN)):
             shown = engine.__name__ if isinstance(engine, type) else repr(engine)
             raise InputError("engine", shown, f"give a name, or a class that has {', '.join(lacking)} too")
         return engine, resolve_settings(engine, settings, scene.requires)
