@@ -137,8 +137,8 @@ def _row(row: Row, runs: list[ReportedRun]) -> ReportedRow:
 
 
 def row_at(row: ReportedRow, runs: list[ReportedRun]) -> ReportedRow:
-    """Row over some of its runs, without remarks, which are about all of them."""
-    return dataclasses.replace(row, **_summary(runs) | {"remarks": []})
+    """Row over its runs at one point, whose reason names no point; without remarks, which are about all runs."""
+    return dataclasses.replace(row, **_summary(runs) | {"remarks": [], "reason": runs[0].reason})
 
 
 def _summary(runs: list[ReportedRun]) -> dict[str, Any]:
