@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
-_ADAPTERS = (_PACKAGE / "engines", _PACKAGE / "papers")
+_ADAPTERS = tuple(_PACKAGE / folder for folder in ("engines", "papers", "robots/importers"))
 _SHOWN = 20  # names of a list in a message
 _LONGEST_FIELD = 300  # characters: a path and the keys that lead to a value; a key itself may have any length
 

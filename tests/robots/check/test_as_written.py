@@ -99,7 +99,7 @@ def test_what_is_not_covered_is_ours(tmp_path: Path) -> None:
     path.write_text(mjcf(joint='damping="much"'))
     with pytest.raises(InputError, match=r"mujoco .* refuses it: ValueError") as caught:
         check.check(path, ["mujoco"])
-    assert "robot_reader.py" not in str(caught.value)
+    assert ".py" not in str(caught.value)
 
 
 def test_no_joint_is_an_answer(tmp_path: Path) -> None:

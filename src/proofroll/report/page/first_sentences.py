@@ -67,10 +67,10 @@ def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> 
         alike = [item for item in comparisons if item.laws_alone is alone]
         rows = [row for item in alike for row in item.rows]
         count = "one comparison" if len(alike) == 1 else f"{len(alike)} comparisons"
-        where = f"{ALONE} ({', '.join(item.name for item in alike)})" if alone else f"in {count}"
+        place = f"{ALONE} ({', '.join(item.name for item in alike)})" if alone else f"in {count}"
         if alike:
             nearest = "" if alone else _nearest(alike, choice)
-            clauses.append(f"of {counted(len(rows), 'settings')} {where}, {standings(rows, alone)}{nearest}")
+            clauses.append(f"of {counted(len(rows), 'settings')} {place}, {standings(rows, alone)}{nearest}")
     text = "; ".join(clauses)
     return f"{text[0].upper()}{text[1:]}."
 
