@@ -44,6 +44,8 @@ from proofroll.robots.check.records import (
 )
 from proofroll.robots.files.robot_file import LintRemark
 from proofroll.studies.claim_judgement import JudgedFile
+from proofroll.studies.fuzz.hunt import FoundKind, Hunt
+from proofroll.studies.fuzz.surprises import Surprise, SurpriseKind
 from proofroll.studies.ladder.models import Ran
 from proofroll.studies.stability.axes import Axis
 from proofroll.studies.stability.effort import Effort
@@ -180,7 +182,7 @@ TRADEOFF = (
         ("tradeoff.md", "JSON", (*TRADEOFF, Recommendation, Answer, CheckedOver)),
         ("json.md", "`ladder --json`", LADDER),
         ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
-        ("json.md", "The other commands", (Drilled, Mutated)),
+        ("json.md", "The other commands", (Drilled, Mutated, Hunt, FoundKind, Surprise, SurpriseKind)),
     ],
     ids=["robots", "against", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
 )
