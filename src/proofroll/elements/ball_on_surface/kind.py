@@ -51,6 +51,9 @@ class BallOnSurfaceKind:
         elements = []
         for placed in _placed(tables, numbers, where):
             ball, surface, contact, start, _ = placed
+            if _is_followed_as_a_body(placed):
+                elements.append(ball_as_body(placed, gravity, where))
+                continue
             try:
                 elements.append(
                     BallOnSurface(ball=ball, surface=surface, contact=contact, start=start, gravity=gravity)
@@ -114,6 +117,15 @@ class BallsAsBodies(BallOnSurfaceKind):
     ) -> Sequence[MechanismElement]:
         """See :func:`proofroll.elements.mechanism.run.balls.ball_as_body`."""
         return [ball_as_body(placed, gravity, where) for placed in _placed(tables, numbers, where)]
+
+
+def _is_followed_as_a_body(placed: PlacedBall) -> bool:
+    """Whether the general mechanics follows a ball: one that flies, bounces or slips at its start, or a wall that
+    turns or is neither a plane nor a cylinder."""
+    surface, start = placed.surface, placed.start
+    of_revolution = surface.kind in ("bowl", "cone", "torus")
+    begins_otherwise = bool(start.gap) or placed.contact.restitution is not None or start.tangential_spin is not None
+    return of_revolution or begins_otherwise or bool(getattr(surface, "turning", 0.0))
 
 
 def _placed(tables: Mapping[str, Any], numbers: Parameters, where: str) -> list[PlacedBall]:
