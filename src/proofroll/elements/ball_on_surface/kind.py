@@ -46,9 +46,11 @@ class BallOnSurfaceKind:
     units: ClassVar[Mapping[str, str]] = units_of(Ball, Contact, InitialMotion, *surface_kinds())
 
     @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[BallOnSurface]:
+    def read(
+        tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str
+    ) -> Sequence[BallOnSurface | MechanismElement]:
         """Elements of a file: one for each contact, with the ball, the surface and the start that it names."""
-        elements = []
+        elements: list[BallOnSurface | MechanismElement] = []
         for placed in _placed(tables, numbers, where):
             ball, surface, contact, start, _ = placed
             if _is_followed_as_a_body(placed):
@@ -112,7 +114,7 @@ class BallsAsBodies(BallOnSurfaceKind):
     """The same tables read as mechanisms, one for each ball: the kind to announce once engines have all walls."""
 
     @staticmethod
-    def read(  # type: ignore[override]  # other elements, by the same protocol
+    def read(  # other elements, by the same protocol
         tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str
     ) -> Sequence[MechanismElement]:
         """See :func:`proofroll.elements.mechanism.run.balls.ball_as_body`."""
@@ -120,8 +122,10 @@ class BallsAsBodies(BallOnSurfaceKind):
 
 
 def _is_followed_as_a_body(placed: PlacedBall) -> bool:
-    """Whether the general mechanics follows a ball: one that flies, bounces or slips at its start, or a wall that
-    turns or is neither a plane nor a cylinder."""
+    """True if the general mechanics follows a ball.
+
+    It flies, bounces or slips at its start, or its wall turns or is neither a plane nor a cylinder.
+    """
     surface, start = placed.surface, placed.start
     of_revolution = surface.kind in ("bowl", "cone", "torus")
     begins_otherwise = bool(start.gap) or placed.contact.restitution is not None or start.tangential_spin is not None

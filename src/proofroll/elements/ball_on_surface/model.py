@@ -11,6 +11,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.elements.ball_on_surface.surfaces import Surface
+from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment
 from proofroll.elements.mechanism.scene.balls import Ball, Contact
 
 
@@ -82,6 +83,10 @@ class RollingBall:
     def wall_rate(self) -> FloatArray | None:
         """Angular velocity W of the wall about the world's origin [rad/s], shape (3,); None: the wall is at rest."""
         return read_only(np.array(self.wall.wall_rate)) if any(self.wall.wall_rate) else None
+
+    def resisting(self, N: FloatArray, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:  # noqa: ARG002 -- the protocol's
+        """Moment of the rolling resistance, against the velocity of the centre [N m], shape (..., 3)."""
+        return resistance_moment(self.contact.rolling_resistance, N, e1, v_WB)
 
     @property
     def udot0(self) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN
 from proofroll.elements.mechanism.dynamics.placed import Placed
-from proofroll.elements.mechanism.run.contacts.on_wall import OnWall, energy, resistance_moment, wall_velocity
+from proofroll.elements.mechanism.run.contacts.on_wall import OnWall, energy, wall_velocity
 from proofroll.elements.mechanism.run.contacts.stretches import (
     DEGREE,
     ENDS,
@@ -34,9 +34,9 @@ _SUBSTEPS = 16
 def energy_balance(body: OnWall, dataset: xr.Dataset) -> FloatArray:
     """Energy now plus the work that resistance and friction took, minus the energy at the start [J], shape (time,).
 
-    Rolling resistance takes the power -M · ω (N f V / a while rolling), friction -F · u, and a wall that moves at the
-    velocity w adds F · w; N, F, ω, V and the slip u are the engine's own. Without a force at time 0, work counts from
-    the first sample that has one, and the shape is (time - 1,). Samples off the grid come last.
+    The moment M of the rolling resistance takes the power -M · ω (N f V / a while rolling), friction -F · u, and a wall
+    that moves at the velocity w adds F · w; N, F, ω, V and the slip u are the engine's own. Without a force at time 0,
+    work counts from the first sample that has one, and the shape is (time - 1,). Samples off the grid come last.
     """
     dataset = _with_forces(dataset)
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
@@ -51,7 +51,7 @@ def energy_balance(body: OnWall, dataset: xr.Dataset) -> FloatArray:
     if f:
         e1 = body.surface.normal(dataset["p_WB"].to_numpy())
         rests = not np.all(np.any(dataset["v_WB"].to_numpy(), axis=-1))
-        moment = resistance_moment(f, dataset["N"].to_numpy(), e1, dataset["v_WB"].to_numpy())
+        moment = body.resisting(dataset["N"].to_numpy(), e1, *(dataset[name].to_numpy() for name in ("v_WB", "w_WB")))
         power -= np.einsum("ti,ti->t", moment, dataset["w_WB"].to_numpy())
     if body.wall_rate is not None:
         p_WB = dataset["p_WB"].to_numpy()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,13 +41,30 @@ _REVERSED = -0.9
 _ALIKE: Mapping[str, str] = {EventKind.REST: EventKind.STICK, EventKind.SETTLE: EventKind.IMPACT}
 
 
+class Sighting(NamedTuple):
+    """An event in the samples of a run.
+
+    Attributes:
+        event: the event, with a bracket of its own.
+        since: time from which it may have been going on [s].
+        low, high: times of the samples around it [s].
+    """
+
+    event: Event
+    since: float
+    low: float
+    high: float
+
+
 class ContactWatch:
     """Events of all contacts of a run. See :class:`proofroll.core.element_abilities.RunWatch`.
 
     A state that lasts for one sample only does not count: a contact that presses at a single sample between two open
     ones rebounds, and one that does not slip at a single sample changes its direction of slip. Two impacts between
     samples count as one. A contact whose gap stays closed has not lifted off, though another may bear its load, and one
-    whose gap cannot close between two samples has no impact there, though its speed changes sign.
+    whose gap cannot close between two samples has no impact there, though its speed changes sign. A slip ends where its
+    speed would reach zero as it fell before, to what the change of its fall leaves open; all else lies anywhere between
+    two samples.
     """
 
     def __init__(self, element: MechanismElement) -> None:
@@ -82,27 +99,25 @@ class ContactWatch:
         """See :class:`proofroll.core.element_abilities.TellsBounces`."""
         return sampled_bounces(self._element.mechanism, columns)
 
-    def _reconciled(self, located: Sequence[Event], seen: Sequence[tuple[Event, float]]) -> Sequence[Event]:
+    def _reconciled(self, located: Sequence[Event], seen: Sequence[Sighting]) -> Sequence[Event]:
         """The engine's own events of contacts, unless its samples show one that is not among them.
 
         Args:
             located: the engine's own.
-            seen: events in the samples, each with the time from which it may have been going on [s].
+            seen: events in the samples.
         """
         names = {contact.name for contact in self._element.mechanism.contacts}
         events = [event for event in located if event.name in names]
         left = list(events)
-        for event, since in seen:
-            match = next((candidate for candidate in left if _alike(candidate, event, since)), None)
+        for sighting in seen:
+            match = next((candidate for candidate in left if _alike(candidate, sighting)), None)
             if match is None:
-                return [event for event, _ in seen]
+                return [other.event for other in seen]
             left.remove(match)
         return events
 
-    def _events(
-        self, times: FloatArray, followed: Followed, pressed: FloatArray, speeds: FloatArray
-    ) -> list[tuple[Event, float]]:
-        """Events in order, each with the time from which it may have been going on [s]."""
+    def _events(self, times: FloatArray, followed: Followed, pressed: FloatArray, speeds: FloatArray) -> list[Sighting]:
+        """Events in order."""
         presses = normal_forces(followed, pressed) > PRESSES * self._element.force
         # Several engines have forces only after a first step, and a slip from rest is slow at first
         presses[0] |= presses[1] & (followed.gap[0] <= _CLOSED * self._element.length)
@@ -115,20 +130,22 @@ class ContactWatch:
         slips[0] |= presses[0] & slips[1]
         slips = presses & _without_lone(slips)
         stands = (speeds <= _CREEPS * self._element.speed) & ~slips.any(axis=1)
-        events: list[tuple[Event, float]] = []
+        events: list[Sighting] = []
         for c, contact in enumerate(self._element.mechanism.contacts):
             states = forces[:, c], presses[:, c], slips[:, c]
             for k in range(len(times) - 1):
-                kind, moment = _change(times, followed, u_n[:, c], states, k, c)
+                kind, moment, doubt = _change(times, followed, u_n[:, c], states, k, c)
                 if kind == EventKind.STICK and stands[k + 1]:
                     kind = EventKind.REST
                 if kind:
                     low, high = float(times[k]), float(times[k + 1])
                     time = min(max(moment, low), high)
-                    event = Event(kind=kind, time=time, time_low=low, time_high=high, name=contact.name)
+                    doubt += abs(time - moment)
+                    bracket = max(time - doubt, low), min(time + doubt, high)
+                    event = Event(kind, time, *bracket, contact.name)
                     since = float(times[_rises_since(followed.slip[:, c], k)]) if kind == EventKind.SLIP else low
-                    events.append((event, since))
-        return sorted(events, key=lambda pair: pair[0].time)
+                    events.append(Sighting(event, since, low, high))
+        return sorted(events, key=lambda sighting: sighting.event.time)
 
 
 def _rises_since(slip: FloatArray, k: int) -> int:
@@ -136,10 +153,10 @@ def _rises_since(slip: FloatArray, k: int) -> int:
     return next((j for j in range(k, 0, -1) if slip[j - 1] >= slip[j]), 0)
 
 
-def _alike(located: Event, seen: Event, since: float) -> bool:
+def _alike(located: Event, sighting: Sighting) -> bool:
     """True if an event may be the one seen in the samples: same contact and kind, at most one interval off."""
-    wide = seen.time_high - seen.time_low
-    near = since - wide <= located.time <= seen.time_high + wide
+    seen, wide = sighting.event, sighting.high - sighting.low
+    near = sighting.since - wide <= located.time <= sighting.high + wide
     return (
         near
         and located.name == seen.name
@@ -200,8 +217,8 @@ def _fall_time(gap: float, speed: float, acceleration: float) -> float:
 
 def _change(
     times: FloatArray, followed: Followed, u_n: FloatArray, states: tuple[_States, _States, _States], k: int, c: int
-) -> tuple[str, float]:
-    """Kind and time [s] of the event of contact c between samples k and k + 1; the kind is empty without an event.
+) -> tuple[str, float, float]:
+    """Kind, time and doubt of it [s] of contact c between samples k and k + 1; the kind is empty without an event.
 
     Args:
         times: of the samples [s].
@@ -216,17 +233,33 @@ def _change(
     if not presses[k]:
         closing = float(u_n[k])
         if presses[k + 1] or (closing < 0 < u_n[k + 1] and _strikes(times, followed.gap[:, c], u_n, pressed, k)):
-            return EventKind.IMPACT, start + float(followed.gap[k, c]) / -closing if closing < 0 else middle
-        return "", start
+            return EventKind.IMPACT, start + float(followed.gap[k, c]) / -closing if closing < 0 else middle, np.inf
+        return "", start, np.inf
     if not presses[k + 1]:
-        return EventKind.LIFT_OFF, middle
+        return EventKind.LIFT_OFF, middle, np.inf
     if slips[k] and not slips[k + 1]:
-        last_slip = float(followed.slip[k - 1, c]) if k and slips[k - 1] else np.inf
-        slip, lost = float(followed.slip[k, c]), last_slip - float(followed.slip[k, c])
-        whole = start + slip / lost * float(times[k] - times[k - 1]) if 0 < lost < np.inf else middle
-        return EventKind.STICK, whole
+        return EventKind.STICK, *_end_of_slip(times, followed.slip[:, c], slips, k)
     if slips[k + 1] and not slips[k]:
-        return EventKind.SLIP, middle
+        return EventKind.SLIP, middle, np.inf
     product = float(followed.slide[k, c] @ followed.slide[k + 1, c])
     turned = slips[k] and product < _REVERSED * float(followed.slip[k, c] * followed.slip[k + 1, c])
-    return (EventKind.TURN, middle) if turned else ("", start)
+    return (EventKind.TURN, middle, np.inf) if turned else ("", start, np.inf)
+
+
+def _end_of_slip(times: FloatArray, slip: FloatArray, slips: _States, k: int) -> tuple[float, float]:
+    """Time after sample k at which a slip ends, and doubt of it [s].
+
+    Its speed falls on as between samples k - 1 and k. What the change of this fall since sample k - 2 makes of it is
+    the doubt. The time is the middle of the interval, in infinite doubt, if the speed does not fall.
+    """
+    unknown = float(times[k] + times[k + 1]) / 2, np.inf
+    if not k or not slips[k - 1] or slip[k - 1] <= slip[k]:
+        return unknown
+    t1, t2 = times[k - 1 : k + 1].tolist()
+    rate = float(slip[k - 1] - slip[k]) / (t2 - t1)
+    end = t2 + float(slip[k]) / rate
+    if k == 1 or not slips[k - 2]:
+        return end, np.inf
+    t0 = float(times[k - 2])
+    bend = (float(slip[k - 2] - slip[k - 1]) / (t1 - t0) - rate) / (t2 - t0)
+    return end, abs(bend) * (end - t2) * (end - t1) / rate

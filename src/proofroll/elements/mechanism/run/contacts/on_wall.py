@@ -104,6 +104,9 @@ class OnWall(Protocol):
     def wall_rate(self) -> FloatArray | None:
         """Angular velocity of the wall, which turns along itself about the world's origin [rad/s]; None: at rest."""
 
+    def resisting(self, N: FloatArray, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+        """Moment of the rolling resistance about the centre [N m], shape (..., 3)."""
+
 
 @dataclass(frozen=True)
 class LocalStart:
@@ -142,6 +145,12 @@ class BodyOnWall:
     index: int
     contact_index: int
     sign: float
+
+    def resisting(self, N: FloatArray, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:  # noqa: ARG002 -- the protocol's
+        """Moment against turning relative to the wall, about axes along it; of a ball that slips, too [N m]."""
+        turning = w_WB if self.wall_rate is None else w_WB - self.wall_rate
+        # Turned by a right angle, it is the velocity with which a ball that rolls moves relative to its wall.
+        return resistance_moment(self.contact.rolling_resistance, N, e1, cross(e1, turning))
 
 
 def body_on_wall(mechanism: Mechanism, local: LocalStart) -> BodyOnWall | None:

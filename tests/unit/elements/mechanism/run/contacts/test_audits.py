@@ -75,3 +75,10 @@ def test_audits_of_the_truth_vanish(name: str) -> None:
     found = contact_audits(the_mechanism(scene).mechanism, run)
     assert found["force_audit"].max() < 1e-6 * float(run["normal_forces"].max())
     assert found["rate_audit"].max() < 1e-8
+
+
+def test_energy_of_a_resisted_slip_balances() -> None:
+    """Rolling resistance of a ball that slips acts against its turning, not against the velocity of its centre."""
+    scene = as_bodies("slide_to_roll", side_spin=40, normal_spin=9, rolling_resistance=5e-3)
+    curves = the_mechanism(scene).observe(truth(scene, np.linspace(0, 0.1, 31)))
+    assert np.abs(curves["energy_balance"]).max() < 1e-4  # along the centre's velocity: 0.1 J
