@@ -418,14 +418,6 @@ def test_file_of_another_surface_is_refused(tmp_path) -> None:
         build(dataclasses.replace(plane, folder=tmp_path), "mujoco")
 
 
-@pytest.mark.parametrize("formulation", ["chart", "facets"])
-@pytest.mark.parametrize("scene", ["turntable", "bouncing_ball"])
-def test_what_another_formulation_can_do_is_named(scene: str, formulation: str) -> None:
-    """A wall that moves and impacts are refused with the formulation that has them."""
-    with pytest.raises(Refused, match=r"choose formulation=free$"):
-        build(load_scene(scene), f"mujoco[formulation={formulation}]")
-
-
 def test_contact_too_soft_to_start_is_refused() -> None:
     """Where the settled depth would exceed the ball's radius the engine refuses instead of starting inside out."""
     with pytest.raises(Refused, match="soft"):

@@ -141,11 +141,3 @@ def test_what_mujoco_cannot_represent_is_refused(engine: str, parameters: dict[s
     """Coefficients that MuJoCo would change without a word, and a wall without a slip, are refused with the reason."""
     with pytest.raises(Refused, match=reason):
         build(load_scene(CYLINDER, **parameters), f"mujoco[{engine}]")
-
-
-@pytest.mark.parametrize("engine", TUNED)
-@pytest.mark.parametrize("setting", ["dt=1e-2", "time_constant=20"])
-def test_a_start_that_slips_is_loaded_from_the_first_sample(engine: str, setting: str) -> None:
-    """However soft the contact, a ball that slips from the start presses on the wall as the truth says, at once."""
-    found, true = (simulate("slide_to_roll", name, until=0.02) for name in (f"mujoco[{engine},{setting}]", "truth"))
-    np.testing.assert_allclose(found.N, true.N, rtol=1e-8)

@@ -39,7 +39,6 @@ class Pinocchio:
         "impulses": frozenset(MechanismCapability[name] for name in ("CONTACT", "JOINT_FRICTION", "STOPS"))
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        **ball.LACKING,
         "null_space": joint_tree.LACKING,
         "constraint_dynamics": constraint_dynamics.LACKING,
         "impulses": impulses.LACKING,

@@ -17,8 +17,6 @@ _MORE = "friction against turning or rolling, which the scene does not ask for, 
 _MARGIN = 1.1
 _SOLVER = 1e-8
 _ROUND_OFF = 1e-12
-# Part of a lift that the solver's tolerance leaves: 3e-5 at most was seen.
-_OF_LIFT = 1e-4
 # Error left where a state at time 0 is found by iteration.
 _SEQUENCE = 1e-6
 
@@ -47,12 +45,12 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     if settings.start == "touching":
         # Friction is bounded by the little normal force of a contact at depth zero.
         supplied = least * max(float(body.gravity @ e1) + (0.0 if lacks else bend), 0.0)
-        lost = _law_of_friction(body, settings, supplied * body.ball.mass) + _lift_of_slip(body, settings)
+        lost = _law_of_friction(body, settings, supplied * body.ball.mass)
         why += "; the ball starts at depth zero, where no depth makes up for it"
         if lost:
             why += " and the normal force that remains does not hold the friction"
         soft = _MARGIN * (missing + creep + lost) / scale + _SOLVER
-        if soft >= 1 and not np.any(body.slip0):
+        if soft >= 1:
             why += ": accelerations and forces at time 0 are not checked"
         return result | _dynamics(body, settings, soft, why)
     # At the depth of a settled start, the reference acceleration k depth, k = d / (dmax tc)², of which the impedance
@@ -60,11 +58,8 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     depth = _MARGIN * missing * (most * settings.contact_time / least) ** 2 / a
     sunk = f"a soft contact carries the load only at a depth, {depth:.1e} of the radius at most"
     rolls = "MuJoCo's contact point, at which it rolls, lies midway in that depth"
-    # A ball that starts slipping may turn faster than it would roll.
-    speed = float(np.linalg.norm(body.v0)) or math.sqrt(a * gravity) or 1.0
-    turns = max(1.0, a * float(np.linalg.norm(body.w0)) / speed)
     # The depth shortens the lever of friction, which balances gravity along the wall.
-    law = _MARGIN * (_law_of_friction(body, settings, None) + _lift_of_slip(body, settings))
+    law = _MARGIN * _law_of_friction(body, settings, None)
     if law:
         why += "; as the ball slips from the start, MuJoCo's cone of friction lifts it or turns its friction"
     soft = (2 * (1 - least) * load + depth * gravity + _MARGIN * creep + law) / scale + _SOLVER
@@ -73,7 +68,7 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
         "gap": Regularised(depth, sunk),
         "gap in the engine": Regularised(depth, sunk),
         "spin": Regularised(depth / 2 + _SOLVER, rolls),
-        "slip": Regularised(turns * depth / 2, rolls),
+        "slip": Regularised(depth / 2, rolls),
         **_dynamics(body, settings, soft, why),
     }
 
@@ -108,17 +103,6 @@ def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str
         # With the correction of a slip, that acceleration is found by iteration.
         share = _SEQUENCE if corrects(body.contact, settings) else _SOLVER
         yield "velocity", Regularised(share, "it is MuJoCo's of half a step before plus half a step's acceleration")
-
-
-def _lift_of_slip(body: RollingBall, settings: MujocoSettings) -> float:
-    """Normal acceleration from MuJoCo's cone on a ball that starts slipping: μ b times the slip, b its damping [m/s²].
-
-    The correction of the cone removes it up to the solver's tolerance, a part of so large a number.
-    """
-    damping = 2 / (settings.impedances[1] * settings.contact_time)
-    left = _OF_LIFT if corrects(body.contact, settings) else 1.0
-    slip = float(np.linalg.norm(body.slip0))
-    return left * (damping * slip * body.contact.mu_kinetic if slip else 0.0)
 
 
 def _law_of_friction(body: RollingBall, settings: MujocoSettings, unloaded: float | None) -> float:

@@ -29,9 +29,6 @@ class Free(Formulation):
         super().__init__(model, body, settings, friction)
         self._edits = settings.curvature or corrects(body.contact, settings)
         self._radius = body.ball.radius
-        self._wall_rate, self._geom = body.wall_rate, model.geom("ball").id
-        if body.wall_rate is not None and not settings.curvature:
-            raise Refused("MuJoCo's mocap plane has no velocity; curvature=true adds the wall's")
         self._wall = model.geom("wall").id
         self._curvature = settings.curvature
         self._half = settings.velocity_lag
@@ -148,14 +145,6 @@ class Free(Formulation):
         v = rates[:3] + self._lead * trend[:3]
         rows[0] = v @ gradient @ v
         row = contact.efc_address
-        if self._wall_rate is not None:
-            # Damping and rate belong to the velocity relative to the wall's, which is W × (p + a e1).
-            e1 = -contact.frame[:3] if contact.geom[1] == self._geom else contact.frame[:3]
-            velocity = cross(self._wall_rate, data.qpos[:3] + self._radius * e1)
-            gained = cross(self._wall_rate, rates[:3] + self._radius * e1_rate)
-            tangents = contact.frame.reshape(3, 3)[1:]
-            rows[1:] += tangents @ gained
-            data.efc_aref[row + 1 : row + 3] += data.efc_KBIP[row + 1, 1] * (tangents @ velocity)
         data.efc_aref[row : row + contact.dim] += self._share * rows[: contact.dim]
 
 

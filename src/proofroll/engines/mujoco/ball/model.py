@@ -127,19 +127,6 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
         geom.solimp = settings.solimp
     if settings.friction_damping is not None:
         _write_pair(spec, settings, mu, settings.friction_damping)
-    if body.contact.restitution is not None:
-        _write_restitution(spec, body, settings, mu)
-
-
-def _write_restitution(spec: Any, body: RollingBall, settings: MujocoSettings, mu: float) -> None:
-    """Writes an impact as one step of damping, (1 + e)/dt in solref's direct format: it takes 1 + e times the velocity.
-
-    The stiffness, without which the format is not valid, is too small to matter.
-    """
-    for geom in spec.geoms:
-        geom.solref = [-1.0, -(1 + (body.contact.restitution or 0.0)) / settings.dt]
-    if settings.cone == "elliptic":
-        _write_pair(spec, settings, mu, 1 + body.contact.tangential_restitution)
 
 
 def _write_pair(spec: Any, settings: MujocoSettings, mu: float, damping: float) -> None:

@@ -23,29 +23,22 @@ from proofroll.engines.mujoco.ball.model import read_spec, write_physics
 from proofroll.engines.mujoco.ball.start import EVALUATIONS, accelerations, start
 from proofroll.engines.mujoco.contact.coefficients import check_coefficients
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
-from proofroll.engines.mujoco.settings import ROLLS, MujocoSettings, check, check_restitution
+from proofroll.engines.mujoco.settings import ROLLS, MujocoSettings, check
 
 _FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, "facets": Facets}
 # Joints whose coordinates hold an orientation.
 _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
 # Part of the natural force above which a normal force is more than round-off.
 _PRESSED = 1e-6
-_FIXED_WALL = "its wall is a fixed body, which has no velocity in MuJoCo (free gives it one with preset=tuned)"
 PROVIDES: Mapping[str, frozenset[str]] = {
     "chart": ALL_OF_A_BALL,
-    "free": frozenset(BallCapability),
-    "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION, BallCapability.SLIPPING_START},
+    "free": ALL_OF_A_BALL,
+    "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION},
 }
 LACKING: Mapping[str, Mapping[str, str]] = {
     "facets": {
         BallCapability.BOUNDED_FRICTION: "each edge between two boxes throws the ball off the wall, so facets "
         "cannot tell when it slips",
-        BallCapability.IMPACTS: "each edge between two boxes is an impact of its own",
-        BallCapability.MOVING_WALL: _FIXED_WALL,
-    },
-    "chart": {
-        BallCapability.IMPACTS: "an impact is one step of damping, which RK4 spreads over stages",
-        BallCapability.MOVING_WALL: _FIXED_WALL,
     },
 }
 INHERENT: Mapping[str, Mapping[str, str]] = {
@@ -85,8 +78,6 @@ class MujocoBall(SteppedModel):
         check(settings, bounded=bounded)
         if bounded:
             check_coefficients((body.contact.mu_static, body.contact.mu_kinetic), settings, "the wall")
-        if body.flies:
-            check_restitution(settings)
         forget_callbacks()
         return cls(compiled(_spec(scene, body, settings)), body, settings)
 

@@ -77,8 +77,8 @@ def start(
         put_ball(model, data, body, depth)
         evaluate_behind(data, formulation.evaluate, lag, share, rounds)
 
-    depth = 0.0 if body.gap0 else _TOUCHING * body.ball.radius
-    if settings.start == "settled" and not body.flies:
+    depth = _TOUCHING * body.ball.radius
+    if settings.start == "settled":
         settled = _settled_depth(model, data, body, evaluate_at)
         # Bounded friction may lift the ball more than the load presses it: then it starts at the surface.
         # At depth 0 the last digit decides whether they touch.

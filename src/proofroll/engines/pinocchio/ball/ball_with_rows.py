@@ -82,7 +82,6 @@ class BallWithRows(ABC):
         q0, v0: joint configuration and velocity at time 0.
         q_scale, v_scale: natural sizes of their components, for tolerances.
         faint: normal force that is round-off [N].
-        slips0: True if the ball starts slipping.
     """
 
     ball: int
@@ -95,7 +94,6 @@ class BallWithRows(ABC):
         self._radius = body.ball.radius
         self._f = body.contact.rolling_resistance
         self._mu_kinetic = body.contact.mu_kinetic
-        self.slips0 = bool(np.any(body.slip0))
         self.model: Any = pin.Model()
         self.model.gravity.linear = body.gravity
         gravity = float(np.linalg.norm(body.gravity))

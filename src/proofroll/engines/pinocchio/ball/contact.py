@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event, EventKind
@@ -33,8 +33,6 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 _ON_CONE = 1 - 1e-9
 # Normal impulse, relative to that of gravity, that is round-off of the gap: the wall does not press.
 _FAINT = 1e-9
-# Rebound speed, in steps of gravity, below which the ball stays on the wall.
-_SOFT = 5.0
 # Fixed-point iteration for rolling resistance, which depends on the normal force: most iterations, and tolerance.
 _REPEATS, _SETTLED = 10, 1e-13
 
@@ -85,8 +83,6 @@ class ContactSteps:
         rolls = 1 + body.ball.inertia_ratio
         # For a rolling ball: moment per rate of its speed [N s²], and acceleration by gravity [m/s²].
         self._stopping, self._pull = rolls * body.ball.mass * body.ball.radius, (body.gravity / rolls).tolist()
-        self._wall_rate, self._radius = body.wall_rate, body.ball.radius
-        self._restitution, self._gravity = body.contact.restitution, body.gravity.tolist()
         self.dt, self.leapfrog = float(settings.dt or 0.0), settings.integrator == "leapfrog"
         self.solver, self.tolerance = settings.solver or "pgs", float(settings.solver_tolerance or 0.0)
         self.contact = PlaneContact(body, self.solver, self.tolerance)
@@ -100,7 +96,6 @@ class ContactSteps:
         self.mu_kinetic = body.contact.mu_kinetic if self.bounded else unbounded
 
         self._status: EventKind = EventKind.STICK
-        self._pressed = False
         self._normal_force = 0.0  # start of the fixed-point iteration for rolling resistance
         self.happened: list[Event] = []
         self._time = 0.0
@@ -127,13 +122,12 @@ class ContactSteps:
         model, dt, start = self.contact.model, self.dt, self._time
         for number in range(whole_steps(start, end, dt)):
             self._time = start + number * dt
-            v, impulse, self._normal_force, status = self.kick()
+            v, _, self._normal_force, status = self.kick()
             if status != self._status:
                 last_time = max(self._time - dt, 0.0)
                 self.happened.append(Event(status, 0.5 * (last_time + self._time), last_time, self._time))
                 self._status = status
             self.started = True
-            self._pressed = self._pressed or bool(impulse.any())
             self.v = v
             self.q = pin.integrate(model, self.q, dt * v)
         self._time = end
@@ -149,7 +143,7 @@ class ContactSteps:
         to_joints = contact.inverse.dot(jacobian.T)
         delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
         # Shifts of the contact point's velocity along e2, -e3 and -e1; the last closes the gap within the step.
-        shift2, shift3, shift1 = 0.0, 0.0, self._closing(gap, triad, velocity)
+        shift2, shift3, shift1 = 0.0, 0.0, gap / self.dt
         if self.leapfrog:
             # Change due to the normal's turning in half a step: a ω × ė1, and the curvature of the path.
             _, _, _, x2, y2, z2, x3, y3, z3 = triad
@@ -159,13 +153,6 @@ class ContactSteps:
             shift2 = self._lever * (x2 * tx + y2 * ty + z2 * tz)
             shift3 = -self._lever * (x3 * tx + y3 * ty + z3 * tz)
             shift1 -= 0.5 * self.dt * (rx * vx + ry * vy + rz * vz)
-        if self._wall_rate is not None:  # wall velocity at the ball's position at the time of the new velocity
-            x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
-            ahead = (0.5 if self.leapfrog else 1.0) * self.dt
-            there = np.array(place) + ahead * np.array(velocity) + self._radius * np.array((x1, y1, z1))
-            carried = cross(self._wall_rate, there)
-            shift2 -= float(carried @ (x2, y2, z2))
-            shift3 += float(carried @ (x3, y3, z3))
         shift = np.array((shift2, shift3, shift1))
 
         torque, normal_force, centred = self._no_torque, self._normal_force, self.leapfrog and self.started
@@ -184,23 +171,6 @@ class ContactSteps:
             if centred:
                 velocity = (0.5 * (v + v_new)[:3]).tolist()
         return Kick(v_new, impulse, normal, status)
-
-    def _closing(self, gap: float, triad: Sequence[float], v: Sequence[float]) -> float:
-        """Largest speed [m/s] at which the ball may approach the wall: it closes the gap within the step.
-
-        Pinocchio's solver has no restitution. If the ball would reach the wall within the step, the result is the
-        negative rebound speed instead; an approach slower than a few steps of gravity does not count as an impact.
-        """
-        e = self._restitution
-        if e is None:
-            return gap / self.dt
-        x, y, z, *_ = triad
-        vx, vy, vz = v
-        gx, gy, gz = self._gravity
-        approach, pull = x * vx + y * vy + z * vz, x * gx + y * gy + z * gz
-        if e * approach <= _SOFT * abs(pull) * self.dt or gap > self.dt * (approach + self.dt * pull):
-            return gap / self.dt
-        return -e * approach
 
     def resistance(
         self, triad: Sequence[float], v: Sequence[float], normal_force: float, span: float = 0.0
@@ -233,8 +203,7 @@ class ContactSteps:
             raise self._not_found()
         F2, F3, N = impulse.tolist()
         if not self._faint < N:
-            # the status does not change before the wall first presses
-            return impulse, N, EventKind.LIFT_OFF if self._pressed else self._status
+            return impulse, N, EventKind.LIFT_OFF
         if math.hypot(F2, F3) < _ON_CONE * mu * N:
             return impulse, N, EventKind.STICK
         if not self.bounded:
@@ -332,12 +301,6 @@ def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
         missing = {name: value / natural for name, value in _missing_bend(body).items()}
         if max(missing.values()) > rough:
             reasons.append("for the length of a step the wall is a plane, and at time 0 it does not yet bend the path")
-    if slip := float(np.linalg.norm(body.slip0)):
-        # An impulse opposes the slip at the end of its step, whose direction may have changed by then.
-        turned = _MARGIN * dt * float(np.linalg.norm(initial_response(body)[1])) / body.ball.mass / slip
-        turned *= (1 + 1 / body.ball.inertia_ratio) * min(body.contact.mu_kinetic, 1.0)
-        missing = {name: value + turned for name, value in missing.items()}
-        reasons.append("an impulse opposes the slip at its end, which turns")
     because = "; ".join(reasons)
     result = {name: Regularised(value + rough, because) for name, value in missing.items()}
     if not steps.bounded:

@@ -14,13 +14,8 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 BallRun = ContactRun | RowsRun
 PROVIDES: Mapping[str, frozenset[str]] = {
     "composite": ALL_OF_A_BALL,
-    "free_flyer": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
-    "contact": ALL_OF_A_BALL | {BallCapability.MOVING_WALL, BallCapability.IMPACTS},
-}
-LACKING: Mapping[str, Mapping[str, str]] = {
-    "composite": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
-    "free_flyer": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
-    "contact": {BallCapability.TANGENTIAL_RESTITUTION: "Pinocchio's solver has no restitution to be asked for"},
+    "free_flyer": ALL_OF_A_BALL,
+    "contact": ALL_OF_A_BALL,
 }
 INHERENT: Mapping[str, Mapping[str, str]] = {
     "contact": {BallCapability.ORIENTATION: "the spherical joint's configuration is the ball's orientation"}

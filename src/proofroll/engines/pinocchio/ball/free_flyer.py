@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from typing_extensions import override
 
-from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, ContactRows, SlidingContact
 
@@ -27,8 +27,7 @@ class FreeFlyer(BallWithRows):
     @override
     def __init__(self, body: RollingBall, orientation: bool) -> None:
         super().__init__(body)
-        self._surface, self._wall_rate = body.surface, body.wall_rate
-        self._orientation = orientation
+        self._surface, self._orientation = body.surface, orientation
         self._matrix = np.zeros((9, 9))
         self._directions = np.zeros((3, 6))
         self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
@@ -36,18 +35,6 @@ class FreeFlyer(BallWithRows):
         self.v0 = np.concatenate([body.v0, body.w0])
         self.q_scale = np.concatenate([np.full(3, self._radius), np.ones(4)])
         self.v_scale = np.concatenate([np.full(3, self._speed), np.full(3, self._speed / self._radius)])
-
-    def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.ball.ball_with_rows.BallWithRows`.
-
-        On a moving wall, the velocity relative to rigid motion with the wall is projected: that motion has no slip.
-        """
-        if self._wall_rate is None:
-            return super().project(data, q, v)
-        turned = pin.Quaternion(q[3:]).toRotationMatrix().T if self._orientation else np.eye(3)
-        carried = np.concatenate([turned @ cross(self._wall_rate, q[:3]), turned @ self._wall_rate])
-        q, rest = super().project(data, q, v - carried)
-        return q, rest + carried
 
     def _aimed(self, moving: Sequence[float]) -> FloatArray:
         """Matrix from (v, ω) to normal velocity and slip along e2, e3, world axes, shape (3, 6); overwritten.
@@ -88,12 +75,6 @@ class FreeFlyer(BallWithRows):
         tx, ty, tz = bx + a * (wy * z - wz * y), by + a * (wz * x - wx * z), bz + a * (wx * y - wy * x)
         normal_drift = x1 * bx + y1 * by + z1 * bz + x * vx + y * vy + z * vz
         drift = np.array((normal_drift, x2 * tx + y2 * ty + z2 * tz, x3 * tx + y3 * ty + z3 * tz))
-        if (
-            self._wall_rate is not None
-        ):  # acceleration of the wall at the contact, W × velocity of the contact position p + a e1
-            gain = cross(self._wall_rate, np.array((vx, vy, vz)) + a * np.array((x, y, z)))
-            drift[1] -= gain @ (x2, y2, z2)
-            drift[2] -= gain @ (x3, y3, z3)
         resistance = self._rest
         if self._f:
             speed = math.sqrt(vx * vx + vy * vy + vz * vz)

@@ -31,8 +31,6 @@ _FLOOR = 1e-6
 # Least values of both, relative to the speed that friction gives while the ball rolls by a radian: a slip that barely
 # starts has no |b| as a scale, and |u| below round-off never ends.
 _LEAST_HANDOVER, _LEAST_FLOOR = 1e-10, 1e-14
-# Least floor for a slip that does not start from rest, relative to its initial |u|.
-_BEGUN = 1e-9
 # Fraction of the time left until |u| = 0 that one step may take.
 _APPROACH = 0.7
 # Time span over which the turning of b is measured, relative to the time in which the ball rolls by a radian.
@@ -66,12 +64,7 @@ class AdaptiveStickSlip(Adaptive):
         self._mode = FrictionLaw.STICKING
         self._monitored = 0.0, 0.0, 0.0
         y = self._joined(self.q, self.v)
-        if mechanism.slips0:
-            self._record(EventKind.SLIP, 0.0, 0.0)
-            self._creep(y)  # also sets the scales of this slip
-            self._mode = FrictionLaw.SLIDING
-            self._floor = max(self._floor, _BEGUN * self._speed(y)[0])
-        elif self._excess(y) > 0:
+        if self._excess(y) > 0:
             self._record(EventKind.SLIP, 0.0, 0.0)
             self._creep(y)
 
@@ -264,7 +257,7 @@ class FixedStickSlip(FixedStep):
         super().__init__(mechanism, settings)
         self.mu_static = contact.mu_static
         self._excess, self._normal_force = mechanism.excess(self._data, self.q, self.v, self.mu_static)
-        self.sticking = self._excess <= 0 and not mechanism.slips0
+        self.sticking = self._excess <= 0
         self._free = self._without_friction()
         if not self.sticking:
             self.events.append(Event(EventKind.SLIP, 0.0, 0.0, 0.0))
