@@ -118,8 +118,8 @@ def test_formulations_of_contact_say_which_law_they_have() -> None:
     ("engine", "formulation", "preset", "scene", "words"),
     [
         ("mujoco", "geoms", "matched", "sled", ["contact by a convex cone, where sliding contacts open"]),
-        ("mujoco", "chart", "matched", "slide_to_roll", ["contact by a convex cone, where sliding contacts open"]),
-        ("projection", "rotating_frame", "default", "slide_to_roll", ["hard contact by Coulomb's law"]),
+        ("mujoco", "geoms", "matched", "slide_to_roll", ["contact by a convex cone, where sliding contacts open"]),
+        ("projection", "dependent", "default", "slide_to_roll", ["hard contact by Coulomb's law"]),
         ("mujoco", "joints", "default", "pendulum", []),
     ],
 )

@@ -25,7 +25,7 @@ from proofroll.elements.mechanism.contact import coulomb
 from proofroll.elements.mechanism.contact.acting import modes_of
 from proofroll.elements.mechanism.dynamics import switches
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
-from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
@@ -212,18 +212,7 @@ def as_bodies(name: str, friction: float, tilt: float, **parameters: float) -> t
 @pytest.mark.parametrize(
     ("name", "friction", "tilt", "until", "parameters"),
     [
-        pytest.param(
-            "slide_to_roll", 0.2, 0.0, 1.0, {"cross_speed": 0.7, "back_spin": 30.0, "mu_static": 0.2},
-            marks=pytest.mark.drill,
-        ),
         pytest.param("inclined_plane", 10.0, 0.35, 1.0, {}, marks=pytest.mark.drill),
-        (
-            "bouncing_ball",
-            0.1,
-            0.2,
-            0.9,
-            {"height": 0.3, "speed": 0.5, "back_spin": 40.0, "restitution": 0.6, "mu_static": 0.1},
-        ),
     ],
 )  # fmt: skip
 def test_a_ball_moves_as_its_own_truth_says(
@@ -338,8 +327,8 @@ def test_a_tip_on_a_turning_arm_rubs_against_its_own_motion(other: float) -> Non
 @pytest.mark.drill
 def test_infinitely_many_impacts_end_when_their_sum_says() -> None:
     """A ball that bounces to a fifth of its speed settles after one and a half times the time of its fall."""
-    mechanism, _ = as_bodies("bouncing_ball", 0.1, 0.0, height=0.05, restitution=0.2)
-    found = truth_of(mechanism, np.array([0.0, 0.2]))
+    scene = load_scene("bouncing_ball", height=0.05, restitution=0.2, mu_static=0.1)
+    found = truth_of(the_mechanism(scene).mechanism, np.array([0.0, 0.2]))
     rests = np.sqrt(2 * 0.05 / 9.81) * (1 + 0.2) / (1 - 0.2)
     assert found.events[-1].kind == "settle"
     assert found.events[-1].time == pytest.approx(rests, abs=DIGITS)

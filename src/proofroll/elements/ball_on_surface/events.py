@@ -76,9 +76,7 @@ class Watch:
             return SeenInRun(kept, [left] if left is not None else None, ended)
         if located is None or contradicted(instants, sticking, events):
             events = [event for event in events if event.kind not in _SWITCHES]
-            slides = located is None and not sticking[0] and instants[0] == 0 and bool(np.any(self._body.slip0))
-            begun = [Event(EventKind.SLIP, 0.0, 0.0, 0.0)] if slides else []
-            events = [*begun, *between_samples(instants, [bool(value) for value in sticking]), *events]
+            events = [*between_samples(instants, [bool(value) for value in sticking]), *events]
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
 
     def bounces(self, columns: Columns) -> Sequence[Bounce]:

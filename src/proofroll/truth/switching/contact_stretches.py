@@ -289,6 +289,7 @@ class ContactStretches(ContactWalks):
         if self._settles(hit, speed, series.ratio if series is not None and alternates else law):
             if series is not None and alternates:
                 return self._settled(stretch, state, stays, series, speed)
+            self._check_alternation(hits, touching)
             modes, normal = (rebounding(contacts, stretch.mode, hit), stretch.mode), touching[hit].normal
             pull, falling = (-float(normal @ self._solved(state, mode).slide_rate[hit]) for mode in modes)
             delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law, max(falling, 0.0))
@@ -298,6 +299,17 @@ class ContactStretches(ContactWalks):
         kinds = (EventKind.SETTLE if over else EventKind.IMPACT for over in settled)
         happened = tuple((kind, contacts[k].name) for kind, k in zip(kinds, hits, strict=True))
         return self._after(stretch, state, stays, happened, margin, delay)
+
+    def _check_alternation(self, hits: Sequence[int], touching: Sequence[Touching]) -> None:
+        """Raises Refused if rebounds that are summed reverse a slip that none of them lessens."""
+        for k in hits:
+            contact, slip = self.contacts[k], float(np.linalg.norm(slip_velocity(touching[k])))
+            if contact.tangential_restitution == 1 and np.isinf(contact.friction) and slip > REST:
+                raise Refused(
+                    f"{contact.name} closes after infinitely many impacts, each of which reverses its slip, so that it "
+                    "has no last direction; end the run earlier, take tangential_restitution below 1, or give friction "
+                    "a bound"
+                )
 
     def _settled(
         self, stretch: Stretch[ContactMode], state: Array, stays: Sequence[bool], series: GeometricSeries, speed: float

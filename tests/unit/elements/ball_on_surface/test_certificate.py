@@ -207,9 +207,9 @@ FRICTION: dict[str, Any] = {
 
 def test_a_velocity_is_measured_by_all_that_makes_it() -> None:
     """A ball that spins fast and goes slowly has its velocity from contact and spin: their roundings are no lie."""
-    scene = load_scene("slide_to_roll", speed=1e-4, back_spin=213.7)
+    scene = load_scene("inclined_plane", speed=1e-4, normal_spin=213.7)
     body = rolling_ball(scene)
-    rounded = body.v0 + np.array([1e-6, 0, 0])  # two roundings of the 5 m/s with which the ball's lowest point moves
+    rounded = body.v0 + np.array([1e-6, 0, 0])  # two roundings of the 5 m/s with which the ball's sides move
     single = SimpleNamespace(precision="single")
     friction = {"mu_static": body.contact.mu_static, "mu_kinetic": body.contact.mu_kinetic}
     lines = certify(Stub(scene, {"v_WB": rounded}, **friction), scene, single)

@@ -113,7 +113,7 @@ def test_a_sample_on_a_bounce_may_be_of_either_side() -> None:
     velocities[:, 2] = [*(-9.81 * times[:3]), 0.0, *(0.5 * 9.81 * falls - 9.81 * (times[4:] - falls))]
     for down, agrees in ((-9.81 * falls, True), (0.5 * 9.81 * falls, True), (5 * 9.81 * falls, False)):
         velocities[3, 2] = down
-        run = {"time": times, "v_WB": velocities}
+        run = {"time": times, "v_WB": velocities[:, None]}
         assert proofroll.judge(run, scene, {"v_WB": "1e-6 m/s"}, because="round-off").agrees is agrees
 
 
