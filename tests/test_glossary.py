@@ -6,6 +6,7 @@ import re
 import runpy
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ import pytest
 from proofroll.core.plugins import engine_names
 from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.walls.charts import wall_coordinates
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import EngineDescription
 from proofroll.running.engine_questions import describe_each
@@ -51,8 +54,13 @@ def test_coordinates_of_a_surface_are_explained(kind: str) -> None:
     """The row of a surface has its coordinates with their units and a place that is true, and a picture shows it."""
     page = (DOCS / "surfaces.md").read_text(encoding="utf-8")
     (row,) = re.findall(rf"^\| `{kind}` \|.*$", page, flags=re.MULTILINE)
-    wall = load_scene(SCENES[kind]).elements[0].rolling.wall  # type: ignore[attr-defined]  # a ball's
-    for name, unit in zip(wall.coordinates, wall.units, strict=True):
+    element: Any = load_scene(SCENES[kind]).elements[0]
+    if isinstance(element, MechanismElement):
+        wall = element.mechanism.geometries[1]
+        coordinates: Any = wall_coordinates(wall.solid, 0.0)  # type: ignore[arg-type]  # a wall
+    else:
+        wall = coordinates = element.rolling.wall
+    for name, unit in zip(coordinates.coordinates, coordinates.units, strict=True):
         assert f"`{name}` [{unit}]" in row
     assert f"gallery/{SCENES[kind]}.svg" in page
     u, v = 0.1, 0.2
@@ -62,14 +70,14 @@ def test_coordinates_of_a_surface_are_explained(kind: str) -> None:
         "plane": lambda: (u * cos(wall.tilt), -v, -u * sin(wall.tilt)),
         "cone": lambda: (v * cos(wall.slope) * cos(u), v * cos(wall.slope) * sin(u), v * sin(wall.slope)),
         "torus": lambda: (
-            (wall.ring_radius + wall.wire_radius * sin(v)) * cos(u),
-            (wall.ring_radius + wall.wire_radius * sin(v)) * sin(u),
-            wall.wire_radius * cos(v),
+            (wall.ring_radius + wall.radius * sin(v)) * cos(u),
+            (wall.ring_radius + wall.radius * sin(v)) * sin(u),
+            wall.radius * cos(v),
         ),
         "bowl": lambda: np.array([u, -v, -wall.radius * (1 - q)]) / (1 + q),
     }
     q = (u * u + v * v) / (4 * wall.radius**2) if kind == "bowl" else 0.0
-    assert np.allclose(wall.position((u, v)), places[kind](), atol=1e-12)
+    assert np.allclose(coordinates.position((u, v)), places[kind](), atol=1e-12)
 
 
 def test_every_surface_has_a_row() -> None:

@@ -8,17 +8,15 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from proofroll.core import plugins
 from proofroll.elements.ball_on_surface import kind
-from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
+from proofroll.elements.mechanism.report.drawing import mechanism_drawing
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
-from proofroll.papers.blajer_2006.report.drawings import overview
-from proofroll.papers.blajer_2006.report.replay_wall import wall
 
 PLUGINS = Path(__file__).parent / "plugins"
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -75,11 +73,11 @@ way = "1e-3 m"
 gap = "1e-4 m"
 
 [[rows]]
-engine = "projection[formulation=rotating_frame]"
+engine = "projection[formulation=dependent]"
 tolerance = "fine"
 
 [[rows]]
-engine = "mujoco[formulation=free,preset=tuned]"
+engine = "mujoco[formulation=geoms,preset=tuned]"
 tolerance = "fine"
 ladder = [2, 1, 0.5]
 """
@@ -139,33 +137,16 @@ def test_compare(proofroll: Proofroll, trough: Path, kind: str) -> None:
     assert {run["status"] for run in content["runs"]} == {"done"}
 
 
-def test_mujoco_reads_what_is_exported(proofroll: Proofroll, trough: Path) -> None:
-    """The model of a scene without a file goes out as one, with the scene's start as its keyframe; elsewhere not."""
-    import mujoco
-
-    file = trough.parent / "trough.xml"
-    code, _, err = proofroll("export", str(trough), str(file), "--engine", "mujoco[formulation=free]")
-    assert code == 0, err
-    model = mujoco.MjModel.from_xml_path(str(file))
-    body = rolling_ball(load_scene(str(trough)))
-    assert model.body("ball").mass == pytest.approx(body.ball.mass)
-    assert model.key_qpos[0, :3] == pytest.approx(body.p0, abs=1e-5)
-    assert model.key_qvel[0, :3] == pytest.approx(body.v0, abs=1e-5)
-    code, _, err = proofroll("export", str(trough), str(file), "--engine", "projection")
-    assert code == 3
-    assert "writes no file" in err
-
-
 @pytest.mark.usefixtures("proofroll")
-def test_it_is_drawn_and_replayed(trough: Path) -> None:
-    """The drawing has the coordinates' names, and the replay's wall lies on the trough, within its ends."""
-    body = rolling_ball(load_scene(str(trough)))
-    whole = plain(overview(body.wall, body)[0].picture(""))
-    texts = {part["text"] for mark in whole["marks"] for part in mark.get("parts", ())}
-    assert {"angle", "way", "v", "g"} <= texts
-    built = wall(body, np.array([[0.4, 0.0], [-0.4, 0.1]]))
-    assert np.abs(body.wall.gap(built.points)).max() < 1e-12
-    assert np.abs(built.points[..., 1]).max() <= 0.3
+def test_it_is_drawn(trough: Path) -> None:
+    """The ball has the coordinates of the package's surface, whose lines through the contact are drawn."""
+    (element,) = load_scene(str(trough)).elements
+    assert isinstance(element, MechanismElement)
+    assert element.on_wall is not None
+    assert element.on_wall.surface.coordinates == ("angle", "way")
+    picture = plain(mechanism_drawing(element).picture(""))
+    lines = [mark for mark in picture["marks"] if mark.get("look") == "hidden"]
+    assert len(lines) == 2, {str(mark)[:200] for mark in picture["marks"]}
 
 
 def test_a_distance_that_is_none_is_refused(

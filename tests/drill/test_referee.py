@@ -9,7 +9,6 @@ import pytest
 from typer.testing import CliRunner
 
 from proofroll.cli import app
-from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.dynamics.analysis import analyse
@@ -105,11 +104,13 @@ def test_the_referee_notices_what_is_wrong() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_ball_starts_where_the_coordinates_of_its_wall_say(seed: int) -> None:
     """Centre, velocity and spin of a rolling ball on each wall, by formulas of its own; it lies on the wall."""
-    style, scene = random_ball(seed)
-    referee, body = BallReferee(scene.elements[0]), rolling_ball(scene)
+    style, element = random_ball(seed)
+    referee, body = BallReferee(element), as_body(element).elements[0].on_wall  # type: ignore[attr-defined]
     state = np.asarray(referee.start(), dtype=np.float64)
     assert style == f"{WALLS[seed]} rolls"
-    np.testing.assert_allclose(state[:9], np.concatenate([body.p0, body.v0, body.w0]), rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(
+        state[:9], np.concatenate([body.surface.position(body.u0), body.v0, body.w0]), rtol=1e-13, atol=1e-14
+    )
     assert abs(referee.run(np.zeros(1, np.longdouble)).seen[0]["gap"]) < 1e-17
 
 
@@ -135,11 +136,9 @@ def test_random_balls_have_every_wall_and_every_law() -> None:
 @pytest.mark.drill
 def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """An inertia that is a millionth too large shows in the motion."""
-    scene = random_ball(17)[1]
-    (element,) = scene.elements
+    element = random_ball(17)[1]
     ball = replace(element.ball, inertia_ratio=element.ball.inertia_ratio * (1 + 1e-6))
-    heavier = replace(scene, elements=(replace(element, ball=ball),))
-    monkeypatch.setattr(holding, "as_body", lambda _: as_body(heavier.elements[0]))  # type: ignore[arg-type]  # a ball
+    monkeypatch.setattr(holding, "as_body", lambda _: as_body(replace(element, ball=ball)))
     assert not hold_ball(17).sound
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
 from proofroll.elements.ball_on_surface.surfaces.formula import Jet, sqrt, variables
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.scene.checks import Vector
@@ -50,8 +50,6 @@ class RollingContact:
         return gap.value, [-1.0 * x for x in gap.first], [-1.0 * dot(row, v) for row in bent]
 
     def _distance(self, *r: Any) -> Any:
-        if isinstance(self.path, Declared):
-            return self.path.distance(*r)
         if isinstance(self.path, Plane):
             normal = self.path.normal(np.array(self.start))
             return float(self.path.gap(np.zeros(3))) - sum(x * float(n) for x, n in zip(r, normal, strict=True))

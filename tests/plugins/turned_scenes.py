@@ -171,28 +171,21 @@ def _renamed(item: Any, names: Mapping[str, str]) -> Any:
 
 
 def turned_ball(scene: Scene, angle: float) -> Scene:
-    """The scene of one ball in a plane, a cylinder, a cone or a torus, turned by an angle [rad] with all its names new.
+    """The scene of one ball on a plane or in a cylinder, turned by an angle [rad] about the world's y axis; new names.
 
-    A plane and a cylinder turn about the world's y axis, which changes their tilt; the others about their own axis,
-    which changes where on them the ball starts.
+    The turn changes the wall's tilt.
     """
     (element,) = scene.elements
     assert isinstance(element, BallOnSurface)
-    tilts = hasattr(element.surface, "tilt")
-    R = from_rpy((0.0, angle, 0.0) if tilts else (0.0, 0.0, angle))
-    direction = tuple(float(x) for x in R @ np.array(element.gravity.direction))
-    surface: Any = dataclasses.replace(element.surface, name="part1")
-    coordinates = element.start.coordinates
-    if tilts:
-        surface = dataclasses.replace(surface, tilt=surface.tilt + angle)
-    else:
-        coordinates = (coordinates[0] + angle, coordinates[1])
+    direction = tuple(float(x) for x in from_rpy((0.0, angle, 0.0)) @ np.array(element.gravity.direction))
+    surface: Any = element.surface
+    surface = dataclasses.replace(surface, name="part1", tilt=surface.tilt + angle)
     turned = dataclasses.replace(
         element,
         ball=dataclasses.replace(element.ball, name="part0"),
         surface=surface,
         contact=dataclasses.replace(element.contact, body="part0", surface="part1"),
-        start=dataclasses.replace(element.start, body="part0", coordinates=coordinates),
+        start=dataclasses.replace(element.start, body="part0"),
         gravity=dataclasses.replace(element.gravity, direction=direction),
     )
     return dataclasses.replace(scene, elements=(turned,))

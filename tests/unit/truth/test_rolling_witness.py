@@ -45,9 +45,9 @@ def witnessed(scene: Scene, element: BallOnSurface, method: str = "run_taylor") 
     return columns(element.rolling, TIMES, *motion, force=record.wrench[:, contact, :3]).dataset()
 
 
-@pytest.mark.parametrize("name", ["sphere_in_cylinder", "inclined_plane", "bowl"])
+@pytest.mark.parametrize("name", ["sphere_in_cylinder", "inclined_plane"])
 def test_truth_of_a_ball_agrees_with_rolling_rows(name: str) -> None:
-    """Motion and forces of three kinds of surface lie within the error bars that two other routes gave them."""
+    """Motion and forces of both kinds of surface lie within the error bars that two other routes gave them."""
     pytest.importorskip("heyoka")
     scene = load_scene(name)
     (element,) = scene.elements

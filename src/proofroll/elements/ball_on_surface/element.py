@@ -30,7 +30,7 @@ from proofroll.elements.ball_on_surface.mechanics import initial_response, natur
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.optional_terms import optional_terms
 from proofroll.elements.ball_on_surface.sampling import BallSample
-from proofroll.elements.ball_on_surface.surfaces import Surface
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
 from proofroll.elements.mechanism.run.contacts import local_frame
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 
@@ -39,13 +39,10 @@ if TYPE_CHECKING:
 
     from proofroll.core.certificate import Line
 
-# Initial slip, relative to the ball's speed, that counts as round-off of rolling.
-_ROUND_OFF = 1e-12
-
 
 @dataclass(frozen=True)
 class BallOnSurface:
-    """A ball that rolls or slips on a surface. See :class:`proofroll.core.element.Element`.
+    """A ball that rolls on a plane or in a cylinder, and slips where friction gives way. See :class:`.Element`.
 
     Attributes:
         ball, surface, contact, start, gravity: data of the scene.
@@ -60,21 +57,17 @@ class BallOnSurface:
     sample_type: ClassVar[type[BallSample]] = BallSample
 
     def __post_init__(self) -> None:
-        """Checks that the start has a normal, friction brakes an initial slip, and a ball on a moving wall rolls.
+        """Checks that the ball rolls on a wall at rest, where the wall has a normal.
 
         Raises:
-            InputError: one of these does not hold.
+            InputError: the ball flies, slips or bounces, its wall turns, or its start has no normal.
         """
-        for name, only in (("mu_static", math.inf), ("rolling_resistance", 0.0)):
-            if any(self.surface.wall_rate) and getattr(self.contact, name) != only:
-                advice = f"on a wall that moves a ball only rolls; leave {name} out, or the wall's turning"
-                raise InputError(name, getattr(self.contact, name), advice)
+        if not rolls_evenly(self.surface, self.contact, self.start):
+            advice = "its own mechanics follows a ball that rolls; read this one as a body (ball_as_body)"
+            raise InputError("start", self.start, advice)
         if not np.all(np.isfinite([self.rolling.p0, self.rolling.v0, self.rolling.w0])):
             advice = "the surface has no normal there, as at an apex; start elsewhere"
             raise InputError("coordinates", list(self.start.coordinates), advice)
-        if math.isinf(self.contact.mu_static) and np.any(self.rolling.slip0):
-            advice = "a ball that starts slipping needs a number for mu_static, or leave its tangential_spin out"
-            raise InputError("tangential_spin", self.start.tangential_spin, advice)
 
     @property
     def name(self) -> str:
@@ -94,18 +87,8 @@ class BallOnSurface:
             needs.add(BallCapability.ROLLING_RESISTANCE)
         if math.isfinite(self.contact.mu_static):
             needs.add(BallCapability.BOUNDED_FRICTION)
-        generators = self.surface.generators
-        flat = generators is not None and all(generator.kind == "translation" for generator in generators)
-        if not flat:
+        if any(generator.kind == "rotation" for generator in self.surface.generators or ()):
             needs.add(BallCapability.CURVED_SURFACE)
-        if np.any(self.rolling.slip0):
-            needs.add(BallCapability.SLIPPING_START)
-        if self.rolling.wall_rate is not None:
-            needs.add(BallCapability.MOVING_WALL)
-        if self.contact.restitution is not None or self.start.gap:
-            needs.add(BallCapability.IMPACTS)
-        if self.contact.tangential_restitution:
-            needs.add(BallCapability.TANGENTIAL_RESTITUTION)
         return frozenset(needs)
 
     optional: ClassVar[frozenset[str]] = frozenset(
@@ -118,7 +101,7 @@ class BallOnSurface:
 
     @property
     def start_facts(self) -> Sequence[str]:
-        """Sentences on centre, velocity, normal force, and whether the ball rolls, slips, rests or leaves at once."""
+        """Sentences on centre, velocity, normal force, and whether the ball rolls, rests or leaves at once."""
         body = self.rolling
         named = zip(body.wall.coordinates, body.u0.tolist(), body.wall.units, strict=True)
         place = ", ".join(f"{name} = {value:.4g}{'' if unit == '1' else f' {unit}'}" for name, value, unit in named)
@@ -126,14 +109,11 @@ class BallOnSurface:
             f"{body.ball.name}: centre at {vector(body.p0)} m in the world ({place}), velocity {vector(body.v0)} m/s, "
             f"spin {vector(body.w0)} rad/s"
         ]
-        if body.gap0:
-            return [*sentences, f"it starts {body.gap0:.4g} m above the {body.wall.kind} and falls"]
         _, force = initial_response(body)
         press = float(normal_force(body, body.p0, force))
         if not np.any(force):
             return [*sentences, f"it leaves the {body.wall.kind} at once: nothing presses it on"]
-        slip = float(np.linalg.norm(body.slip0))
-        moves = f"it slips at {slip:.4g} m/s" if slip else "it rolls" if np.any(body.v0) else "its centre is at rest"
+        moves = "it rolls" if np.any(body.v0) else "its centre is at rest"
         return [*sentences, f"{moves}; the {body.wall.kind} presses it with {press:.4g} N"]
 
     @property
@@ -154,14 +134,7 @@ class BallOnSurface:
         u0 = np.asarray(self.start.coordinates, dtype=np.float64)
         frame = surface.frame(u0)
         v0 = frame[:, 1:] @ np.asarray(self.start.velocity)
-        carried = np.cross(self.surface.wall_rate, surface.position(u0) + self.ball.radius * frame[:, 0])
-        w0 = self.start.spin * frame[:, 0] - np.cross(frame[:, 0], v0 - carried) / self.ball.radius
-        slip0 = np.zeros(3)
-        if self.start.tangential_spin is not None:
-            spin = frame @ (self.start.spin, *self.start.tangential_spin)
-            slip = self.ball.radius * np.cross(spin - w0, frame[:, 0])
-            if np.linalg.norm(slip) > _ROUND_OFF * np.linalg.norm(v0):
-                w0, slip0 = spin, np.zeros(3) if self.start.gap else slip
+        w0 = self.start.spin * frame[:, 0] - np.cross(frame[:, 0], v0) / self.ball.radius
         return RollingBall(
             ball=self.ball,
             contact=self.contact,
@@ -169,11 +142,9 @@ class BallOnSurface:
             wall=self.surface,
             gravity=self.gravity.vector,
             u0=u0,
-            p0=surface.position(u0) - self.start.gap * frame[:, 0],
+            p0=surface.position(u0),
             v0=v0,
             w0=w0,
-            slip0=slip0,
-            gap0=self.start.gap,
         )
 
     @cached_property
@@ -260,6 +231,12 @@ class BallOnSurface:
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
         """See the protocol: rolling resistance, bounded friction and orientation."""
         return optional_terms(self, parameters, truth)
+
+
+def rolls_evenly(surface: object, contact: Contact, start: InitialMotion) -> bool:
+    """True if a ball rolls on a plane or in a cylinder at rest, and never bounces."""
+    rolls = not start.gap and start.tangential_spin is None and contact.restitution is None
+    return rolls and isinstance(surface, Plane | Cylinder) and not getattr(surface, "turning", 0.0)
 
 
 def rolling_ball(scene: Scene) -> RollingBall:

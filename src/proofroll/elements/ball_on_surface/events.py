@@ -1,4 +1,4 @@
-"""Events of a ball on a wall: begin and end of slip, lift-off, impacts."""
+"""Events of a ball on a wall: begin and end of slip, lift-off."""
 
 from __future__ import annotations
 
@@ -9,14 +9,10 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounces import Bounce, bounces_along
-from proofroll.core.columns import Columns
 from proofroll.core.element_abilities import SeenInRun
 from proofroll.core.events import Event, EventKind, events_of
 from proofroll.elements.ball_on_surface.mechanics import (
     always_pressed,
-    bouncing_bodies,
-    course_of,
     natural_acceleration,
     normal_force,
 )
@@ -78,11 +74,6 @@ class Watch:
             events = [event for event in events if event.kind not in _SWITCHES]
             events = [*between_samples(instants, [bool(value) for value in sticking]), *events]
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
-
-    def bounces(self, columns: Columns) -> Sequence[Bounce]:
-        """See :class:`proofroll.core.element_abilities.TellsBounces`."""
-        motion = (columns[name].values for name in ("time", "p_WB", "v_WB", "w_WB"))
-        return bounces_along(course_of(self._body, *motion), events_of(columns), bouncing_bodies(self._body))
 
     def _press(self, sample: BallSample) -> float:
         """Normal force N [N]; NaN where the engine gives no force."""

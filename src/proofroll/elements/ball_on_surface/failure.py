@@ -56,14 +56,11 @@ def signs(body: RollingBall, dataset: xr.Dataset, truth: xr.Dataset | None) -> l
     """See :class:`proofroll.core.element.Element`."""
     gap, energy = dataset["gap"].to_numpy(), dataset["energy"].to_numpy()
     allowed = off_surface(body)
-    driven = 0.0  # by a wall that moves
-    if body.wall_rate is not None:
-        driven = np.inf if truth is None else float(np.max(truth["energy"] - truth["energy"][0]))
     with np.errstate(over="ignore", invalid="ignore"):
         shown = {
-            LEFT: (gap > allowed) & (not body.flies),
+            LEFT: gap > allowed,
             SANK: gap < -allowed,
-            ENERGY_GAIN: energy - energy[0] - driven > GAIN * largest_kinetic_energy(body, truth),
+            ENERGY_GAIN: energy - energy[0] > GAIN * largest_kinetic_energy(body, truth),
         }
     if truth is not None and body.contact.rolling_resistance > 0:
         v = dataset["v_WB"].to_numpy()

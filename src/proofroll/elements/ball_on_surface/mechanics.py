@@ -9,10 +9,7 @@ import math
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.bounces import Course
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Declared
-from proofroll.elements.mechanism.run.contacts.on_wall import energy
 from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment as resistance_moment  # noqa: PLC0414 -- public here
 
 # Speed of a ball about to move from rest, relative to that of a fall by one radius: it has a direction and no effect.
@@ -20,29 +17,14 @@ _SETTING_OFF = 1e-12
 _PULLS = 1e-9  # relative to the whole force: a smaller pull is round-off
 
 
-def course_of(body: RollingBall, times: FloatArray, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> Course:
-    """Energy along a motion, and height of the centre against gravity."""
-    up = -body.gravity / (float(np.linalg.norm(body.gravity)) or 1.0)
-    return Course(times, energy(body, p_WB, v_WB, w_WB), (p_WB @ up)[:, None], (v_WB @ up)[:, None])
-
-
-def bouncing_bodies(body: RollingBall) -> dict[str, int]:
-    """Name of an event -> index of the body that bounces; empty without gravity, which says what height is."""
-    return {"": 0} if np.any(body.gravity) else {}
-
-
 def always_pressed(body: RollingBall) -> bool:
     """True if the wall presses the ball at every place and speed, so that nothing can lift it off.
 
     N / m = e1 · g + v · (∂e1/∂p) v: this holds if no normal points against gravity and the wall is nowhere convex. It
-    is checked around the surface's periodic coordinates; along the others the surface is taken to be uniform. A
-    declared surface is checked on its whole domain.
+    is checked around the surface's periodic coordinates; along the others the surface is uniform.
     """
-    if isinstance(body.surface, Declared):
-        u = body.surface.places()
-    else:
-        around = [np.zeros(1) if period is None else np.linspace(0, period, 64) for period in body.surface.periods]
-        u = body.u0 + np.stack(np.meshgrid(*around), axis=-1).reshape(-1, 2)
+    around = [np.zeros(1) if period is None else np.linspace(0, period, 64) for period in body.surface.periods]
+    u = body.u0 + np.stack(np.meshgrid(*around), axis=-1).reshape(-1, 2)
     p_WB = body.surface.position(u)
     gravity, bends = body.surface.normal(p_WB) @ body.gravity, np.linalg.eigvalsh(body.surface.normal_gradient(p_WB))
     round_off = 1e-12 * float(np.linalg.norm(body.gravity))
@@ -80,14 +62,8 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     * Rolling that needs more friction than the bound: the ball begins to slip against it. N is the same, for friction
       along the wall does not change it.
     * At rest: the ball stays if rolling resistance and friction can hold it.
-    * A slipping start: kinetic friction against the slip.
-    * Off the wall, or held by nothing but a pull: the ball falls.
+    * Held by nothing but a pull: the ball falls.
     """
-    if body.gap0:
-        return body.gravity, np.zeros(3)
-    if np.any(body.slip0):
-        force = _slipping_force(body)
-        return force / body.ball.mass + body.gravity, force
     if resistance_undirected(body, body.v0) and can_rest(body, body.p0):
         return np.zeros(3), -body.ball.mass * body.gravity
     acceleration, _, force = newton_euler(body, body.p0, _way(body), body.w0)
@@ -106,21 +82,13 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
 
 def initial_angular_acceleration(body: RollingBall) -> FloatArray:
     """Angular acceleration at time 0 in the world [rad/s²], shape (3,): moments of contact and resistance over J."""
-    if body.gap0 or (resistance_undirected(body, body.v0) and can_rest(body, body.p0)):
+    if resistance_undirected(body, body.v0) and can_rest(body, body.p0):
         return np.zeros(3)
     _, force = initial_response(body)
     e1 = body.surface.normal(body.p0)
     moment = body.ball.radius * cross(e1, force)
     moment += resistance_moment(body.contact.rolling_resistance, -force @ e1, e1, _way(body))
     return np.asarray(moment / body.ball.inertia)
-
-
-def _slipping_force(body: RollingBall) -> FloatArray:
-    """Force of the wall on a ball that starts slipping [N], shape (3,)."""
-    e1 = body.surface.normal(body.p0)
-    bend = float(body.v0 @ body.surface.normal_gradient(body.p0) @ body.v0)
-    press = body.ball.mass * (float(e1 @ body.gravity) + bend)
-    return np.asarray(-press * e1 - body.contact.mu_kinetic * press * body.slip0 / np.linalg.norm(body.slip0))
 
 
 def _way(body: RollingBall) -> FloatArray:
@@ -164,8 +132,6 @@ def newton_euler(
     matrix[6:, :3] = np.eye(3)
     matrix[6:, 3:6] = -a * cross_e1
     right = np.concatenate([m * body.gravity + force, np.zeros(3) + moment, -a * cross(w_WB, e1_rate)])
-    if body.wall_rate is not None:  # v + a ω × e1 is the wall's velocity W × (p + a e1), whose rate this is
-        right[6:] += cross(body.wall_rate, v_WB + a * e1_rate)
     solution = np.linalg.solve(matrix, right)
     return solution[:3], solution[3:6], solution[6:]
 

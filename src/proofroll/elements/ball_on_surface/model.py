@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -52,9 +52,8 @@ class RollingBall:
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
         u0: initial surface coordinates, shape (2,).
         p0, v0, w0: initial centre [m], velocity [m/s] and angular velocity [rad/s] in the world, shape (3,).
-        slip0: initial velocity of the contact point in the world [m/s], shape (3,); exactly zero where the ball rolls
-            or does not touch the wall.
-        gap0: initial distance from the wall [m].
+        flies: False, as the ball starts on the wall and does not land again.
+        wall_rate: None, as the wall is at rest.
     """
 
     ball: Ball
@@ -66,23 +65,16 @@ class RollingBall:
     p0: FloatArray
     v0: FloatArray
     w0: FloatArray
-    slip0: FloatArray = field(default_factory=lambda: np.zeros(3))
-    gap0: float = 0.0
+
+    slip0: ClassVar[FloatArray] = read_only(np.zeros(3))
+    gap0: ClassVar[float] = 0.0
+    flies: ClassVar[bool] = False
+    wall_rate: ClassVar[FloatArray | None] = None
 
     def __post_init__(self) -> None:
         """Keeps read-only copies of the arrays."""
-        for name in ("gravity", "u0", "p0", "v0", "w0", "slip0"):
+        for name in ("gravity", "u0", "p0", "v0", "w0"):
             object.__setattr__(self, name, read_only(np.array(getattr(self, name), dtype=np.float64)))
-
-    @property
-    def flies(self) -> bool:
-        """True if the ball starts off the wall, or may leave it and land again."""
-        return self.gap0 > 0 or self.contact.restitution is not None
-
-    @cached_property
-    def wall_rate(self) -> FloatArray | None:
-        """Angular velocity W of the wall about the world's origin [rad/s], shape (3,); None: the wall is at rest."""
-        return read_only(np.array(self.wall.wall_rate)) if any(self.wall.wall_rate) else None
 
     def resisting(self, N: FloatArray, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:  # noqa: ARG002 -- the protocol's
         """Moment of the rolling resistance, against the velocity of the centre [N m], shape (..., 3)."""
@@ -116,4 +108,4 @@ class RollingBall:
         e1 = self.surface.normal(self.p0)
         v0 = speed * self.v0 / np.linalg.norm(self.v0)
         w0 = (self.w0 @ e1) * e1 - np.cross(e1, v0) / self.ball.radius
-        return replace(self, v0=v0, w0=w0, slip0=np.zeros(3))
+        return replace(self, v0=v0, w0=w0)

@@ -37,11 +37,9 @@ def natural_time(body: RollingBall) -> float:
 
     Where the path turns at the rate Ω, a ball with r = J/(m a²) oscillates across it at √(r/(1+r)) Ω (√(2/7) Ω for a
     homogeneous ball, Blajer 2006, section 3). On a straight path there is no oscillation: it is one turn of the ball,
-    or 2π √(a/g), the time scale of starting to roll, whichever is longer. On a turntable it is one circle of the ball.
+    or 2π √(a/g), the time scale of starting to roll, whichever is longer.
     """
     turning, ratio = turning_rate(body), body.ball.inertia_ratio
-    if body.wall_rate is not None:
-        return 2 * math.pi * (1 + ratio) / (ratio * float(np.linalg.norm(body.wall_rate)))
     if turning > 0:
         return 2 * math.pi / (math.sqrt(ratio / (1 + ratio)) * turning)
     speed, gravity, a = float(np.linalg.norm(body.v0)), float(np.linalg.norm(body.gravity)), body.ball.radius
@@ -85,8 +83,7 @@ def first_motion(body: RollingBall) -> FirstMotion | None:
         return None
     speed = float(np.linalg.norm(body.v0)) or float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
     acceleration, turning = initial_response(body)[0], initial_angular_acceleration(body)
-    at_contact = acceleration + np.cross(turning, body.ball.radius * body.surface.normal(body.p0))
-    lasts = min(_stops(body.v0, acceleration), _stops(body.slip0, at_contact))
+    lasts = _stops(body.v0, acceleration)
     return FirstMotion(
         acceleration=acceleration[None, :],
         angular_acceleration=turning[None, :],

@@ -35,8 +35,7 @@ def optional_terms(element: BallOnSurface, parameters: Mapping[str, float], trut
     if "mu_static" in parameters:
         unbounded = dict.fromkeys((n for n in ("mu_static", "mu_kinetic") if n in parameters), math.inf)
         if math.isfinite(element.contact.mu_static):
-            if BallCapability.SLIPPING_START not in element.requires:  # such a start has no motion without a bound
-                terms.append(OptionalTerm("bounded friction", "the scene bounds it", {}, unbounded))
+            terms.append(OptionalTerm("bounded friction", "the scene bounds it", {}, unbounded))
         else:
             far = _FAR * (float(np.nanmax(truth["needed_friction"].to_numpy())) or 1.0)
             because = f"the scene has no bound; here one of {far:.3g}, {_FAR:g} times what rolling needs"

@@ -12,7 +12,6 @@ from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
-from proofroll.elements.mechanism.run.contacts.on_wall import wall_velocity
 
 
 def start(body: RollingBall) -> FloatArray:
@@ -24,8 +23,7 @@ def reduced_rates(body: RollingBall, state: FloatArray) -> tuple[FloatArray, Flo
     """Rates of (u, u̇, ω1), shape (5,), and velocity [m/s] and force [N] in the world, shape (3,).
 
     With κ = J/ma² the tangential part of Newton-Euler after eliminating the friction reads
-    (1 + κ) v̇ = g - κ a ω1 e1 × ė1 + e1 × M / (m a), and ω̇1 = ω · ė1. A wall that turns at the rate W adds κ ẇ, for
-    the velocity w = W × (p + a e1) of its point at the contact, and v - w replaces v in ω.
+    (1 + κ) v̇ = g - κ a ω1 e1 × ė1 + e1 × M / (m a), and ω̇1 = ω · ė1.
     """
     a, m, kappa, f = body.ball.radius, body.ball.mass, body.ball.inertia_ratio, body.contact.rolling_resistance
     u, spin = state[:2], float(state[4])
@@ -42,12 +40,6 @@ def reduced_rates(body: RollingBall, state: FloatArray) -> tuple[FloatArray, Flo
     inward = r2 * v2 + r3 * v3
     N = m * (inward + g1)
     drive2, drive3 = g2 + kappa * a * spin * r3, g3 - kappa * a * spin * r2
-    w2 = w3 = 0.0
-    if body.wall_rate is not None:
-        e1, e1_rate = frame[:, 0], frame[:, 1:] @ (r2, r3)
-        _, w2, w3 = (cross(body.wall_rate, body.surface.position(u) + a * e1) @ frame).tolist()
-        _, gain2, gain3 = (cross(body.wall_rate, frame[:, 1:] @ (v2, v3) + a * e1_rate) @ frame).tolist()
-        drive2, drive3 = drive2 + kappa * gain2, drive3 + kappa * gain3
     speed = math.hypot(v2, v3)
     if f and speed:  # e1 × M = -f N v/V; at rest the moment is zero, as in resistance_moment
         resisted = f * N / (m * a)
@@ -57,7 +49,7 @@ def reduced_rates(body: RollingBall, state: FloatArray) -> tuple[FloatArray, Flo
         x - row[0] * udot1 - row[1] * udot2 for x, row in zip((tangential2, tangential3), curving, strict=True)
     )
     uddot1, uddot2 = (t3v * along2 - t2v * along3) / det, (t2u * along3 - t3u * along2) / det
-    spin_rate = ((v3 - w3) * r2 - (v2 - w2) * r3) / a
+    spin_rate = (v3 * r2 - v2 * r3) / a
     force = (m * (-inward - g1), m * (tangential2 - g2), m * (tangential3 - g3))
     rates = np.array([udot1, udot2, uddot1, uddot2, spin_rate])
     return rates, frame @ (0.0, v2, v3), frame @ force
@@ -67,7 +59,7 @@ def placed(body: RollingBall, states: FloatArray, v_WB: FloatArray) -> tuple[Flo
     """Centre p_WB [m], ``v_WB`` [m/s] and spin w_WB [rad/s] of states (u, u̇, ω1), shape (n, 5); each shape (n, 3)."""
     e1 = body.surface.frame(states[:, :2])[..., 0]
     p_WB = body.surface.position(states[:, :2])
-    w_WB = states[:, 4:] * e1 - cross(e1, v_WB - wall_velocity(body, p_WB, e1)) / body.ball.radius
+    w_WB = states[:, 4:] * e1 - cross(e1, v_WB) / body.ball.radius
     return p_WB, v_WB, w_WB
 
 
@@ -83,30 +75,15 @@ def closed_form(body: RollingBall, times: FloatArray) -> BallMotion | None:
 
 
 def _plane(body: RollingBall, t: FloatArray) -> BallMotion:
-    """Uniform acceleration g_t / (1 + κ), κ = J/ma²: (5/7) g sin α for a homogeneous ball.
-
-    On a turntable of the rate W, v̇ = g_t / (1 + κ) + W' n × v with W' = κ/(1 + κ) W (2/7 W) and the normal n: circles
-    at the rate W', which drift where the table is tilted (Milne, Vectorial Mechanics, 1948).
-    """
+    """Uniform acceleration g_t / (1 + κ), κ = J/ma²: (5/7) g sin α for a homogeneous ball."""
     frame = body.surface.frame(body.u0)
     e1, tangents = frame[:, 0], frame[:, 1:]
     acceleration = tangents @ (tangents.T @ body.gravity) / (1 + body.ball.inertia_ratio)
-    if body.wall_rate is None:
-        v = body.v0 + t[:, None] * acceleration
-        p = body.p0 + t[:, None] * body.v0 + 0.5 * t[:, None] ** 2 * acceleration
-        rates, route = np.broadcast_to(acceleration, p.shape), "closed form (uniform acceleration)"
-    else:
-        turning = body.ball.inertia_ratio / (1 + body.ball.inertia_ratio) * body.wall_rate
-        drift = np.cross(turning, acceleration) / (turning @ turning)
-        angle, circling = t[:, None] * float(turning @ -e1), body.v0 - drift
-        sideways = np.cross(-e1, circling)
-        v = drift + np.cos(angle) * circling + np.sin(angle) * sideways
-        way = np.sin(angle) * circling + 2 * np.sin(angle / 2) ** 2 * sideways
-        p = body.p0 + t[:, None] * drift + way / float(turning @ -e1)
-        rates, route = acceleration + np.cross(turning, v), "closed form (circles of a turntable)"
-    carried = wall_velocity(body, p, np.broadcast_to(e1, p.shape))
-    w = (body.w0 @ e1) * e1 - np.cross(e1, v - carried) / body.ball.radius
-    return BallMotion(p_WB=p, v_WB=v, w_WB=w, force=body.ball.mass * (rates - body.gravity), route=route)
+    v = body.v0 + t[:, None] * acceleration
+    p = body.p0 + t[:, None] * body.v0 + 0.5 * t[:, None] ** 2 * acceleration
+    w = (body.w0 @ e1) * e1 - np.cross(e1, v) / body.ball.radius
+    force = np.broadcast_to(body.ball.mass * (acceleration - body.gravity), p.shape)
+    return BallMotion(p_WB=p, v_WB=v, w_WB=w, force=force, route="closed form (uniform acceleration)")
 
 
 def _vertical_cylinder(body: RollingBall, surface: Cylinder, t: FloatArray) -> BallMotion:

@@ -1,1 +1,1 @@
-"""Truth of a ball on a surface: rolling, stick and slip, flight and impact, each by two routes."""
+"""Truth of a ball on a surface: rolling, stick and slip, and the flight from the wall, each by two routes."""

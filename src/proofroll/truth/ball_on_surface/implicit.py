@@ -1,4 +1,4 @@
-"""Stick and slip by implicit collocation in the world frame: the second route, for every surface."""
+"""Stick and slip by implicit collocation in the world frame: the second route."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface import unreduced_taylor
 from proofroll.truth.ball_on_surface.contact import ContactRates
-from proofroll.truth.ball_on_surface.impact import by_equations
 from proofroll.truth.ball_on_surface.route import BallStretch, End, Route, World, about_to_stop, join_motions
 from proofroll.truth.numerics.collocation import Step, System, next_length, nodes, take
 
@@ -37,7 +36,6 @@ class Implicit(Route):
     """
 
     name = "world frame by signed distance, implicit collocation"
-    impact = staticmethod(by_equations)
 
     def __init__(self, body: RollingBall, first_step: float = 0.1) -> None:
         self._body = body
@@ -50,12 +48,6 @@ class Implicit(Route):
     @override
     def start(self) -> FloatArray:
         return np.concatenate([self._body.p0, self._body.w0, np.zeros(3)])
-
-    @override
-    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-        gap, e1 = float(self._body.surface.gap(p_WB)), self._body.surface.normal(p_WB)
-        slip = v_WB + self._body.ball.radius * cross(w_WB, e1)
-        return np.concatenate([p_WB + gap * e1, w_WB, slip - (slip @ e1) * e1])
 
     def friction(self, state: FloatArray) -> tuple[float, float]:
         """See :class:`Route`; [N]."""
@@ -81,7 +73,7 @@ class Implicit(Route):
         walk = _Walk(self._contact.system(sticking=True), time, state, until)
         resisted = self._body.contact.rolling_resistance > 0
         length = self._pace
-        compiled = self._held and self._body.wall_rate is None and unreduced_taylor.available(self._body)
+        compiled = self._held and unreduced_taylor.available(self._body)
         while walk.time < until:
             if compiled and len(walk.steps) == _MANY:
                 return self._rolls_on(walk, until)
@@ -121,13 +113,11 @@ class Implicit(Route):
         )
 
     @override
-    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
-        if slip is not None:
-            state = np.concatenate([state[:6], slip])
+    def slip(self, time: float, state: FloatArray, until: float) -> BallStretch:
         walk = _Walk(self._contact.system(sticking=False), time, state, until)
         length = min(self._first * self._pace, until - time)
         while walk.time < until:
-            started = bool(walk.steps) or slip is not None
+            started = bool(walk.steps)
             left = self._until_still(walk.state, False) if started else np.inf
             if about_to_stop(left, self._pace, walk.time):
                 still = walk.state + left * self._contact.rates(walk.state[None, :], False)[0]

@@ -45,8 +45,6 @@ class Onset:
 def first_slip(scene: Scene, until: float) -> float | None:
     """Time of the ball's first slip [s]; None: not until ``until`` [s]."""
     body = rolling_ball(scene)
-    if np.any(body.slip0):
-        return 0.0
     return friction_curve(body, until).onset(body.contact.mu_static)
 
 
@@ -59,19 +57,6 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
     if not 0 <= uncertainty < 1:
         raise InputError("uncertainty", uncertainty, "give a relative uncertainty of mu and f between 0 and 1")
     body = rolling_ball(scene)
-    if np.any(body.slip0):  # independent of friction
-        return Onset(
-            time=0.0,
-            by_mu=None,
-            by_f=None,
-            edge_below=None,
-            edge_above=None,
-            distance=float("inf"),
-            uncertainty=uncertainty,
-            verdict="well-posed",
-            earliest=0.0,
-            latest=0.0,
-        )
     mu = body.contact.mu_static
     curve = friction_curve(body, until)
     time = curve.onset(mu)

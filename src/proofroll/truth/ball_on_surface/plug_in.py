@@ -50,7 +50,7 @@ class BallOnSurfaceTruth:
         except ZeroDivisionError:
             message = "the ball comes to a point where its wall has no curvature, as at the apex of a cone"
             raise Diverged(f"{message}; start further off") from None
-        if "sticking" in result and BallCapability.SLIPPING_START not in element.requires:
+        if "sticking" in result:
             first = onset(scene, min(float(times[-1]), float(result.attrs.get(ENDS, np.inf))))
             result.attrs["onset"] = json.dumps(dataclasses.asdict(first))
             if first.verdict == "ill-posed":
@@ -93,7 +93,7 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     # takes some ten times as long as the series.
     stepped = not by_series or BallCapability.ORIENTATION in scene.requires
     stepped = stepped and closed_form(body, times[:1]) is None
-    if bounded or stepped or body.gap0 or not (always_pressed(body) or stays_on(body, float(times[-1]))):
+    if bounded or stepped or not (always_pressed(body) or stays_on(body, float(times[-1]))):
         result, _ = stick_slip(scene, times)
         return result if bounded else result.drop_vars("sticking")
 

@@ -51,12 +51,6 @@ class Polar(Sliding):
     def start(self) -> FloatArray:
         return start(self._body)
 
-    @override
-    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-        u = self._body.surface.locate(p_WB)
-        udot = np.linalg.pinv(self._body.surface.tangents(u)) @ v_WB
-        return np.concatenate([u, udot, [w_WB @ self._body.surface.normal(p_WB)]])
-
     def friction(self, state: FloatArray) -> tuple[float, float]:
         """See :class:`Route`; [N]."""
         b, N = self._drive(state)
@@ -199,9 +193,6 @@ class Polar(Sliding):
     def _stood_still(self, last: FloatArray) -> FloatArray:
         rates = self._slipping(last)
         return np.asarray(last + rates / -rates[5])
-
-    def _axes(self, state: FloatArray) -> FloatArray:
-        return self._body.surface.frame(state[:2])
 
     def _until_halt(self, y: FloatArray) -> float:
         _, v, force = reduced_rates(self._body, y[:5])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum, auto
 from typing import ClassVar
 
@@ -77,19 +77,13 @@ class Route(ABC):
 
     Attributes:
         name: method of integration, shown to people.
-        impact: function of :mod:`proofroll.truth.ball_on_surface.impact`: velocity and spin after an impact.
     """
 
     name: ClassVar[str]
-    impact: ClassVar[staticmethod[..., tuple[FloatArray, FloatArray]]]
 
     @abstractmethod
     def start(self) -> FloatArray:
-        """State at time 0; an initial slip is not part of it."""
-
-    @abstractmethod
-    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-        """State of a ball that touches the wall at this position [m], velocity [m/s] and spin [rad/s]."""
+        """State at time 0."""
 
     @abstractmethod
     def friction(self, state: FloatArray) -> tuple[float, float]:
@@ -104,11 +98,8 @@ class Route(ABC):
         """Rolls without slip from ``time`` to ``until`` at the latest [s]."""
 
     @abstractmethod
-    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
-        """Slips from ``time`` to ``until`` at the latest [s].
-
-        ``slip``: initial velocity of the contact point in the world [m/s], shape (3,); None: zero.
-        """
+    def slip(self, time: float, state: FloatArray, until: float) -> BallStretch:
+        """Slips from rest from ``time`` to ``until`` at the latest [s]."""
 
     @abstractmethod
     def world(self, state: FloatArray) -> World:
@@ -152,15 +143,13 @@ class Path:
         stretches: in order, from time 0.
         events: kind and time [s] of each change.
         end: time from which the motion is not known [s]; inf: it reaches all times asked for.
-        ended: reason why it ends there, as a clause; empty: a landing whose outcome the contact does not say.
-        blurs: time of an event [s] -> its uncertainty [s], for events that both routes find by the same method.
+        ended: reason why it ends there, as a clause; empty: a landing, whose outcome the contact does not say.
     """
 
     stretches: list[BallStretch]
     events: list[tuple[EventKind, float]]
     end: float = math.inf
     ended: str = ""
-    blurs: dict[float, float] = field(default_factory=dict)
 
     def motion(self, times: FloatArray, route: str) -> BallMotion:
         """Motion at rising ``times`` [s]; the time of an event belongs to the later stretch."""

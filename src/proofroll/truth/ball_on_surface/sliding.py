@@ -9,11 +9,9 @@ from typing_extensions import override
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.truth.ball_on_surface.impact import by_coefficients
 from proofroll.truth.ball_on_surface.route import BallStretch, End, Route, World, join_motions
 
 _FLOOR = 1e-6  # |u| below which the rest of a slip is extrapolated, relative to |u| at the handover
-_BEGUN = 1e-8  # smallest handover of a slip that does not start from rest, relative to its initial |u|
 _ROUNDS = 50  # Newton iterations for τ at a given time
 
 
@@ -46,8 +44,6 @@ class Sliding(Route):
     integrated.
     """
 
-    impact = staticmethod(by_coefficients)
-
     def __init__(self, body: RollingBall, handover: float = 1e-5) -> None:
         self._body, self._handover = body, handover
 
@@ -76,10 +72,6 @@ class Sliding(Route):
         """State at |u| = 0, extrapolated linearly from a tiny |u|."""
 
     @abstractmethod
-    def _axes(self, state: FloatArray) -> FloatArray:
-        """Frame (e1, e2, e3) of the surface at a state as columns, shape (3, 3)."""
-
-    @abstractmethod
     def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
         """Motion of states, shape (n, 5), with slip ``size`` [m/s] and direction ``phi`` [rad]; phi None: sticking."""
 
@@ -98,25 +90,19 @@ class Sliding(Route):
         return BallStretch(start=time, end=run.end, sticking=True, state=run.last, why=run.why, motion=motion)
 
     @override
-    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
+    def slip(self, time: float, state: FloatArray, until: float) -> BallStretch:
         handover = self._grown(time, state, until)
-        # A slip that does not start from rest has no slaved part.
-        creep = self._creep(time, state, until if slip is None else time, handover)
+        creep = self._creep(time, state, until, handover)
 
         def creeping(times: FloatArray) -> BallMotion:
             y = creep.at(times)
             return self._motion(y[:, :5], y[:, 5], self._slaved(y))
 
-        if slip is None:
-            if creep.why is not End.GROWN:  # the time limit, or the slip stops before
-                return BallStretch(
-                    start=time, end=creep.end, sticking=False, state=creep.last[:5], why=creep.why, motion=creeping
-                )
-            small, phi = creep.last, self._slaved(creep.last[None, :])[0]
-        else:
-            _, e2, e3 = self._axes(state).T
-            small, phi = np.append(state, np.linalg.norm(slip)), np.arctan2(slip @ e3, slip @ e2)
-            handover = max(handover, _BEGUN * small[5])
+        if creep.why is not End.GROWN:  # the time limit, or the slip stops before
+            return BallStretch(
+                start=time, end=creep.end, sticking=False, state=creep.last[:5], why=creep.why, motion=creeping
+            )
+        small, phi = creep.last, self._slaved(creep.last[None, :])[0]
         start_state = np.array([*small[:5], np.log(small[5]), phi, creep.end])
         run = self._slide(start_state, np.log(_FLOOR * handover), until)
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounces import Bounce, Course, exact_bounces, with_bars, with_bounces
 from proofroll.core.dataset import ENDED, ENDS
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import IMPACTS, Event, EventKind, with_events
+from proofroll.core.events import Event, EventKind, with_events
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import always_pressed, bouncing_bodies, course_of, natural_speed
+from proofroll.elements.ball_on_surface.mechanics import always_pressed, natural_speed
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.truth import SAFETY
 from proofroll.truth.ball_on_surface import taylor
@@ -51,13 +49,11 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     Returns:
         Dataset of :func:`.error_bars.dataset_of`, each variable with the attribute ``error_bar`` in its own unit, and
         ``sticking`` (bool per sample; a sample at an event belongs to the later stretch), with its events if friction
-        is bounded or there are some, and energies and heights of bounces; events up to the last sample,
-        each with a bracket that contains both routes. If relative changes of the parameters by
-        :data:`proofroll.truth.numerics.conditioning.MOVE` (:func:`with_changes`) change the events, the
-        attribute ``ill_posed``
-        says from which time on; only earlier events are returned, and error bars cover the difference of the routes.
-        Where the motion is not known to the last time, the dataset has the samples before its end, and says when and
-        why it ends (:data:`proofroll.core.dataset.ENDS`).
+        is bounded or there are some; events up to the last sample, each with a bracket that contains both routes. If
+        relative changes of the parameters by :data:`proofroll.truth.numerics.conditioning.MOVE` (:func:`with_changes`)
+        change the events, the attribute ``ill_posed`` says from which time on; only earlier events are returned, and
+        error bars cover the difference of the routes. Where the motion is not known to the last time, the dataset has
+        the samples before its end, and says when and why it ends (:data:`proofroll.core.dataset.ENDS`).
 
     Raises:
         Diverged, Refused: a route follows no motion from time 0 on.
@@ -80,12 +76,12 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     posed, well = _unmoved(body, paths[1], pace, until)
     if not well:
         number, posed_throughout = min(number, posed), False
-        why = f"a relative {MOVE:g} of friction, resistance, restitution or gravity changes it"
+        why = f"a relative {MOVE:g} of friction, resistance or gravity changes it"
     events = []
     certain = until - MOVE * max(until, pace)  # the last digits would say whether an event at the end is in
     shared = [both for both in zip(events_1[:number], events_2, strict=False) if both[0][1] < certain]
     for (kind, time), (_, second_time) in shared:
-        wide = SAFETY * (abs(time - second_time) + _FLOOR * time + paths[0].blurs.get(time, 0.0))
+        wide = SAFETY * (abs(time - second_time) + _FLOOR * time)
         events.append(Event(kind, time, max(time - wide, 0.0), time + wide))
     result, check = (
         _dataset(scene, times, path, route.name, quadrature)
@@ -101,53 +97,29 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
             f"ill-posed: what happens after {last_event:.9g} s depends on the last digits of the parameters: {why}"
         )
     if bounded or events:
-        result = with_bounces(with_events(result, events), _bounces(body, paths, events, until))
+        result = with_events(result, events)
     return result, events
-
-
-def _bounces(body: RollingBall, paths: Sequence[Path], events: Sequence[Event], until: float) -> list[Bounce]:
-    """Energies and heights of the impacts among the events, with error bars from both routes."""
-    bounces_by_route = []
-    for path in paths:
-
-        def sampled(times: FloatArray, path: Path = path) -> Course:
-            motion = path.motion(times, "")
-            return course_of(body, times, motion.p_WB, motion.v_WB, motion.w_WB)
-
-        shared = [Event(kind, time, time, time) for kind, time in path.events[: len(events)]]
-        bounces_by_route.append(exact_bounces(sampled, shared, bouncing_bodies(body), until))
-    bounces = with_bars(bounces_by_route[0], bounces_by_route[1], SAFETY, _FLOOR)
-    impacts = [event.time for event in events if event.kind in IMPACTS]
-    return [replace(item, time=time) for item, time in zip(bounces, impacts, strict=False)]
 
 
 def _landing(path: Path) -> str:
     """Reason why a path ends at a landing, as a clause."""
-    # A ball that starts in the air has not left the wall.
-    leaves = f"leaves the wall at t = {path.events[-1][1]:.9g} s and " if path.events else ""
     return (
-        f"the ball {leaves}lands at t = {path.end:.9g} s; a restitution law would be needed (restitution of the "
-        "contact), so end the run before it lands"
+        f"the ball leaves the wall at t = {path.events[-1][1]:.9g} s and lands at t = {path.end:.9g} s; a restitution "
+        "law would be needed (restitution of the contact), so end the run before it lands"
     )
 
 
 def with_changes(body: RollingBall, part: float) -> RollingBall:
-    """Ball with friction, rolling resistance, restitution and gravity changed by this relative amount or less.
+    """Ball with friction, rolling resistance and gravity changed by this relative amount or less.
 
-    Zero stays zero, and a restitution of 1 stays 1. The amounts differ, so that two changes cannot cancel.
+    Zero stays zero. The amounts differ, so that two changes cannot cancel.
     """
     contact = body.contact
-
-    def restitution(e: float) -> float:
-        return float(np.clip(e * (1 + part / 3), -1, 1)) if abs(e) < 1 else e
-
     contact = replace(
         contact,
         mu_static=contact.mu_static * (1 + part),
         mu_kinetic=contact.mu_kinetic * (1 + part),
         rolling_resistance=contact.rolling_resistance * (1 - part),
-        restitution=contact.restitution and restitution(contact.restitution),
-        tangential_restitution=restitution(contact.tangential_restitution),
     )
     return replace(body, contact=contact, gravity=body.gravity * (1 - part / 2))
 
@@ -155,7 +127,7 @@ def with_changes(body: RollingBall, part: float) -> RollingBall:
 def _unmoved(body: RollingBall, path_now: Path, pace: float, until: float) -> tuple[int, bool]:
     """See :func:`~proofroll.truth.numerics.conditioning.well_posed_events`; few steps of route 2 near an edge."""
     contact = body.contact
-    if always_pressed(body) and not (body.gap0 or contact.rolling_resistance or np.isfinite(contact.mu_static)):
+    if always_pressed(body) and not (contact.rolling_resistance or np.isfinite(contact.mu_static)):
         return len(path_now.events), True  # nothing can switch
 
     def story(path: Path) -> Story:

@@ -21,7 +21,7 @@ from proofroll.elements.ball_on_surface.mechanics import (
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.truth.ball_on_surface.flight import Rebound, fly, landing_outcome, normal_force_per_mass
+from proofroll.truth.ball_on_surface.flight import fly, normal_force_per_mass
 from proofroll.truth.ball_on_surface.route import BallStretch, End, Path, Route, World
 from proofroll.truth.numerics import hybrid
 from proofroll.truth.numerics.hybrid import Transition
@@ -46,13 +46,11 @@ class Mode:
     Attributes:
         flight: position [m], velocity [m/s] and spin [rad/s] at the start of a flight; None: the ball touches the wall.
         sticking: True if the ball rolls without slip, or rests.
-        slip: velocity of the contact point at the start of a slip [m/s], shape (3,); None: zero.
         rests: nothing moves except a spin about the normal.
     """
 
     flight: World | None = None
     sticking: bool = False
-    slip: FloatArray | None = None
     rests: bool = False
 
 
@@ -68,9 +66,8 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:
     """
     path = hybrid.follow(SwitchedBall(body, route), until)
     events = [(cast(EventKind, event.kind), event.time) for event in path.happenings]
-    blurs = {event.time: event.blur for event in path.happenings if event.blur}
     end = math.inf if path.known else path.stretches[-1].end
-    return Path(list(path.stretches), events, blurs=blurs, end=end, ended=path.ended)
+    return Path(list(path.stretches), events, end=end, ended=path.ended)
 
 
 class SwitchedBall:
@@ -83,16 +80,15 @@ class SwitchedBall:
     def begin(self) -> Transition[Mode]:
         """See the protocol."""
         body, route, state = self.body, self.route, self.route.start()
-        if body.gap0:
-            return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), ())
-        # A route's state lacks an initial slip and the velocity that goes with it; hence ``body.v0``.
-        if resistance_undirected(body, body.v0) and not np.any(body.slip0):
+        if resistance_undirected(body, body.v0):
             if can_rest(body, body.p0):
                 return Transition(state, RESTS, ())
             state = route.nudged(state, setting_off(body, body.p0))
         if normal_force_per_mass(body, body.p0, body.v0) < -_OFF_WALL * natural_acceleration(body):
             return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), ((EventKind.LIFT_OFF, ""),))
-        return self._touching(state, body.slip0 if np.any(body.slip0) else None)
+        if _must_slip(body, route, state):
+            return Transition(state, Mode(), ((EventKind.SLIP, ""),))
+        return Transition(state, ROLLS, ())
 
     def walk(self, time: float, state: FloatArray, mode: Mode, until: float) -> BallStretch:
         """See the protocol."""
@@ -103,7 +99,7 @@ class SwitchedBall:
         elif mode.sticking:
             stretch = self.route.stick(time, state, until)
         else:
-            stretch = self.route.slip(time, state, until, mode.slip)
+            stretch = self.route.slip(time, state, until)
         self._spans = self._spans[1], stretch.end - stretch.start
         return stretch
 
@@ -111,7 +107,7 @@ class SwitchedBall:
         """See the protocol."""
         body, route, state = self.body, self.route, stretch.state
         if stretch.why is End.LANDED:
-            return self._landed(stretch)
+            return Transition(stretch.state, None, ())
         if stretch.why is End.LIFTOFF:
             # ``at_end`` includes the slip, which the state lacks.
             return Transition(route.start(), Mode(flight=stretch.at_end()), ((EventKind.LIFT_OFF, ""),))
@@ -134,26 +130,6 @@ class SwitchedBall:
         if slips != stretch.sticking:
             return Transition(state, Mode() if slips else ROLLS, ())
         return Transition(state, Mode() if slips else ROLLS, ((EventKind.SLIP if slips else EventKind.STICK, ""),))
-
-    def _landed(self, stretch: BallStretch) -> Transition[Mode]:
-        outcome = landing_outcome(self.body, self.route, stretch)
-        if outcome is None:
-            return Transition(stretch.state, None, ())
-        if isinstance(outcome, Rebound):
-            return Transition(
-                stretch.state, Mode(flight=outcome.world), ((EventKind.BOUNCE, ""),) if outcome.seen else ()
-            )
-        state = self.route.at(*outcome.world)
-        state = state if outcome.slip is not None else self.route.nudged(state, outcome.world[1])
-        landing = self._touching(state, outcome.slip)
-        happenings = ((EventKind.SETTLE, ""), *landing.happenings)
-        return Transition(state, landing.mode, happenings, delay=outcome.rest, blur=outcome.blur)
-
-    def _touching(self, state: FloatArray, slip: FloatArray | None) -> Transition[Mode]:
-        """Mode of a ball that starts to touch the wall with the velocity ``slip`` of its contact point [m/s]."""
-        if slip is None and not _must_slip(self.body, self.route, state):
-            return Transition(state, ROLLS, ())
-        return Transition(state, Mode(slip=slip), ((EventKind.SLIP, ""),))
 
 
 def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:

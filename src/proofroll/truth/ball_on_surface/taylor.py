@@ -61,12 +61,6 @@ class SlidingTaylor(Sliding):
     def start(self) -> FloatArray:
         return start(self._body)
 
-    @override
-    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-        u = self._body.surface.locate(p_WB)
-        frame = self._body.surface.frame(u)
-        return np.concatenate([u * self._scales, frame[:, 1:].T @ v_WB, [w_WB @ frame[:, 0]]])
-
     def friction(self, state: FloatArray) -> tuple[float, float]:
         """Needed and available friction, times (1 + κ)/κ over the mass [m/s²]; see :class:`Route`."""
         b2, b3, _, N = self._model.drive(state, self._pars)

@@ -16,6 +16,7 @@ from proofroll.truth.laws.record import Array
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+    from proofroll.elements.mechanism.scene.shapes.walls import Declared
 
 # Contacts of two geometries that are neither a plane nor one contact.
 _SLOTS = {("box", "box"): 24, ("box", "capsule"): 22}
@@ -35,6 +36,8 @@ class SurfaceShape(NamedTuple):
     frame: Array
     ring: float
     slope: float
+    surface: Declared | None = None
+    metre: float = 1.0
 
     @property
     def bend(self) -> float:
@@ -77,6 +80,8 @@ def shape_of(geometry: Geometry) -> SurfaceShape:
         frame=of_angles(np.array(geometry.orientation)),
         ring=geometry.ring_radius or 0.0,
         slope=geometry.slope or 0.0,
+        surface=getattr(geometry, "surface", None),
+        metre=getattr(geometry, "metre", 1.0),
     )
 
 
@@ -124,6 +129,8 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair], index: di
 def near(shape: SurfaceShape, x: Array) -> tuple[Array, Array]:  # noqa: PLR0911 -- one rule for each kind of shape
     """Distance of places from a shape [m], negative in its material, and its gradient; NaN where it is not smooth."""
     y, none = x - shape.centre, np.full(x.shape, np.nan)
+    if shape.surface is not None:
+        return shape.surface.gap(x / shape.metre) * shape.metre, -shape.surface.normal(x / shape.metre)
     if shape.kind == "plane":
         return dot(y, shape.axis), np.broadcast_to(shape.axis, x.shape)
     if shape.kind in {"sphere", "bowl"}:

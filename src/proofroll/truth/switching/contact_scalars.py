@@ -238,5 +238,6 @@ def _two_shafts(shaft_a: Shaft, a: ScalarMotion, shaft_b: Shaft, b: ScalarMotion
 def known_shapes(contact: BodyContact) -> bool:
     """True if both shapes have a rule here."""
     rules = SphereShape | EllipsoidShape | CircleShape | HalfSpace | CurvedWall
-    simple = isinstance(contact.shape_a, rules) and isinstance(contact.shape_b, rules)
+    shapes = contact.shape_a, contact.shape_b
+    simple = all(isinstance(shape, rules) and getattr(shape, "has_formula", True) for shape in shapes)
     return simple or contact.features is not None

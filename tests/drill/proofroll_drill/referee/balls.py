@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.element import BallOnSurface
-
 from .extrapolation import Long, one_step, tight_step
 from .linear_algebra import long, turn
+from .random_balls import RandomBall
 
 _LONGEST = 0.02  # s
 _NEAR_STOP = 0.4  # of the time that a slip still takes, the most that a step makes of it: no friction is reversed in it
@@ -46,7 +45,7 @@ class Told:
 class BallReferee:
     """One ball, from its start on."""
 
-    def __init__(self, element: BallOnSurface) -> None:
+    def __init__(self, element: RandomBall) -> None:
         self.element, contact = element, element.contact
         self.a, self.k = long(element.ball.radius), long(element.ball.inertia_ratio)
         self.g, self.mass = long(element.gravity.vector), long(element.ball.mass)
@@ -55,7 +54,7 @@ class BallReferee:
         self._wall: Callable[[Long], tuple[Any, Long, Long]] = getattr(self, f"_{element.surface.kind}")
         self.W = long([0, 0, 0])
         if element.surface.kind == "plane":
-            self.W = long(element.surface.turning) * self._tilted()[2]  # type: ignore[attr-defined]  # a plane has it
+            self.W = long(element.surface.turning) * self._tilted()[2]
 
     def start(self) -> Long:
         """Centre, velocity, spin and orientation, one after the other."""
@@ -239,7 +238,7 @@ class BallReferee:
 
     def _tilted(self) -> Long:
         """World components of the axes of a wall that is turned about y, as rows."""
-        return turn((0, 1, 0), long(self.element.surface.tilt)).T  # type: ignore[attr-defined]  # those that are have it
+        return turn((0, 1, 0), long(self.element.surface.tilt)).T
 
     def _plane(self, p: Long) -> tuple[Any, Long, Long]:
         up = self._tilted()[2]
@@ -274,12 +273,12 @@ class BallReferee:
         return self._radius() * e1, e1, e2, np.cross(e1, e2)
 
     def _cone(self, p: Long) -> tuple[Any, Long, Long]:
-        slope, out = long(self.element.surface.slope), _outward(p)  # type: ignore[attr-defined]  # a cone has it
+        slope, out = long(self.element.surface.slope), _outward(p)
         e1, around = np.sin(slope) * out - np.cos(slope) * _Z, np.cross(_Z, out)
         return -(e1 @ p) - self.a, e1, np.sin(slope) / (p @ out) * np.outer(around, around)
 
     def _cone_at(self, angle: Any, way: Any) -> tuple[Long, Long, Long, Long]:
-        slope = long(self.element.surface.slope)  # type: ignore[attr-defined]  # a cone has it
+        slope = long(self.element.surface.slope)
         out = np.array([np.cos(angle), np.sin(angle), 0 * angle])
         along = np.cos(slope) * out + np.sin(slope) * _Z
         e1 = np.sin(slope) * out - np.cos(slope) * _Z
@@ -287,21 +286,21 @@ class BallReferee:
 
     def _torus(self, p: Long) -> tuple[Any, Long, Long]:
         wall, out = self.element.surface, _outward(p)
-        d = p - long(wall.ring_radius) * out  # type: ignore[attr-defined]  # a torus has it
+        d = p - long(wall.ring_radius) * out
         r, around = np.sqrt(d @ d), np.cross(_Z, out)
         along = np.cross(around, d / r)
         bend = -np.outer(along, along) / r - (d @ out) / r / (p @ out) * np.outer(around, around)
-        return r - long(wall.wire_radius) - self.a, -d / r, bend  # type: ignore[attr-defined]
+        return r - long(wall.wire_radius) - self.a, -d / r, bend
 
     def _torus_at(self, angle: Any, around: Any) -> tuple[Long, Long, Long, Long]:
         wall = self.element.surface
         out = np.array([np.cos(angle), np.sin(angle), 0 * angle])
         away = np.sin(around) * out + np.cos(around) * _Z
-        p = long(wall.ring_radius) * out + (long(wall.wire_radius) + self.a) * away  # type: ignore[attr-defined]
+        p = long(wall.ring_radius) * out + (long(wall.wire_radius) + self.a) * away
         return p, -away, np.cross(_Z, out), np.cos(around) * out - np.sin(around) * _Z
 
     def _radius(self) -> Any:
-        return long(self.element.surface.radius) - self.a  # type: ignore[attr-defined]  # round walls have it
+        return long(self.element.surface.radius) - self.a
 
 
 def _outward(p: Long) -> Long:

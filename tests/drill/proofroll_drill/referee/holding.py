@@ -12,7 +12,6 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.events import JUMPS, events_of
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.dynamics.record import Record
@@ -26,7 +25,7 @@ from proofroll.truth.switched_truth import truth_of
 from .balls import BallReferee
 from .contacts import ContactReferee, Told
 from .linear_algebra import long
-from .random_balls import random_ball
+from .random_balls import RandomBall, random_ball
 from .random_contacts import random_contacts
 from .random_mechanisms import random_mechanism
 from .solver import Referee
@@ -87,9 +86,7 @@ def hold(seed: int, until: float = UNTIL) -> Held:
 
 def hold_ball(seed: int, until: float = UNTIL_OF_BALLS) -> Held:
     """The truth of a random ball as a body against the referee's, as far as that goes; events too, within brackets."""
-    style, scene = random_ball(seed)
-    (element,) = scene.elements
-    assert isinstance(element, BallOnSurface)
+    style, element = random_ball(seed)
     times = np.linspace(0, until, 6)
     told = BallReferee(element).run(times.astype(np.longdouble))
     does = " ".join([*(kind for kind, _ in told.events), *["bounce"] * len(told.bounces), told.why])
@@ -127,7 +124,7 @@ def hold_ball(seed: int, until: float = UNTIL_OF_BALLS) -> Held:
     return Held(seed, style, does, said, worst, 0)
 
 
-def as_body(element: BallOnSurface) -> Scene:
+def as_body(element: RandomBall) -> Scene:
     """Scene of a ball as a body with a sphere that touches a wall."""
     placed = PlacedBall(element.ball, element.surface, element.contact, element.start)
     return Scene("random_ball", "", (ball_as_body(placed, element.gravity, "random"),))

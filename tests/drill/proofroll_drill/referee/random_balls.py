@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.gravity import Gravity
-from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Cylinder, Plane, Torus
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 
@@ -16,8 +15,19 @@ WALLS = ("plane", "cylinder", "bowl", "cone", "torus")
 STYLES = ("rolls", "resisted", "may slip", "starts slipping", "falls")
 
 
-def random_ball(seed: int) -> tuple[str, Scene]:
-    """A wall with a style, and a scene of it, the same for the same number."""
+@dataclass(frozen=True)
+class RandomBall:
+    """A ball with its wall, the law of their contact, its start, and gravity."""
+
+    ball: Ball
+    surface: Any
+    contact: Contact
+    start: InitialMotion
+    gravity: Gravity
+
+
+def random_ball(seed: int) -> tuple[str, RandomBall]:
+    """A wall with a style, and a ball on it, the same for the same number."""
     rng = np.random.default_rng(seed)
     wall, style = WALLS[seed % len(WALLS)], STYLES[seed // len(WALLS) % len(STYLES)]
     radius = float(rng.uniform(0.02, 0.1))
@@ -38,10 +48,8 @@ def random_ball(seed: int) -> tuple[str, Scene]:
         law["restitution"] = float(rng.choice([0.0, rng.uniform(0.2, 0.9)]))
         law["tangential_restitution"] = float(rng.uniform(-0.5, 0.9))
     ball = Ball("ball", radius, float(rng.uniform(0.1, 2)), float(rng.choice([0.4, 2 / 3, rng.uniform(0.1, 0.9)])))
-    element = BallOnSurface(
-        ball, surface, Contact("ball", "wall", **law), InitialMotion("ball", coordinates, **start), gravity
-    )
-    return f"{wall} {style}", Scene("random_ball", "", (element,), asks=("orientation",) if seed % 2 else ())
+    contact, motion = Contact("ball", "wall", **law), InitialMotion("ball", coordinates, **start)
+    return f"{wall} {style}", RandomBall(ball=ball, surface=surface, contact=contact, start=motion, gravity=gravity)
 
 
 def _wall(rng: Any, kind: str, radius: float, *, moves: bool) -> tuple[Any, tuple[float, float], Gravity]:

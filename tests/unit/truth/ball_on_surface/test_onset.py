@@ -92,16 +92,6 @@ def test_no_slip_and_slip_at_once() -> None:
     assert onset(cylinder(mu_static=0.01), 4.0).time == 0.0
 
 
-def test_a_start_that_slips() -> None:
-    """A ball that is started slipping slips at once, whatever its friction, where that of rolling would never do."""
-    scene = load_scene("slide_to_roll")
-    found = onset(scene, 1.0, uncertainty=0.5)
-    assert (found.time, found.by_mu, found.earliest, found.latest, found.verdict) == (0.0, None, 0.0, 0.0, "well-posed")
-    assert first_slip(scene, 1.0) == 0.0
-    _, events = stick_slip(scene, np.array([0.0, 0.1]))
-    assert (events[0].kind, events[0].time) == ("slip", 0.0)
-
-
 def test_curve_against_closed_form() -> None:
     """Without resistance the needed friction is (g c / V0²)(1 - (5/7) cos νt) and its only edge is its crest."""
     body = rolling_ball(cylinder(rolling_resistance=0.0))

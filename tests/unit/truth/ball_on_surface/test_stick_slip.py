@@ -13,12 +13,9 @@ import xarray as xr
 from proofroll import load_scene
 from proofroll.core.dataset import ENDED
 from proofroll.core.events import Event, events_of
-from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.surfaces import Plane
-from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.truth.ball_on_surface import implicit, taylor
 from proofroll.truth.ball_on_surface import stick_slip as module
 from proofroll.truth.ball_on_surface.contact import ContactRates
@@ -277,26 +274,6 @@ def test_disagreement_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     assert dataset.attrs["ill_posed"].endswith("the two routes to the truth disagree about it")
 
 
-@pytest.mark.parametrize("ratio", [0.05, 0.1])
-def test_a_slip_whose_direction_still_turns_ends_in_time(ratio: float) -> None:
-    """A ball that slips across an incline stops to slip after c |u| / (c² - b²), c and b what friction and weight do.
-
-    Both routes once took the rest of a slip for straight too early, by the same 1e-9 of their pace: no difference told.
-    """
-    k, mu, slip = 0.4, 0.5, 0.01
-    tilt = float(np.arctan(ratio * (1 + 1 / k) * mu))
-    c, b = (1 + 1 / k) * mu * 9.81 * np.cos(tilt), 9.81 * np.sin(tilt)
-    start = InitialMotion("ball", (0.0, 0.0), velocity=(0.0, 0.0), spin=0.0, tangential_spin=(slip / 0.1, 0.0))
-    contact = Contact("ball", "wall", mu_static=mu, mu_kinetic=mu)
-    ball = BallOnSurface(Ball("ball", 0.1, 1.0, k), Plane("wall", tilt), contact, start, Gravity(9.81, (0, 0, -1)))
-    body, stops = rolling_ball(Scene("across", "", (ball,))), c * slip / (c**2 - b**2)
-    for route in (Polar(body), first_route(body), Implicit(body)):
-        assert events(route, Scene("across", "", (ball,)), 2 * stops)[1] == (
-            "stick",
-            pytest.approx(stops, rel=3e-12, abs=0),
-        )
-
-
 EPS = float(np.finfo(float).eps)
 
 
@@ -386,13 +363,3 @@ def test_a_long_stretch_is_handed_to_a_compiled_series(monkeypatch: pytest.Monke
     whole, handed = (path.motion(times, "") for path in paths)
     for name in ("p_WB", "v_WB", "w_WB", "force"):
         np.testing.assert_allclose(getattr(handed, name), getattr(whole, name), rtol=1e-10, atol=1e-10)
-
-
-def test_a_ball_that_spins_on_the_spot_sets_off_against_resistance() -> None:
-    """Friction and resistance end its slip after aω / (7/2 μ g + f g / (k a)); it was taken to rest, and ill-posed."""
-    scene = load_scene("slide_to_roll", speed=0.0, back_spin=10.0, rolling_resistance=1e-4)
-    found = truth(scene, np.linspace(0, 0.1, 3))
-    sticks = 0.25 / (3.5 * 0.2 * 9.81 + 1e-4 * 9.81 / (0.4 * 0.025))
-    assert "ill_posed" not in found.attrs
-    assert [event.kind for event in events_of(found)] == ["slip", "stick"]
-    assert events_of(found)[1].time == pytest.approx(sticks, rel=1e-10)

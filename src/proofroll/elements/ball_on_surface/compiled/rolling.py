@@ -145,8 +145,8 @@ def reduced(resistance: bool, tolerance: float) -> CompiledEquations:
 
 
 def supports(body: RollingBall) -> bool:
-    """True if the expressions hold on the scene's surface and the wall does not move."""
-    return isinstance(body.surface, (Cylinder, Plane)) and body.wall_rate is None
+    """True if the expressions hold on the scene's surface."""
+    return isinstance(body.surface, (Cylinder, Plane))
 
 
 def parameters(body: RollingBall) -> list[float]:

@@ -84,8 +84,6 @@ def reported_force(evidence: Evidence) -> Iterator[Cause]:
     pair, body = run_and_truth(evidence), evidence.element.rolling
     if pair is None or "N" not in pair[0] or "N" not in pair[1] or CLOCK.proven(evidence):
         return
-    if body.flies:  # its force comes and goes: a late impact must not be taken for a force that is reported late
-        return
     run, truth = pair
     time, axes = truth["time"].to_numpy(), frames(body, truth)
     reported, true = forces(body, run), forces(body, truth)

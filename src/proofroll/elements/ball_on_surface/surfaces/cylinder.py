@@ -39,7 +39,6 @@ class Cylinder:
     coordinates = ("gamma", "z")
     units = ("rad", "m")
     periods = (2 * np.pi, None)
-    wall_rate = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         require_bounds("radius", self.radius, above=0)

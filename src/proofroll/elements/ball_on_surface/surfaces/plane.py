@@ -43,11 +43,6 @@ class Plane:
         require_bounds("turning", self.turning)
 
     @property
-    def wall_rate(self) -> tuple[float, float, float]:
-        """See :class:`Surface`."""
-        return components(-self.turning * self._axes[:, 0])
-
-    @property
     def generators(self) -> tuple[Generator, Generator]:
         """See :class:`Surface`."""
         frame = self._axes
@@ -82,7 +77,7 @@ class Plane:
 
     def offset(self, ball_radius: float) -> Plane:
         """See :class:`Surface`."""
-        return Plane(self.name, self.tilt, self.height + ball_radius, self.turning)
+        return Plane(self.name, self.tilt, self.height + ball_radius)
 
     def position(self, u: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""

@@ -68,10 +68,6 @@ class Surface(Protocol):
     def generators(self) -> tuple[Generator, Generator] | None:
         """Motions G1, G2 with p(u) = G1(u1) G2(u2) p(0), likewise frame(u); None for an inhomogeneous surface."""
 
-    @property
-    def wall_rate(self) -> tuple[float, float, float]:
-        """Angular velocity W of the wall about the world's origin, with which it moves along itself [rad/s]."""
-
     def offset(self, ball_radius: float) -> Surface:
         """Surface on which the centre of a touching ball of this radius [m] moves."""
 

@@ -14,7 +14,7 @@ from proofroll.elements.mechanism.scene.checks import WORLD
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, SLIDING, JointKind
 from proofroll.elements.mechanism.scene.rotations import frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Shape, SphereShape, Wall
-from proofroll.elements.mechanism.scene.shapes.walls import BowlWall, CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls import BowlWall, CurvedWall, Declared, DeclaredWall
 from proofroll.report.pen import Drawing, View, across, circle, unit
 
 _SIZE = 240.0  # size of the mechanism in the picture [px]
@@ -113,6 +113,9 @@ def _shapes(picture: Drawing, view: View, element: MechanismElement) -> None:
                 outline = middle + _PATCH * _reach(element) * np.array([x + y, y - x, -x - y, x - y, x + y])
             elif isinstance(shape, BowlWall) and _is_vertex(contact.shape_a, contact.shape_b):  # a cable
                 outline = np.stack([p + R @ shape.point, touch.place])
+            elif isinstance(shape, DeclaredWall):
+                _coordinate_lines(picture, view, shape.surface, touch.place)
+                continue
             elif isinstance(shape, CurvedWall):  # the circle about its axis through the contact
                 axis, foot = R @ shape.axis, p + R @ shape.point
                 middle = foot + axis * (axis @ (touch.place - foot))
@@ -134,6 +137,14 @@ def _shapes(picture: Drawing, view: View, element: MechanismElement) -> None:
         hull = _hull(np.array([com, *np.concatenate(paths)]))
         if len(paths) > 1 or np.any(np.all(hull == com, axis=1)):  # else the body is drawn by its only shape
             picture.path(hull, "line")
+
+
+def _coordinate_lines(picture: Drawing, view: View, surface: Declared, place: FloatArray) -> None:
+    """Draws the two lines of coordinates of a surface through a place on it."""
+    for column, (low, high) in enumerate(surface.domain):
+        u = np.tile(surface.locate(place), (_OUTLINE, 1))
+        u[:, column] = np.linspace(low, high, _OUTLINE)
+        picture.path(np.asarray(view(surface.position(u))), "hidden")
 
 
 def _is_vertex(*shapes: Shape) -> bool:

@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.run.contacts.observables import SLIDES
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.scene.checks import WORLD, ZERO, Vector
 from proofroll.elements.mechanism.scene.joint_kinds import SLIDING, JointKind
-from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, Geometry
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, DeclaredGeometry, Geometry
 from proofroll.elements.mechanism.scene.shapes.shapes import SphereShape, Wall
 from proofroll.files.json_data import plain
 from proofroll.report.labels import symbol, unit
@@ -117,7 +117,8 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
         "joints": [{"body": index[body], "at": position} for _, body, position in joints],
         "contacts": len(touching),
         "slips": SLIDES * element.speed,
-        "shapes": [_shape(geometry, index[geometry.body], element, com) for geometry in mechanism.geometries],
+        "shapes": [_shape(geometry, index[geometry.body], element, com) for geometry in mechanism.geometries
+                   if not isinstance(geometry, DeclaredGeometry)],
         "springs": [[index[s.body_a], s.position_a, index[s.body_b], s.position_b] for s in mechanism.links]
                    + [[index[j.parent], j.position, index[j.child], j.child_position]
                       for j in mechanism.joints if j.kind in {*SLIDING, JointKind.PLANAR}],

@@ -25,9 +25,9 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.parts import Body
 from proofroll.elements.mechanism.scene.rotations import Array, cross
-from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair, declared_wall
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, Declared
 from proofroll.elements.mechanism.scene.shapes.walls.charts import WallCoordinates, wall_coordinates
 from proofroll.elements.mechanism.scene.signal import Formula
 
@@ -166,6 +166,8 @@ def wall_name(placed: PlacedBall) -> str:
 def _wall(placed: PlacedBall) -> tuple[Geometry, float]:
     """Shape of a surface, and the rate at which it turns about its axis [rad/s]."""
     surface, name = placed.surface, wall_name(placed)
+    if isinstance(surface, Declared):
+        return declared_wall(name, surface), 0.0
     turning, tilt = float(getattr(surface, "turning", 0.0)), float(getattr(surface, "tilt", 0.0))
     body, axis = name if turning else WORLD, (math.sin(tilt), 0.0, math.cos(tilt))
     match surface.kind:
@@ -216,7 +218,7 @@ def _free_joint(placed: PlacedBall, wall: Geometry, turning: float) -> Joint:
 
 
 def _initial(
-    on_wall: WallCoordinates, radius: float, start: InitialMotion, rate: Array
+    on_wall: WallCoordinates | Declared, radius: float, start: InitialMotion, rate: Array
 ) -> tuple[Array, Array, Array, bool]:
     """Centre, velocity and spin at the start [SI], and whether the ball slips on a wall that turns at a ``rate``."""
     u0 = np.asarray(start.coordinates, dtype=np.float64)

@@ -1,14 +1,12 @@
 """Drawings of a ball with symbols: its contact enlarged, and the whole scene by the kind of its wall."""
 
-import itertools
 from functools import singledispatch
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
-from proofroll.report.labels import symbol
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
 from proofroll.report.pen import Drawing, View, across, circle, turn, unit
 
 _BALL = 84.0  # radius of the ball [px]
@@ -95,7 +93,6 @@ def _forward(body: RollingBall) -> FloatArray:
 
 _SIZE = 128.0  # half the width of the drawn part of a wall [px]
 _LEVEL = 0.02  # angles below this have no arc [rad]
-_LINES, _FINE = 13, 61  # lines of a net along each coordinate, and points of each
 
 
 @singledispatch
@@ -166,39 +163,6 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
     drawn.text(rim[-1], "a", beside=(-6.0, -2.0))
     drawn.gravity(view, body.gravity, view(-1.15 * size * view.right))
     return [drawn, contact(body, (-0.42, 0.4, 0.8), (-1, 0, 0))]
-
-
-@overview.register
-def _net(wall: Declared, body: RollingBall) -> list[Drawing]:
-    """Drawings of coordinate lines over the whole domain, with the ball at its start and its velocity."""
-    (low, high), (lowest, highest) = wall.domain
-    middle = wall.position(wall.places())
-    size = 0.5 * float(np.max(np.ptp(middle, axis=0)))
-    centre = (middle.min(axis=0) + middle.max(axis=0)) / 2
-    drawn, view = Drawing(), View(_direction(-62, 32), (0, 0, 1), _SIZE / size)
-
-    def line(u1: FloatArray, u2: FloatArray) -> None:
-        points = wall.position(np.stack(np.broadcast_arrays(u1, u2), axis=-1))
-        looks = np.where(view.towards(wall.normal(points)) > 0, "hidden", "line")  # seen from behind
-        cuts = [0, *(1 + np.flatnonzero(looks[1:] != looks[:-1])).tolist(), len(looks) - 1]
-        for start, end in itertools.pairwise(cuts):
-            if end > start:
-                drawn.path(view(points[start : end + 1] - centre), str(looks[start]))
-
-    for value in np.linspace(low, high, _LINES):
-        line(np.full(1, value), np.linspace(lowest, highest, _FINE))
-    for value in np.linspace(lowest, highest, _LINES):
-        line(np.linspace(low, high, _FINE), np.full(1, value))
-    start, frame = body.p0 - centre, body.surface.frame(body.u0)
-    foot = start + body.ball.radius * frame[:, 0]
-    for name, tangent in zip(body.surface.coordinates, frame[:, 1:].T, strict=True):
-        drawn.vector(view([foot, foot + 0.45 * size * tangent]), "thin", symbol(name), by=14.0)
-    speed = float(np.linalg.norm(body.v0))
-    if speed:
-        drawn.vector(view([start, start + 0.4 * size * body.v0 / speed]), "motion", "v")
-    drawn.disc(view(start).tolist(), body.ball.radius * view.scale, "ball")
-    drawn.gravity(view, body.gravity, view(-1.25 * size * view.right))
-    return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1) if abs(frame[2, 0]) < 0.9 else (-1, 0, 0))]
 
 
 def _slope(drawn: Drawing, view: View, low: FloatArray, high: FloatArray) -> None:

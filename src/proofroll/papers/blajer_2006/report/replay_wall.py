@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Declared
 
 # Divisions of a periodic coordinate, and number of divisions between drawn lines (30 degrees).
 _ROUND, _ROUND_LINES = 72, 6
@@ -43,7 +42,6 @@ def wall(body: RollingBall, u: FloatArray) -> Wall:
     """
     # Coordinates of the wall and of the centre's surface may differ at opposite points.
     u = body.wall.locate(body.surface.position(u))
-    domain = body.wall.domain if isinstance(body.wall, Declared) else ((-math.inf, math.inf),) * 2
     grids: list[npt.NDArray[np.floating]] = []
     every = []
     for column, (period, scale) in enumerate(zip(body.surface.periods, body.surface.length_scales, strict=True)):
@@ -53,7 +51,6 @@ def wall(body: RollingBall, u: FloatArray) -> Wall:
             continue
         margin = _MARGIN * body.ball.radius / scale
         low, high = float(u[:, column].min()) - margin, float(u[:, column].max()) + margin
-        low, high = max(low, domain[column][0]), min(high, domain[column][1])
         step = _round_step(max(2 * body.ball.radius / scale, (high - low) / _MOST_LINES))
         grids.append(np.arange(math.floor(low / step), math.ceil(high / step) + 1) * step)
         every.append(1)

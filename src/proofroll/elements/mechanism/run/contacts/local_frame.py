@@ -19,7 +19,7 @@ from proofroll.core.observable import Observable, Role
 from proofroll.core.whole_turns import doubt
 from proofroll.elements.mechanism.run.contacts.audits import energy_balance, force_audit, rate_audit
 from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, OnWall, slip_velocity, wall_velocity
-from proofroll.elements.mechanism.run.contacts.stretches import DEGREE, ENDS, FORCES, with_sticking
+from proofroll.elements.mechanism.run.contacts.stretches import DEGREE, ENDS, FORCES, held_in_flight, with_sticking
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -257,7 +257,7 @@ def local_observables(body: BodyOnWall, acceleration: FloatArray) -> tuple[Obser
     """Observables of a ball of a mechanism, whose bodies start with accelerations [m/s²], shape (bodies, 3)."""
     g, size = np.linalg.norm(body.gravity), np.linalg.norm(acceleration[body.index])
     weight = float(max(g, size)) if np.isfinite(size) else float(g)
-    return table(body, weight or 1.0, body.surface.chart.scales(*body.u0.tolist()))
+    return table(body, weight or 1.0, body.surface.scales(*body.u0.tolist()))
 
 
 def local_bars(body: BodyOnWall, dataset: xr.Dataset, bars: Mapping[str, float]) -> dict[str, float]:
@@ -300,5 +300,6 @@ def local_sizes(body: BodyOnWall, truth: xr.Dataset) -> dict[str, float]:
 
 
 def _of_ball(body: BodyOnWall, dataset: xr.Dataset) -> xr.Dataset:
-    """The motion of the ball alone, with ``sticking`` where its events show it."""
-    return with_sticking(body, dataset.isel(body=body.index))
+    """The motion of the ball alone, with ``sticking`` where its events show it, and held where it should never fly."""
+    motion = with_sticking(body, dataset.isel(body=body.index))
+    return motion if body.flies else held_in_flight(motion)

@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.scene.checks import WORLD, ZERO
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, Declared
 from proofroll.elements.mechanism.scene.shapes.walls.charts import WallCoordinates, wall_coordinates
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class BodyOnWall:
 
     ball: Ball
     contact: Contact
-    surface: WallCoordinates
+    surface: WallCoordinates | Declared
     gravity: FloatArray
     u0: FloatArray
     v0: FloatArray
@@ -216,7 +216,7 @@ def _law(contact: BodyContact, ball: str, wall: str) -> Contact:
     )
 
 
-def _turning(mechanism: Mechanism, carrier: str, surface: WallCoordinates) -> FloatArray | None:
+def _turning(mechanism: Mechanism, carrier: str, surface: WallCoordinates | Declared) -> FloatArray | None:
     """Rate at which a wall turns along itself [rad/s], shape (3,); None: it moves in another way."""
     if carrier == WORLD:
         return np.zeros(3)

@@ -39,6 +39,18 @@ def with_sticking(body: OnWall, dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(sticking=("time", sticks))
 
 
+def held_in_flight(dataset: xr.Dataset) -> xr.Dataset:
+    """The run with no gap and no slip from each lift-off to the next impact: in flight they are no errors."""
+    if "event_kind" not in dataset:
+        return dataset
+    kinds = {EventKind.LIFT_OFF: True, EventKind.IMPACT: False, EventKind.BOUNCE: True, EventKind.SETTLE: False}
+    changes = [(event.time, kinds[EventKind(event.kind)]) for event in events_of(dataset) if event.kind in kinds]
+    reached = np.searchsorted([time for time, _ in changes], dataset["time"].to_numpy(), side="right")
+    flies = np.array([False, *(flies for _, flies in changes)])[reached]
+    held = {name: dataset[name].where(~flies, 0.0) for name in ("gap", "slip", "slip2", "slip3")}
+    return dataset.assign({name: values.assign_attrs(dataset[name].attrs) for name, values in held.items()})
+
+
 def stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
     """Parts of a run between its events that have enough samples for the splines."""
     t = dataset["time"].to_numpy()

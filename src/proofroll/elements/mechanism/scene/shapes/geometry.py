@@ -6,9 +6,10 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, cast
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
@@ -29,7 +30,16 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
     Shape,
     SphereShape,
 )
-from proofroll.elements.mechanism.scene.shapes.walls import Bore, BowlWall, ConeWall, CurvedWall, Shaft, TorusWall
+from proofroll.elements.mechanism.scene.shapes.walls import (
+    Bore,
+    BowlWall,
+    ConeWall,
+    CurvedWall,
+    Declared,
+    DeclaredWall,
+    Shaft,
+    TorusWall,
+)
 
 GeometryKind = Literal[
     "sphere", "ellipsoid", "circle", "plane", "box", "capsule", "cylinder", "bore", "shaft", "bowl", "cone", "torus"
@@ -189,6 +199,39 @@ class Geometry:
         if self.kind == "torus":
             return TorusWall(point, axis, self.ring_radius or 0.0, self.radius or 0.0)
         return {"bore": Bore, "shaft": Shaft, "bowl": BowlWall}[self.kind](point, axis, self.radius or 0.0)
+
+
+@dataclass(frozen=True)
+class DeclaredGeometry(Geometry):
+    """A wall at rest in the world that the class of a package describes; files name it in ``[[surfaces]]`` alone.
+
+    Attributes:
+        surface: in metres.
+        metre: a metre in the unit of length of the mechanism.
+    """
+
+    surface: Declared | None = None
+    metre: float = field(default=1.0, metadata=METRES)
+
+    @override
+    def __post_init__(self) -> None:
+        checks.name(self.name, "geometries")
+
+    @cached_property
+    @override
+    def frame(self) -> Array:
+        return read_only(np.eye(3))
+
+    @cached_property
+    @override
+    def shapes(self) -> tuple[Shape, ...]:
+        assert self.surface is not None  # by `declared_wall`
+        return (DeclaredWall(np.zeros(3), np.array(Z), self.surface, self.metre),)
+
+
+def declared_wall(name: str, surface: Declared) -> Geometry:
+    """Geometry of a declared surface."""
+    return DeclaredGeometry(name, WORLD, cast(GeometryKind, "declared"), surface=surface)
 
 
 @dataclass(frozen=True)

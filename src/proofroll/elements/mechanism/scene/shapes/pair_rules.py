@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, GeometryKind, Pair
 
 # Walls that a sphere alone touches; all but a bowl have an axis.
-CURVED = ("bore", "shaft", "bowl", "cone", "torus")
+CURVED = ("bore", "shaft", "bowl", "cone", "torus", "declared")
 # Bodies of finite size with faces, edges, sides or ends, of which the nearest touches.
 _SOLID = frozenset({"box", "capsule", "cylinder"})
 # Room of a sphere in a wall, relative to the wall's radius, that counts as none: digits of a file.

@@ -20,6 +20,7 @@ from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.scene.rotations import Array, from_z
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Wall
 from proofroll.elements.mechanism.scene.shapes.walls.curved import CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls.declared import Declared, DeclaredWall
 from proofroll.elements.mechanism.scene.shapes.walls.formula import cos, differentiated, sin
 from proofroll.elements.mechanism.scene.shapes.walls.of_revolution import Bore, BowlWall, ConeWall, Shaft, TorusWall
 
@@ -258,6 +259,10 @@ class WallCoordinates:
         e1, e2 = self.normal(self.position(u)), tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
         return np.stack([e1, e2, cross(e1, e2)], axis=-1)
 
+    def scales(self, u1: float, u2: float) -> tuple[float, float]:
+        """Way per unit of each coordinate at a place [m/unit]."""
+        return self.chart.scales(u1, u2)
+
     def locate(self, p_WB: npt.ArrayLike) -> Array:
         """Coordinates of the nearest centre that touches, shape (..., 2); angles in (-π, π]."""
         return np.stack(self.chart.locate(*self._local(p_WB)), axis=-1)
@@ -293,7 +298,7 @@ class WallCoordinates:
 
 def wall_coordinates(
     wall: Wall, radius: float, turned: Array | None = None, moved: Array | None = None
-) -> WallCoordinates:
+) -> WallCoordinates | Declared:
     """Coordinates of the centres of spheres of a radius [m] that touch a wall.
 
     Args:
@@ -303,8 +308,10 @@ def wall_coordinates(
         moved: its origin in the world [m], shape (3,); None: not moved.
 
     Raises:
-        InputError: no coordinates of such a wall are known.
+        InputError: no coordinates of such a wall are known, or a sphere has no room in it.
     """
+    if isinstance(wall, DeclaredWall):
+        return wall.surface.offset(radius)
     rotation, origin = np.eye(3) if turned is None else turned, np.zeros(3) if moved is None else moved
     if isinstance(wall, HalfSpace):
         return WallCoordinates(OnPlane(radius), origin + rotation @ wall.point, rotation @ wall.normal)

@@ -41,6 +41,11 @@ class CurvedWall:
 
     kind: ClassVar[str]
 
+    @property
+    def has_formula(self) -> bool:
+        """True if :meth:`away` is a formula; if not, :meth:`near` searches the nearest point."""
+        return True
+
     def away(self, x: Any, y: Any, z: Any) -> Any:
         """Distance of a place from the wall [m], in the wall's axes; z is ``axis``.
 

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounds import OutOfBounds, require_bounds
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.surfaces.declared import Declared
-from proofroll.elements.ball_on_surface.surfaces.formula import Jet, cos, sin, sqrt, variables
-from proofroll.elements.mechanism.scene.shapes.walls.of_revolution import cone_distance, ring_distance
+from proofroll.elements.mechanism.scene.shapes.walls.declared import Declared
+from proofroll.elements.mechanism.scene.shapes.walls.formula import Jet, cos, sin, sqrt, variables
 
 # Number of start points along a curve for the search of the nearest point, of Newton steps, and relative tolerance.
 _PLACES, _NEWTON, _ROUND_OFF = 65, 30, 1e-15
@@ -146,99 +143,3 @@ class Parallel(Revolved):
     @override
     def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
         return self.of.along(r, z)
-
-
-@dataclass(frozen=True)
-class Cone(Revolved):
-    """Inside of a cone that opens upwards; coordinates are the angle about its axis and the distance from its tip.
-
-    Attributes:
-        name: used by contacts.
-        kind: name of the surface in scene files.
-        slope: of the wall from the horizontal [rad].
-        length: from the tip to the rim, along the wall [m]; only for drawings and checks.
-        tip: height of the tip [m]; 0 for the wall itself.
-    """
-
-    name: str
-    slope: float = field(metadata={"unit": "rad"})
-    length: float = field(default=1.0, metadata={"unit": "m"})
-    tip: float = field(default=0.0, metadata={"unit": "m"})
-    kind: Literal["cone"] = "cone"
-
-    coordinates = ("gamma", "s")
-
-    def __post_init__(self) -> None:
-        require_bounds("slope", self.slope, above=0)
-        if not self.slope < math.pi / 2:
-            raise OutOfBounds("slope", self.slope, "the value must be below a right angle")
-        require_bounds("length", self.length, above=0)
-        require_bounds("tip", self.tip)
-
-    @property
-    @override
-    def extent(self) -> tuple[float, float]:
-        return 0.0, self.length
-
-    @override
-    def offset(self, ball_radius: float) -> Cone:
-        return dataclasses.replace(self, tip=self.tip + ball_radius / math.cos(self.slope))
-
-    @override
-    def profile(self, s: Any) -> tuple[Any, Any]:
-        return s * math.cos(self.slope), s * math.sin(self.slope) + self.tip
-
-    @override
-    def away(self, r: Any, z: Any) -> Any:
-        return cone_distance(self.slope, r, z - self.tip)
-
-    @override
-    def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
-        return np.asarray(r * math.cos(self.slope) + (z - self.tip) * math.sin(self.slope))
-
-
-@dataclass(frozen=True)
-class Torus(Revolved):
-    """Outside of a ring of round wire; coordinates are the angle about its axis and that around the wire.
-
-    Attributes:
-        name: used by contacts.
-        kind: name of the surface in scene files.
-        ring_radius: of the wire's middle from the axis [m].
-        wire_radius: radius of the wire [m]; of the centre's surface after :meth:`offset`.
-    """
-
-    name: str
-    ring_radius: float = field(metadata={"unit": "m"})
-    wire_radius: float = field(metadata={"unit": "m"})
-    kind: Literal["torus"] = "torus"
-
-    coordinates = ("gamma", "theta")
-    units = ("rad", "rad")
-    periods = (2 * math.pi, 2 * math.pi)
-    extent = (-math.pi, math.pi)
-
-    def __post_init__(self) -> None:
-        require_bounds("ring_radius", self.ring_radius, above=0)
-        require_bounds("wire_radius", self.wire_radius, above=0)
-        if not self.wire_radius < self.ring_radius:
-            raise OutOfBounds("wire_radius", self.wire_radius, f"the value must be below {self.ring_radius:g}")
-
-    @override
-    def offset(self, ball_radius: float) -> Torus:
-        if not ball_radius + self.wire_radius < self.ring_radius:
-            room = self.ring_radius - self.wire_radius
-            raise InputError("radius", ball_radius, f"the ball must be smaller than the {room:g} m inside {self.name}")
-        return dataclasses.replace(self, wire_radius=self.wire_radius + ball_radius)
-
-    def profile(self, s: Any) -> tuple[Any, Any]:
-        """See :class:`Revolved`; the angle starts at the top of the wire and grows outwards."""
-        return sin(s) * self.wire_radius + self.ring_radius, cos(s) * self.wire_radius
-
-    @override
-    def away(self, r: Any, z: Any) -> Any:
-        return ring_distance(self.ring_radius, self.wire_radius, r, z)
-
-    @override
-    def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
-        return np.arctan2(r - self.ring_radius, z)

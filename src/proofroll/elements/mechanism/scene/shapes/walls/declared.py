@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
-from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.arrays import FloatArray, cross, read_only
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.surfaces.formula import differentiated
-from proofroll.elements.ball_on_surface.surfaces.surface import Generator
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.shapes.walls.curved import CurvedWall, Near
+from proofroll.elements.mechanism.scene.shapes.walls.formula import differentiated
 
 # Places along each coordinate at which a declaration is checked, and from which Newton's method for the nearest point
 # starts.
@@ -29,7 +31,7 @@ class Declared:
     * ``coordinates``, ``units``, ``periods``, ``domain``, in such an order that the product of the tangents points to
       the wall;
     * :meth:`point`, and where it has a formula, which is faster, :meth:`distance`, in ``+ - * /``, ``**`` and the
-      functions of :mod:`proofroll.elements.ball_on_surface.surfaces.formula`, so that they can be differentiated;
+      functions of :mod:`proofroll.elements.mechanism.scene.shapes.walls.formula`, so that they can be differentiated;
     * :meth:`offset`, and where it is known, which is faster, :meth:`locate`.
 
     Tangents, curvature, frame and normal are derivatives.
@@ -40,8 +42,8 @@ class Declared:
     coordinates: tuple[str, str]
     units: tuple[str, str]
     periods: tuple[float | None, float | None] = (None, None)
-    generators: tuple[Generator, Generator] | None = None
-    wall_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    origin: ClassVar[Array] = read_only(np.zeros(3))
+    axis: ClassVar[Array] = read_only(np.array([0.0, 0.0, 1.0]))
 
     @property
     def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -49,7 +51,11 @@ class Declared:
         raise NotImplementedError
 
     def offset(self, ball_radius: float) -> Declared:
-        """See :class:`Surface`."""
+        """Surface on which the centre of a touching ball of this radius [m] moves.
+
+        Raises:
+            InputError: the ball has no room.
+        """
         raise NotImplementedError
 
     def point(self, u1: Any, u2: Any) -> tuple[Any, Any, Any]:
@@ -105,15 +111,18 @@ class Declared:
         axes = [low + (high - low) * inner for low, high in self.domain]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
+    def scales(self, u1: float, u2: float) -> tuple[float, float]:  # noqa: ARG002 -- those of walls vary
+        """Largest way per unit of each coordinate [m/unit]: the largest radius for an angle, 1 for a length."""
+        return self._scales
+
     @cached_property
-    def length_scales(self) -> tuple[float, float]:
-        """See :class:`Surface`; the largest radius for an angle, 1 for a length."""
+    def _scales(self) -> tuple[float, float]:
         lengths = np.linalg.norm(self.tangents(self.places()), axis=-2).max(axis=0)
         scale, second_scale = (1.0 if unit == "m" else float(x) for unit, x in zip(self.units, lengths, strict=True))
         return scale, second_scale
 
     def position(self, u: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """Point of the surface [m], shape (..., 3)."""
         return self._bent(u, 0, 1)[..., 0]
 
     def _bent(self, u: npt.ArrayLike, lowest: int, count: int) -> FloatArray:
@@ -127,19 +136,15 @@ class Declared:
         return _stacked(derivatives, u.shape[:-1]).reshape(*u.shape[:-1], 3, count)
 
     def tangents(self, u: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """Its derivatives [m/unit], shape (..., 3, 2)."""
         return self._bent(u, 1, 2)
 
     def second(self, u: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """Its second derivatives [m/unit²], shape (..., 3, 2, 2)."""
         return self._bent(u, 3, 3)[..., [[0, 1], [1, 2]]]
 
     def frame(self, u: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
-        if np.ndim(u) == 1:  # without the overhead of arrays
-            parts = _chart(self)[0](*np.asarray(u).tolist())
-            columns = _triad(*parts[1::6], *parts[2::6])
-            return np.array(columns).reshape(3, 3).T
+        """Local frame with columns e1, towards the wall, e2, along the first coordinate, and e3 = e1 × e2."""
         tangents = self.tangents(u)
         across = cross(tangents[..., 0], tangents[..., 1])
         e1 = across / np.linalg.norm(across, axis=-1, keepdims=True)
@@ -147,7 +152,10 @@ class Declared:
         return np.stack([e1, e2, cross(e1, e2)], axis=-1)
 
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`; Newton's method for the nearest point, from the nearest of a grid."""
+        """Coordinates of the nearest point, shape (..., 2): Newton's method, from the nearest of a grid.
+
+        A periodic coordinate is in (-period/2, period/2].
+        """
         p = np.asarray(p_WB, dtype=np.float64)
         flat, samples = p.reshape(-1, 3), self.places()
         u = samples[np.argmin(np.linalg.norm(flat[:, None] - self.position(samples)[None], axis=-1), axis=1)]
@@ -170,36 +178,48 @@ class Declared:
         return _stacked(parts[lowest : lowest + count], p.shape[:-1])
 
     def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """Distance from the surface [m], shape (...); negative behind it."""
         return self._away(p_WB, 0, 1)[..., 0]
 
     def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """e1, minus the gradient of the gap, shape (..., 3)."""
         return -self._away(p_WB, 1, 3)
 
     def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """Gradient of e1 [1/m], shape (..., 3, 3)."""
         return -self._away(p_WB, 4, 6)[..., [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
 
-    def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-        """See :class:`Surface`."""
-        gap, x1, y1, z1, *_ = _field(self)[0](x, y, z)
-        return gap, -x1, -y1, -z1
 
-    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
-        """See :class:`Surface`."""
-        return self.moving_triad(x, y, z, 0.0, 0.0, 0.0)[1:10]
+@dataclass(frozen=True, eq=False)
+class DeclaredWall(CurvedWall):
+    """Wall at rest in the world that a declared surface describes; ``metre``: a metre in the wall's unit of length."""
 
-    def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
-        """See :class:`Surface`."""
-        gap, x1, y1, z1, xx, xy, xz, yy, yz, zz = _field(self)[0](x, y, z)
-        place = _chart(self)[0](*self.locate(np.array([x, y, z])).tolist())
-        x2, y2, z2 = place[1], place[7], place[13]
-        size = math.sqrt(x2 * x2 + y2 * y2 + z2 * z2) or math.nan
-        x1, y1, z1, x2, y2, z2 = -x1, -y1, -z1, x2 / size, y2 / size, z2 / size
-        e3 = (y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2)
-        rate = -(xx * vx + xy * vy + xz * vz), -(xy * vx + yy * vy + yz * vz), -(xz * vx + yz * vy + zz * vz)
-        return gap, x1, y1, z1, x2, y2, z2, *e3, *rate
+    surface: Declared
+    metre: float = 1.0
+    kind: ClassVar[str] = "declared"
+
+    @property
+    @override
+    def has_formula(self) -> bool:
+        return self.surface.knows_distance
+
+    @override
+    def away(self, x: Any, y: Any, z: Any) -> Any:
+        k = self.metre
+        return self.surface.distance(x / k, y / k, z / k) * k
+
+    @cached_property
+    @override
+    def frame(self) -> Array:
+        return np.eye(3)
+
+    @override
+    def near(self, place: Array) -> Near:
+        surface, place = self.surface, place / self.metre
+        normal, bend = -surface.normal(place), -surface.normal_gradient(place) / self.metre
+        if not (np.isfinite(normal).all() and np.isfinite(bend).all()):
+            normal, bend = np.zeros(3), np.zeros((3, 3))
+        return Near(float(surface.gap(place)) * self.metre, normal, bend)
 
 
 # Functions with the surface as key, for attributes of the surface would have to be pickled with it.
@@ -238,15 +258,6 @@ def _distance_by_nearest(surface: Declared) -> tuple[Callable[..., Any], Callabl
         return [float(part) for part in of_arrays(x, y, z)]
 
     return of_floats, of_arrays
-
-
-def _triad(x2: float, y2: float, z2: float, x: float, y: float, z: float) -> tuple[float, ...]:
-    """Components of e1, e2, e3, nine numbers, from the two tangents; NaN where they are zero or parallel."""
-    x1, y1, z1 = y2 * z - z2 * y, z2 * x - x2 * z, x2 * y - y2 * x
-    across = math.sqrt(x1 * x1 + y1 * y1 + z1 * z1) or math.nan
-    length = math.sqrt(x2 * x2 + y2 * y2 + z2 * z2) or math.nan
-    x1, y1, z1, x2, y2, z2 = x1 / across, y1 / across, z1 / across, x2 / length, y2 / length, z2 / length
-    return x1, y1, z1, x2, y2, z2, y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2
 
 
 def _stacked(parts: Sequence[Any], shape: tuple[int, ...]) -> FloatArray:
