@@ -33,6 +33,7 @@ from proofroll.elements.mechanism.run.certificate import CAPS, certify
 from proofroll.elements.mechanism.run.contacts.local_frame import local_observables, local_sizes, observe_locally
 from proofroll.elements.mechanism.run.contacts.observables import contact_observables, event_observables
 from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, LocalStart, body_on_wall
+from proofroll.elements.mechanism.run.contacts.stretches import held_in_flight
 from proofroll.elements.mechanism.run.dataset import from_samples
 from proofroll.elements.mechanism.run.failure_program import program
 from proofroll.elements.mechanism.run.optional_terms import optional_terms
@@ -397,8 +398,10 @@ class MechanismElement:
     def common_span(
         self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
     ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
-        """Truth and runs unchanged: no event of a mechanism ends a run."""
-        return truth, dict(runs)
+        """Truth and runs, with a ball that rolls held where it flies: no event of a mechanism ends a run."""
+        if self.on_wall is None or self.on_wall.flies:
+            return truth, dict(runs)
+        return held_in_flight(truth), {key: held_in_flight(run) for key, run in runs.items()}
 
     def certify(self, built: Any, sample: MechanismSample) -> list[Line]:
         """See the protocol."""

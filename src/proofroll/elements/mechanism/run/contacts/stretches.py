@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import BETWEEN
 from proofroll.core.events import EventKind, events_of
 from proofroll.elements.mechanism.run.contacts.on_wall import LocalCoordinates, OnWall
 
@@ -45,10 +46,13 @@ def held_in_flight(dataset: xr.Dataset) -> xr.Dataset:
         return dataset
     kinds = {EventKind.LIFT_OFF: True, EventKind.IMPACT: False, EventKind.BOUNCE: True, EventKind.SETTLE: False}
     changes = [(event.time, kinds[EventKind(event.kind)]) for event in events_of(dataset) if event.kind in kinds]
-    reached = np.searchsorted([time for time, _ in changes], dataset["time"].to_numpy(), side="right")
-    flies = np.array([False, *(flies for _, flies in changes)])[reached]
-    held = {name: dataset[name].where(~flies, 0.0) for name in ("gap", "slip", "slip2", "slip3")}
-    return dataset.assign({name: values.assign_attrs(dataset[name].attrs) for name, values in held.items()})
+    instants, flies = [time for time, _ in changes], np.array([False, *(flies for _, flies in changes)])
+    held = {}
+    for axis, prefix in (("time", ""), (BETWEEN, f"{BETWEEN}.")):  # and samples off the grid
+        for name in (prefix + name for name in ("gap", "slip", "slip2", "slip3") if prefix + name in dataset):
+            aloft = flies[np.searchsorted(instants, dataset[axis].to_numpy(), side="right")]
+            held[name] = dataset[name].where(~aloft, 0.0).assign_attrs(dataset[name].attrs)
+    return dataset.assign(held)
 
 
 def stretches(dataset: xr.Dataset) -> list[xr.Dataset]:

@@ -98,12 +98,14 @@ def test_events_say_when_a_ball_sticks() -> None:
 def test_in_flight_a_ball_has_neither_gap_nor_slip() -> None:
     """From a lift-off to the next impact both are zero, for they would count as errors of a ball that should roll."""
     size = {name: ("time", np.ones(11)) for name in ("gap", "slip", "slip2", "slip3")}
-    plain = xr.Dataset(size, coords={"time": np.linspace(0, 1, 11)})
+    off_grid = {"between.gap": ("between", np.ones(3))}
+    plain = xr.Dataset(size | off_grid, coords={"time": np.linspace(0, 1, 11), "between": [0.15, 0.45, 0.75]})
     assert held_in_flight(plain) is plain
     kinds = (EventKind.LIFT_OFF, 0.25), (EventKind.IMPACT, 0.65), (EventKind.LIFT_OFF, 0.95)
     told = held_in_flight(with_events(plain, [Event(kind, t, t, t) for kind, t in kinds]))
     for name in size:
         assert told[name].to_numpy().tolist() == [1.0] * 3 + [0.0] * 4 + [1.0] * 3 + [0.0]
+    assert told["between.gap"].to_numpy().tolist() == [1.0, 0.0, 1.0]
 
 
 @pytest.mark.parametrize(
