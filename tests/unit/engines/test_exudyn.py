@@ -12,8 +12,7 @@ from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.running.simulation import build, simulate
 
 pytest.importorskip("exudyn")
@@ -75,55 +74,6 @@ def test_tilted_cylinder(formulation: str) -> None:
     )
     assert float(np.abs(run.energy - run.energy[0]).max()) < 2e-3
     assert float(np.abs(run.p_WB - reference.p_WB).max()) < 1e-3
-
-
-class Foreign(Cylinder):
-    """A cylinder that does not tell how it slides along itself."""
-
-    @property
-    def generators(self) -> None:  # type: ignore[override]
-        """Unknown."""
-        return None
-
-
-@pytest.mark.parametrize("formulation", ["generic", "rolling_disc"])
-def test_wall_without_generators(formulation: str) -> None:
-    """Without generators generic and the rolling disc give the same numbers; the carrier refuses with a reason."""
-    scene = cylinder(rolling_resistance=5e-4)
-    foreign = scene_with(scene, surface=Foreign("wall", 0.225))
-    rolling_ball(foreign).__dict__["surface"] = Foreign("wall", rolling_ball(foreign).surface.radius)
-    with pytest.raises(Refused, match="use generic"):
-        build(foreign, "exudyn", formulation="carrier")
-    ends = []
-    for each in (scene, foreign):
-        engine = build(each, "exudyn", formulation=formulation, dt=1e-3)
-        engine.advance(0.05)
-        ends.append(engine.sample().p_WB)
-    # Other coordinates of generic have another error, of second order in the step.
-    np.testing.assert_allclose(ends[1], ends[0], atol=1e-5 if formulation == "generic" else 1e-10)
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        load_scene("bowl", rolling_resistance=5e-4),
-        load_scene("cone"),
-        load_scene("torus_rim"),
-        load_scene("turntable", tilt=0.1),
-    ],
-    ids=lambda scene: scene.name,
-)
-def test_generic_on_any_wall(scene: Scene) -> None:
-    """On walls that do not slide along themselves or that move generic is what the scene says, and of second order."""
-    assert [line for line in certify(build(scene, "exudyn", formulation="generic"), scene) if not line.holds] == []
-    truth = simulate(scene, "truth", until=0.2, every=0.05)
-    off = []  # the rule's own errors, which no processor changes
-    for dt in (1e-3, 5e-4):
-        run = simulate(scene, "exudyn", until=0.2, every=0.05, formulation="generic", dt=dt)
-        np.testing.assert_allclose(run["N"], truth["N"], rtol=1e-5)
-        off.append(float(np.abs(run["p_WB"] - truth["p_WB"]).max()))
-    assert off[0] < 1e-6
-    assert off[0] / off[1] == pytest.approx(4, rel=0.1)
 
 
 def test_carrier_weighs_nothing() -> None:

@@ -9,14 +9,12 @@ import pytest
 from true_runs import true_run
 
 from proofroll.core.certificate import Standing, certify
-from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.errors import Diverged, InputError
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
-from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth as truth_of
-from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.files.scene_file import load_scene
-from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
 
 pin = pytest.importorskip("pinocchio")
@@ -226,32 +224,6 @@ def test_wrong_settings_give_one_line(options: str, field: str, advice: str) -> 
     assert field in caught.value.field
     assert advice in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_surface_without_generators() -> None:
-    """Joints need a surface that slides along itself; the free ball does not."""
-
-    class Bare:
-        """A cylinder that keeps its symmetry to itself."""
-
-        generators = None
-
-        def __init__(self, surface: object) -> None:
-            self._surface = surface
-
-        def __getattr__(self, name: str) -> object:
-            if name.startswith("__"):  # as when it is copied, before it has a surface
-                raise AttributeError(name)
-            return getattr(self._surface, name)
-
-    scene = cylinder()
-    scene.elements[0].__dict__["rolling"] = dataclasses.replace(
-        rolling_ball(scene), surface=Bare(rolling_ball(scene).surface)
-    )
-    with pytest.raises(Refused, match="free_flyer"):
-        build(scene, "pinocchio[formulation=composite]")
-    engine = build(scene, "pinocchio[formulation=free_flyer,preset=tuned]")
-    assert record(engine, cylinder(), time_grid(0.01, 0.01)).failure is None
 
 
 def test_singular_rows_are_said(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -87,7 +87,7 @@ class BallOnSurface:
             needs.add(BallCapability.ROLLING_RESISTANCE)
         if math.isfinite(self.contact.mu_static):
             needs.add(BallCapability.BOUNDED_FRICTION)
-        if any(generator.kind == "rotation" for generator in self.surface.generators or ()):
+        if any(generator.kind == "rotation" for generator in self.surface.generators):
             needs.add(BallCapability.CURVED_SURFACE)
         return frozenset(needs)
 

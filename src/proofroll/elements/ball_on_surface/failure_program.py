@@ -76,10 +76,9 @@ def _run(body: RollingBall, failed: FailedRun) -> str:
 def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
     """Text of the program; see :class:`proofroll.core.element_abilities.WritesPrograms`."""
     truth, part = failed.truth, engine if engine is not None else _run(body, failed)
-    generators = body.surface.generators
-    generator = None if generators is None else generators[-1]
+    generator = body.surface.generators[-1]
     true: list[float] = []
-    if truth is not None and generator is not None and generator.kind == "translation":
+    if truth is not None:
         true = (truth[body.surface.coordinates[-1]].to_numpy() - body.u0[-1]).tolist()
     rolls = [] if truth is None or "sticking" not in truth else [int(value) for value in truth["sticking"].to_numpy()]
     resists = truth is not None and body.contact.rolling_resistance > 0
@@ -90,7 +89,7 @@ def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
         "GAIN": GAIN,
         "SLIPPED": SLIPPED,
         "BACKWARDS": BACKWARDS,
-        "ALONG": list(generator.axis) if generator else [0.0, 0.0, 0.0],
+        "ALONG": list(generator.axis),
         "TRUE": true,
         "ROLLS": rolls,
         "HEADING": ways,

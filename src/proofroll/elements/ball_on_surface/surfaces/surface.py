@@ -65,8 +65,8 @@ class Surface(Protocol):
         """Largest distance travelled per unit of each coordinate [m/unit]."""
 
     @property
-    def generators(self) -> tuple[Generator, Generator] | None:
-        """Motions G1, G2 with p(u) = G1(u1) G2(u2) p(0), likewise frame(u); None for an inhomogeneous surface."""
+    def generators(self) -> tuple[Generator, Generator]:
+        """Motions G1, G2 with p(u) = G1(u1) G2(u2) p(0), likewise frame(u)."""
 
     def offset(self, ball_radius: float) -> Surface:
         """Surface on which the centre of a touching ball of this radius [m] moves."""

@@ -117,9 +117,9 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     N follows from the state: along e1 the centre accelerates by -v·(∂e1/∂p)v, so that
     N = m (v·(∂e1/∂p)v + e1·g). The last multiplier instead would lag by an iterate and make the moment ring with it.
     """
-    triad, moving_triad = rolling.surface.triad, rolling.surface.moving_triad
+    triad = rolling.surface.triad
     (k22, k23), (_, k33) = curvature(rolling.surface, rolling.u0).tolist()
-    twist, homogeneous = 2 * k23, rolling.surface.generators is not None
+    twist = 2 * k23
     m, least = rolling.ball.mass, slow(rolling)
     gx, gy, gz = rolling.gravity.tolist()
     position, velocity = Output.Position, Output.Velocity
@@ -128,16 +128,13 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
         output = system.GetNodeOutput
         x, y, z = output(node, position).tolist()
         vx, vy, vz = output(node, velocity).tolist()
-        if homogeneous:
-            x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad(x, y, z)
-        else:
-            _, x1, y1, z1, x2, y2, z2, x3, y3, z3, ex, ey, ez = moving_triad(x, y, z, vx, vy, vz)
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad(x, y, z)
         v2, v3 = vx * x2 + vy * y2 + vz * z2, vx * x3 + vy * y3 + vz * z3
         speed = max(math.hypot(v2, v3), least)
         if not speed:
             return [0.0, 0.0, 0.0]
-        # v·(∂e1/∂p)v, of which a homogeneous surface has the same coefficients everywhere
-        turning = k22 * v2 * v2 + (twist * v2 + k33 * v3) * v3 if homogeneous else vx * ex + vy * ey + vz * ez
+        # v·(∂e1/∂p)v, whose coefficients are the same everywhere
+        turning = k22 * v2 * v2 + (twist * v2 + k33 * v3) * v3
         N = m * (turning + x1 * gx + y1 * gy + z1 * gz)
         # resistance_moment, written out to save the call
         factor = load[0] * N / speed

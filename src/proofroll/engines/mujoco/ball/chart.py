@@ -38,11 +38,9 @@ class Chart(Formulation):
         """Writes one joint for each of the two rigid motions that map the surface onto itself.
 
         Raises:
-            Refused: the surface has no such motions, or the file's joints are of another kind.
+            Refused: the file's joints are of another kind.
         """
         surface = body.surface
-        if surface.generators is None:
-            raise Refused("chart needs a surface that two rigid motions slide along itself")
         origin = np.zeros(2)
         frame = surface.frame(origin)
         centre = frame.T @ surface.position(origin)

@@ -174,7 +174,7 @@ class Facets(Formulation):
                 short for the ball's way along its axis.
         """
         generators = body.surface.generators
-        if generators is None or generators[0].kind != "rotation":
+        if generators[0].kind != "rotation":
             raise Refused("facets needs a wall that closes on itself")
         origin = np.zeros(2)
         frame = body.surface.frame(origin)

@@ -91,12 +91,6 @@ def _written(body: RollingBall, name: str, formulation: str) -> str:
         return _FREE.format(**names)
     if formulation != "chart":
         raise Refused(f"{formulation} needs a wall made of MuJoCo's shapes, mujoco_{formulation}.xml beside the scene")
-    if body.surface.generators is None:
-        raise Refused(
-            "chart moves the ball by two joints in a row that slide its wall along itself, as those of planes and "
-            "cylinders do: on a sphere they are singular at the bottom, elsewhere they would not follow the wall's "
-            "curvature, and the J̇v that MuJoCo leaves out would remain; use free"
-        )
     joint_1, joint_2 = (_JOINTS[generator.kind] for generator in body.surface.generators)
     return _CHART.format(**names, first=joint_1, second=joint_2)
 

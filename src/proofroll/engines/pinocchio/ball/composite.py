@@ -8,7 +8,6 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator
 from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, ContactRows, SlidingContact
@@ -48,19 +47,12 @@ class Composite(BallWithRows):
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
-        """See :class:`~proofroll.engines.pinocchio.ball.ball_with_rows.BallWithRows`.
-
-        Raises:
-            Refused: the surface has no generators.
-        """
-        generators = body.surface.generators
-        if generators is None:
-            raise Refused("composite joints need a surface that slides along itself; use formulation=free_flyer")
+        """See :class:`~proofroll.engines.pinocchio.ball.ball_with_rows.BallWithRows`."""
         super().__init__(body)
         self._frame0 = body.surface.frame(np.zeros(2))
         self._carriage = 0
         self._read: Any = None  # the data to which self._wrench refers
-        for name, generator in zip(body.surface.coordinates, generators, strict=True):
+        for name, generator in zip(body.surface.coordinates, body.surface.generators, strict=True):
             self._carriage = self.model.addJoint(self._carriage, _joint(generator), pin.SE3.Identity(), name)
         placement = pin.SE3(self._frame0, body.surface.position(np.zeros(2)))
         self._wrench = np.zeros(3)

@@ -45,7 +45,7 @@ class ProjectionBall:
         else:
             self._orientation = FollowedFrame() if follow else RotatingFrame()
         self._coordinates = 2 + self._orientation.size
-        turning = [generator.kind == "rotation" for generator in body.surface.generators or ()]
+        turning = [generator.kind == "rotation" for generator in body.surface.generators]
         periodic = [*turning, *([False] * (2 - len(turning))), *self._orientation.periodic]
         self._angles = [index for index, whole in enumerate(periodic) if whole]
         self._ball = ProjectedBall(body, geometry, self._orientation)
