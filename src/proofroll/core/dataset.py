@@ -34,7 +34,7 @@ LEFT_OUT = "widest_bracket_left_out"
 # A sample that is nearer to an impact than this part of the sampling interval lies on it.
 _ON_IMPACT = 1e-6
 # Units of what an impact leaves as it is, reactions apart: places, angles and orientations.
-_CONTINUOUS = frozenset({"m", "rad", "1"})
+CONTINUOUS = frozenset({"m", "rad", "1"})
 
 
 def from_samples(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) -> xr.Dataset:
@@ -231,7 +231,7 @@ def _of_either_side(scene: Scene, truth: xr.Dataset, run: xr.Dataset, on: npt.ND
             continue
         if variable.shape[1:] != true_variables[name].shape[1:]:  # a user's file
             continue
-        if true_variables[name].attrs.get("units") in _CONTINUOUS and not reaction:
+        if true_variables[name].attrs.get("units") in CONTINUOUS and not reaction:
             continue
         true = true_variables[name].values
         around = np.stack([true[indices - 1], true[indices], true[np.minimum(indices + 1, last)]])

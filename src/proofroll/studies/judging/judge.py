@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_distance, largest_magnitude, magnitudes
 from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
-from proofroll.core.dataset import BETWEEN, off_impacts
+from proofroll.core.dataset import BETWEEN, CONTINUOUS, impact_samples, off_impacts
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.element_abilities import MovesFreely, step_bound
 from proofroll.core.errors import InputError, require_known
@@ -38,6 +38,7 @@ _LEAST = 0.01
 _MILLI = 1e3
 _NO_TOLERANCE = "no tolerance is given for it"
 _UNDETERMINED = "the truth does not determine it"
+_CONTRADICTS = "that is against the state of the same trajectory"
 _MOST_TRUTHS = 64
 _truths: dict[tuple[str, bytes, bytes], xr.Dataset] = {}
 
@@ -207,6 +208,8 @@ def judge(
     further |= {name: Tolerance(run_values.CONTRADICTS, True) for name, _ in rates if name in sure}
     unasked = [_compared(name, bound, reference, observed, dataset) for name, bound in further.items()]
     compared += [item for item in unasked if item.judgement.verdict is Verdict.DIFFERS]
+    against = dict(_against_state(user_run, reference, bounds))
+    compared = [item for item in compared if item.judgement.observable not in against] + [*against.values()]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
     unjudged = _unjudged(user_run, reference, bounds) | _unsure(dataset, reference, bounds)
     if tolerance is None:
@@ -423,6 +426,27 @@ def _compared(
         )
     judgement = judge_curve(Allowance(name, unit, bound.absolute(scale), scale), run, true)
     return Compared(judgement, _farthest(run, true.values, times))
+
+
+def _against_state(
+    user_run: GivenRun, reference: Reference, bounds: Mapping[str, Tolerance]
+) -> Iterator[tuple[str, Compared]]:
+    """Given columns that contradict the state of the same trajectory, which is judged."""
+    times = user_run.dataset.variables["time"].values
+    on = np.isin(times, reference.dataset.variables["time"].values[impact_samples(reference.scene, reference.dataset)])
+    for name, (values, follows) in user_run.twice.items():
+        if not _comparable(reference, name) or (name in bounds and not user_run.besides):
+            continue  # of a run of proofroll's own the column itself is judged
+        unit, vectors = _unit(reference, name), reference.vectors(name)
+        scale = _size(reference, name, follows, unit)
+        allowance = Allowance(name, unit, bounds.get(name, _USUAL).absolute(scale), scale)
+        jumps = on.reshape(-1, *[1] * (values.ndim - 1)) & (unit not in CONTINUOUS)
+        curve = RunCurve(np.where(jumps, follows, values), vectors=vectors)
+        bar = float(reference.dataset.variables[name].attrs["error_bar"])
+        judgement = judge_curve(allowance, curve, TrueCurve(follows, bar))
+        if judgement.verdict is Verdict.DIFFERS:
+            judgement = replace(judgement, remarks=(*judgement.remarks, _CONTRADICTS))
+            yield name, Compared(judgement, _farthest(curve, follows, times))
 
 
 def _farthest(run: RunCurve, true: FloatArray, times: FloatArray) -> float | None:

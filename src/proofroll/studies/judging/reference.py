@@ -15,7 +15,17 @@ from numpy.typing import NDArray
 from proofroll.core.arrays import FloatArray, Vectors, magnitudes
 from proofroll.core.beside_events import beside_events
 from proofroll.core.columns import SAMPLED_BAR
-from proofroll.core.dataset import LEFT_OUT, Key, before_end, common_span, ended_early, observe, part, scales
+from proofroll.core.dataset import (
+    CONTINUOUS,
+    LEFT_OUT,
+    Key,
+    before_end,
+    common_span,
+    ended_early,
+    observe,
+    part,
+    scales,
+)
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, JUMPS, Event, events_of
 from proofroll.core.observable import Role
@@ -26,8 +36,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _PARTED = 0.1  # part of their largest difference at which two runs have parted
-# Units of what an impact leaves as it is: places, angles, directions.
-_CONTINUOUS = frozenset({"m", "rad", "1"})
 
 
 @dataclass(frozen=True)
@@ -122,7 +130,7 @@ class Reference:
     def _on_either_side(self, name: str, curve: FloatArray, values: FloatArray) -> FloatArray:
         """True curve with a run's own values at samples on an impact, where what jumps has a value on each side."""
         item = self.scene.observables[name]
-        if item.role == Role.EVENT or item.unit in _CONTINUOUS or len(curve) != len(values):
+        if item.role == Role.EVENT or item.unit in CONTINUOUS or len(curve) != len(values):
             return curve
         jumps = [event for event in self.events if event.kind in JUMPS]
         if not jumps or len(times := self.dataset.variables["time"].values[1:]) != len(curve):

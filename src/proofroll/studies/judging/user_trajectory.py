@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN, add_events, columns_of, observe
 from proofroll.core.element_abilities import WatchesRuns
+from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError, require_known
 from proofroll.core.events import events_of, wrong_bracket
 from proofroll.core.multi_element import REQUIRED
@@ -19,9 +20,11 @@ from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import LATEST
 from proofroll.core.unit_conversion import in_si, name_and_unit
+from proofroll.core.whole_turns import on_turns_of
 from proofroll.files.atomic import ordinary_content
 from proofroll.files.trajectory_file import CSV, STORED
 from proofroll.running.recording import require_unit
+from proofroll.studies.judging.run_values import turned_alike
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,6 +46,7 @@ class GivenRun:
         besides: given variable -> reason why it is not judged, or None if that is not known yet; empty for a run of
             proofroll's own.
         reactions: columns that do not follow from the state: forces and moments.
+        twice: column that follows from the state -> its values as given and as they follow, turns and signs alike.
     """
 
     dataset: xr.Dataset
@@ -50,6 +54,7 @@ class GivenRun:
     labels: Mapping[str, list[str]]
     besides: Mapping[str, str | None]
     reactions: Collection[str] = ()
+    twice: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def require_units(self, truth: xr.Dataset) -> None:
         """Checks that variables are numbers, those with a unit in that of the truth, and bodies in its order.
@@ -125,15 +130,15 @@ def read_run(run: RunInput, scene: Scene, columns: Mapping[str, str] | None = No
         raise InputError("run", "event_low", wrong)
     if made_of is not None:
         if _whole(dataset, scene):
-            return GivenRun(dataset, units, labels, {})
+            return GivenRun(dataset, units, labels, {}, twice=_twice(dataset, scene))
         # The user left variables out: the rest, on the grid only, is judged like a foreign run.
         dataset = dataset.drop_dims(BETWEEN, errors="ignore").drop_attrs(deep=False)
     names = [str(name) for name in dataset.data_vars]
     # a scene of several elements is judged by its given variables only
     if not all(name in dataset for name in REQUIRED) or len(scene.elements) > 1 or times[0] > 0:
         return GivenRun(dataset, units, labels, dict.fromkeys(names))
-    state = [field.name for field in fields(scene.elements[0].sample_type) if field.name in dataset]
-    completed = _completed(dataset, scene, times, state)
+    state = [item.name for item in fields(scene.elements[0].sample_type) if item.name in dataset]
+    completed = _completed(dataset, scene, times)
     # Reactions do not follow from the state: they are judged as they are given.
     kept = [name for name in names if name not in state and not _has_values(completed, name)]
     besides: dict[str, str | None] = dict.fromkeys([name for name in names if name not in (*state, *kept)], FROM_STATE)
@@ -144,6 +149,7 @@ def read_run(run: RunInput, scene: Scene, columns: Mapping[str, str] | None = No
         labels=labels,
         besides=besides,
         reactions=kept,
+        twice=_twice(dataset, scene, completed),
     )
 
 
@@ -283,18 +289,58 @@ def _check_lengths(arrays: Mapping[str, Any]) -> None:
             )
 
 
-def _completed(run: xr.Dataset, scene: Scene, times: FloatArray, names: list[str]) -> xr.Dataset:
-    """Dataset with all variables that follow from the state."""
-    sample_type = scene.elements[0].sample_type
-    arrays = {name: np.asarray(run[name].to_numpy(), dtype=np.float64) for name in names}
-    samples = [sample_type(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]
+def _samples(run: xr.Dataset, scene: Scene, count: int) -> list[dict[str, Sample]]:
+    """The states of all elements at each of these times."""
+    samples: list[dict[str, Sample]] = [{} for _ in range(count)]
+    for element in scene.elements:
+        names = {item.name: scene.label(element, item.name) for item in fields(element.sample_type)}
+        arrays = {key: np.asarray(run.variables[name].values, float) for key, name in names.items() if name in run}
+        for index, sample in enumerate(samples):
+            sample[element.name] = element.sample_type(**{key: values[index] for key, values in arrays.items()})
+    return samples
+
+
+def _completed(run: xr.Dataset, scene: Scene, times: FloatArray) -> xr.Dataset:
+    """Dataset with all variables that follow from the state of a scene's only element, and its events."""
+    element = scene.elements[0]
     try:
+        samples = _samples(run, scene, len(times))
         columns = columns_of(scene, times, samples)
-        element = scene.elements[0]
         if isinstance(element, WatchesRuns):
-            events = element.watch(scene.asks).conclude(times, samples, None).events
+            events = element.watch(scene.asks).conclude(times, [item[element.name] for item in samples], None).events
             columns = columns if events is None else add_events(scene, element, columns, events)
         return columns.dataset()
     except (ValueError, TypeError, Diverged) as error:
-        shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
+        shapes = ", ".join(
+            f"{item.name} {run[item.name].shape}" for item in fields(element.sample_type) if item.name in run
+        )
         raise InputError("run", shapes, f"these are no states of {scene.name} ({error})") from None
+
+
+def _twice(
+    run: xr.Dataset, scene: Scene, follows: xr.Dataset | None = None
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """``twice`` of a :class:`GivenRun`; what the state does not determine is zero in both.
+
+    Args:
+        run: as given.
+        scene: of the run.
+        follows: all variables that follow from its state, if they are known.
+    """
+    if follows is None:
+        try:
+            times = run.variables["time"].values
+            follows = columns_of(scene, times, _samples(run, scene, len(times))).dataset()
+        except (TypeError, Diverged):  # a part of the state was left out
+            return {}
+    columns, given = {}, run.variables  # indexing a dataset would make coordinates, too
+    for name, item in follows.variables.items():
+        if name not in given or item.dims[:1] != ("time",) or given[name].shape != item.shape or name == "time":
+            continue
+        own, values = item.values, given[name].values
+        known = np.isfinite(own)
+        values = turned_alike(values, own) if item.dims[-1:] == ("wxyz",) else values
+        turned = on_turns_of(own, values, str(name), (follows, run))
+        if turned is not None and known.any():
+            columns[str(name)] = np.where(known, turned, 0.0), np.where(known, own, 0.0)
+    return columns

@@ -97,3 +97,30 @@ def test_arrays_are_renamed_and_converted(pendulum: tuple[np.ndarray, np.ndarray
     assert proofroll.judge(dataset, "pendulum").agrees
     with pytest.raises(InputError, match="columns = 'phi': the trajectory has t, theta"):
         proofroll.judge(arrays, "pendulum", columns={"phi": "q.pivot"})
+
+
+@pytest.mark.parametrize("own", [True, False], ids=["of a run", "of a file"])
+@pytest.mark.parametrize("column", ["q.pivot", "v.pivot", "tip.x", "positions"])
+def test_a_column_that_contradicts_the_state_is_named(column: str, *, own: bool) -> None:
+    """Its largest difference and time are told; the same columns unchanged agree."""
+    run = proofroll.simulate("pendulum", "projection", until=0.2, every=0.02)
+    run = run.copy(deep=True) if own else run.drop_attrs(deep=False).drop_dims("between")
+    assert proofroll.judge(run, "pendulum").agrees
+    run[column][5:] += 0.25
+    run[column][7] += 0.25
+    judged = proofroll.judge(run, "pendulum")
+    (wrong,) = (item for item in judged.compared if not item.agrees)
+    assert wrong.judgement.observable == column
+    assert wrong.at == pytest.approx(0.14)
+    assert column not in judged.unjudged
+    assert ("against the state of the same trajectory" in str(wrong)) is (column != "positions" or not own)
+
+
+def test_a_tolerance_of_a_column_is_for_what_was_given() -> None:
+    """Beside a right state, too."""
+    run = (
+        proofroll.simulate("pendulum", "projection", until=0.2, every=0.02).drop_attrs(deep=False).drop_dims("between")
+    )
+    assert proofroll.judge(run, "pendulum", {"q.pivot": "1e-6 rad"}).agrees
+    run["q.pivot"][5] += 1e-4
+    assert not proofroll.judge(run, "pendulum", {"q.pivot": "1e-6 rad"}).agrees
