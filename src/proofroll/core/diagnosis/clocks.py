@@ -13,6 +13,8 @@ _SPLINE = 5
 # Fewest samples that determine a shift; from _MANY on the degree of the spline is left out at each end, else _END.
 _FEWEST, _MANY, _END = 9, 18, 2
 _SHIFTS = 6
+# Delays that are tried where any up to a farthest one is looked for.
+_TRIED = 401
 # Largest relative error of a clock that is looked for.
 _PACE = 0.25
 
@@ -29,10 +31,20 @@ def _comparable(time: FloatArray, reported: FloatArray, true: FloatArray) -> tup
     return (flat[:, finite], exact[:, finite]) if finite.any() else None
 
 
-def best_delay(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
+def best_delay(
+    time: FloatArray, reported: FloatArray, true: FloatArray, farthest: float | None = None
+) -> tuple[float, float, float] | None:
     """Delay of the reported values [s], and the largest difference before and after correction.
 
-    None if there are too few samples.
+    Args:
+        time: of the samples [s], shape (time,).
+        reported: values of the run, shape (time, …).
+        true: values of the truth at the same times.
+        farthest: longest delay that is looked for [s]; before time 0 the motion then stands at its start. By default
+            the time of the first samples, which are left out.
+
+    Returns:
+        None if there are too few samples.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -43,19 +55,27 @@ def best_delay(time: FloatArray, reported: FloatArray, true: FloatArray) -> tupl
     end = _SPLINE if len(time) >= _MANY else _END
     inner = slice(end, -end)
     flat, curve = flat[inner], make_interp_spline(time, exact, k=_SPLINE)
-    rate, delay, reach = curve.derivative(), 0.0, time[end] - time[0]
+    rate, reach = curve.derivative(), float(time[end] - time[0])
+
+    def left(delay: float) -> FloatArray:
+        moments = time[inner] - delay
+        known = (moments <= time[-1]) & ((moments >= time[0]) | (time[0] == 0))
+        return np.where(known[:, None], flat - curve(np.clip(moments, time[0], time[-1])), np.nan)
+
+    begin = 0.0
+    if farthest is not None:
+        tried = np.linspace(-farthest, farthest, _TRIED)
+        begin, reach = float(min(tried, key=lambda delay: float(np.nanmean(left(delay) ** 2)))), farthest
+    delay = begin
     for _ in range(_SHIFTS):
-        slope = rate(time[inner] - delay)
+        moments = time[inner] - delay
+        slope = rate(np.clip(moments, time[0], time[-1])) * ((time[0] <= moments) & (moments <= time[-1]))[:, None]
         square = float(np.sum(slope**2))
         if not square:
             return None
-        delay -= float(np.sum((flat - curve(time[inner] - delay)) * slope)) / square
+        delay -= float(np.nansum(left(delay) * slope)) / square
         delay = float(np.clip(delay, -reach, reach))
-    return (
-        delay,
-        known_difference(flat, exact[inner]),
-        known_difference(flat, curve(time[inner] - delay)),
-    )
+    return delay, known_difference(flat, exact[inner]), float(np.nanmax(np.abs(left(delay))))
 
 
 def best_clock_factor(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:

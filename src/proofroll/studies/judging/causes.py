@@ -10,6 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES
+from proofroll.core.diagnosis.clocks import best_delay
 from proofroll.core.number_format import number, spaced
 
 _DEGREE = np.pi / 180
@@ -28,6 +29,10 @@ _LENGTHS = (
 )
 _FACTORS = {"rad": _ANGLES, "rad/s": _ANGLES, "m": _LENGTHS, "m/s": _LENGTHS}
 _FEW = 5  # samples from which a fitted number proves something
+# Part of a difference that a record at other times may leave: a pendulum whose push was left out leaves a fiftieth.
+_AT_ANOTHER_TIME = 1e-2
+# Delay, in intervals of samples, up to which it may be the error of a method of first order: half a step.
+_OWN_ERROR = 0.75
 _LIKE_ITS_TRUTH = 1e-3  # part of a variable's size up to which it needs no cause
 
 
@@ -36,7 +41,7 @@ class GivenVariable:
     """Values of a given variable.
 
     Attributes:
-        values, true: in the trajectory and in the truth at its times, shape (time,).
+        values, true: in the trajectory and in the truth at its times, shape (time, …).
         unit: of both.
     """
 
@@ -50,6 +55,11 @@ class GivenVariable:
         return float(np.max(np.abs(self.values - self.true), initial=0.0))
 
     @property
+    def way(self) -> float:
+        """Largest distance of the truth from its first row."""
+        return float(np.max(np.abs(self.true - self.true[:1]), initial=0.0))
+
+    @property
     def wrong(self) -> bool:
         """True if it differs by more than a small part of its size."""
         return self.off > _LIKE_ITS_TRUTH * float(np.max(np.abs(self.true), initial=0.0))
@@ -59,7 +69,7 @@ def causes_of(variables: Mapping[str, GivenVariable], times: FloatArray, falling
     """Clauses on the mistakes that explain variables of a trajectory, and on a first row that is not the start.
 
     Args:
-        variables: variables of one number for each time, by name.
+        variables: of the trajectory and the truth, by name.
         times: of the samples [s].
         falling: names of the coordinates of bodies that nothing holds.
     """
@@ -78,6 +88,8 @@ def causes_of(variables: Mapping[str, GivenVariable], times: FloatArray, falling
         if _exchanged(variables[a], variables[b]):
             sentences |= {a: f"{a} and {b} are each the other: swapped columns?", b: ""}
     open_ones = {name: item for name, item in wrong.items() if name not in sentences}
+    if open_ones and (late := [*_late(variables, times)]):
+        return late
     return [*filter(None, sentences.values()), *_first_row(open_ones, times)]
 
 
@@ -112,6 +124,33 @@ def _damped(item: GivenVariable, times: FloatArray) -> Iterator[tuple[str, Float
         yield says, item.true + basis @ [rate, delay]
 
 
+def _late(variables: Mapping[str, GivenVariable], times: FloatArray) -> Iterator[str]:
+    """Clause on the one delay that explains all variables that differ; before it the motion stands at its start."""
+    ways: dict[str, float] = {}
+    for item in variables.values():
+        ways[item.unit] = max(ways.get(item.unit, 0.0), item.way)
+    moving = {name: item for name, item in variables.items() if item.way > _LIKE_ITS_TRUTH * ways[item.unit]}
+    wrong = {
+        name: item for name, item in variables.items() if item.wrong and item.off > _LIKE_ITS_TRUTH * ways[item.unit]
+    }
+    if not wrong or wrong.keys() - moving.keys():
+        return
+    values, true = (
+        np.concatenate([(array / item.way).reshape(len(times), -1) for item, array in arrays], axis=1)
+        for arrays in zip(*(((item, item.values), (item, item.true)) for item in wrong.values()), strict=True)
+    )
+    shift = best_delay(times, values, true, farthest=float(times[-1] - times[0]) / 2)
+    if (
+        shift is not None
+        and shift[2] <= _AT_ANOTHER_TIME * shift[1]
+        and abs(shift[0]) > _OWN_ERROR * float(np.min(np.diff(times)))
+    ):
+        delay, (off, left) = shift[0], (number(100 * part, 2) for part in shift[1:])
+        which = "the record" if wrong.keys() == moving.keys() else " and ".join(wrong)
+        verb, word = "is" if len(wrong) == 1 or which == "the record" else "are", "late" if delay > 0 else "early"
+        yield f"{which} {verb} {word} by {abs(delay):.3g} s (off by {off} % of the way, by {left} % with that)"
+
+
 def _exchanged(variable_a: GivenVariable, variable_b: GivenVariable) -> bool:
     if variable_a.unit != variable_b.unit or variable_a.true.shape != variable_b.true.shape:
         return False
@@ -129,7 +168,9 @@ def _first_row(wrong: Mapping[str, GivenVariable], times: FloatArray) -> Iterato
     apart = []
     for name, item in wrong.items():
         size = float(np.max(np.abs(item.true), initial=0.0)) or 1.0
-        if abs(item.values[0] - item.true[0]) > 10 * _LIKE_ITS_TRUTH * size:
-            apart.append(f"{name} {number(item.values[0], 4)} instead of {number(item.true[0], 4)}{spaced(item.unit)}")
+        begun, start = (np.ravel(values[0]) for values in (item.values, item.true))
+        if np.max(np.abs(begun - start)) > 10 * _LIKE_ITS_TRUTH * size:
+            given, expected = (", ".join(number(value, 4) for value in row) for row in (begun, start))
+            apart.append(f"{name} {given} instead of {expected}{spaced(item.unit)}")
     if apart:
         yield f"the first row is not the scene's start: {', '.join(apart)}"

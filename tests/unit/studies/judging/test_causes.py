@@ -46,9 +46,46 @@ def test_a_mistake_is_named_alone(one: Any, two: Any, words: str) -> None:
 
 
 def test_a_motion_that_differs_otherwise_has_no_cause() -> None:
-    """A wrong amplitude, a late motion and the truth itself are no mistake of this kind."""
+    """A wrong amplitude, a slow clock of one coordinate and the truth itself are no mistake of this kind."""
     for one in (1.1 * (ONE - 0.3) + 0.3, np.sin(3 * TIMES - 0.3 * TIMES) + 0.3, ONE):
         assert said(one, TWO) == []
+
+
+def one_at(times: Any) -> Any:
+    """ONE at other times, standing at its start before time 0."""
+    return np.sin(3 * np.maximum(times, 0.0)) + 0.3
+
+
+def two_at(times: Any) -> Any:
+    """TWO at other times."""
+    return np.cos(2 * np.maximum(times, 0.0)) - 0.1
+
+
+@pytest.mark.parametrize("delay", [0.1, 0.123, 0.6, -0.1])
+def test_a_record_at_other_times_is_named(delay: float) -> None:
+    """One clause for all that moves, whether the delay is one of samples or not; of one late column its name."""
+    word = f"{'late' if delay > 0 else 'early'} by {abs(delay):g} s (off by "
+    (only,) = said(one_at(TIMES - delay), two_at(TIMES - delay))
+    assert only.startswith(f"the record is {word}")
+    (only,) = said(ONE, two_at(TIMES - delay))
+    assert only.startswith(f"q.b is {word}")
+    assert not [cause for cause in said(one_at(TIMES - delay), two_at(0.9 * TIMES - delay)) if "the record" in cause]
+
+
+@pytest.mark.parametrize("whole", [True, False])
+@pytest.mark.parametrize("clock", [True, False])
+def test_a_late_record_is_named(*, whole: bool, clock: bool) -> None:
+    """A clock that is late by 0.1 s, and a start that is; of coordinates alone, and of a whole state."""
+    scene = load_scene("pendulum")
+    times = 0.02 * np.arange(31)
+    true = truth(scene.fully_asked, times)
+    given = ("p_WB", "v_WB", "w_WB", "q_WB") if whole else ("q.pivot", "tip.x")
+    columns = {name: true[name].to_numpy()[: -5 if clock else None] for name in given}
+    if not clock:
+        columns = {name: values[np.maximum(np.arange(31) - 5, 0)] for name, values in columns.items()}
+    judged = proofroll.judge({"time": times[5:] if clock else times, **columns}, scene)
+    assert not judged.agrees
+    assert "cause: the record is late by 0.1 s (" in str(judged)
 
 
 def test_millimetres_are_named() -> None:
