@@ -84,7 +84,7 @@ def _written(body: RollingBall, name: str, formulation: str) -> str:
     """MJCF of a model without a file.
 
     Raises:
-        Refused: the formulation needs a file, or two motions that slide the surface along itself, and there are none.
+        Refused: the formulation needs a file.
     """
     names = {"name": name, "radius": body.ball.radius, "seen": _SEEN * body.ball.radius}
     if formulation == "free":
