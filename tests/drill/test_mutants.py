@@ -192,7 +192,7 @@ def test_a_jump_a_moment_later_is_no_other_clock() -> None:
 def test_a_ball_that_jumps_is_not_told_of_gravity() -> None:
     """A soft contact that throws the ball off the wall again and again has neither gravity nor a pyramid to blame."""
     scene = load_scene("slide_to_roll", speed=2.0, back_spin=400.0)
-    run = simulate(scene, "mujoco", until=0.5, every=0.01, formulation="free", preset="default")
+    run = simulate(scene, "mujoco", until=0.5, every=0.01, formulation="geoms", preset="default")
     true = truth(scene, run["time"].to_numpy())
     assert np.any(run["N"] == 0)
     assert diagnose(Evidence(scene.elements[0], [], run, true, 2e-3), hypotheses_of(scene.elements[0])) == []

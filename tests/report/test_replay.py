@@ -458,15 +458,6 @@ def test_without_a_picture_the_values_follow_the_time(
         assert opened.messages == []
 
 
-def test_a_ball_in_the_air_is_off_the_wall() -> None:
-    """Before it lands and between bounces nobody says that it rolls, though its friction has no bound."""
-    scene = load_scene("bouncing_ball", mu_static=np.inf)
-    data = sampled(truth(scene, np.linspace(0, 0.6, 13)))
-    state = poses(rolling_ball(scene), data, data["time"]).state
-    assert state is not None
-    assert set(state.tolist()) == {AWAY}
-
-
 @pytest.mark.drill
 @pytest.mark.parametrize(("engine", "hidden"), [("truth", True), ("projection", False)])
 def test_a_run_alone_has_no_table_of_ghosts(
