@@ -125,7 +125,12 @@ def _damped(item: GivenVariable, times: FloatArray) -> Iterator[tuple[str, Float
 
 
 def _late(variables: Mapping[str, GivenVariable], times: FloatArray) -> Iterator[str]:
-    """Clause on the one delay that explains all variables that differ; before it the motion stands at its start."""
+    """Clause on the one delay that explains all variables that differ; before it the motion stands at its start.
+
+    Places tell it where they are given: velocities that jump, and quaternions of any sign, follow no curve.
+    """
+    places = {name: item for name, item in variables.items() if item.unit in {"m", "rad"}}
+    variables = places if any(item.wrong for item in places.values()) else variables
     ways: dict[str, float] = {}
     for item in variables.values():
         ways[item.unit] = max(ways.get(item.unit, 0.0), item.way)

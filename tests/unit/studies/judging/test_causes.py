@@ -72,6 +72,17 @@ def test_a_record_at_other_times_is_named(delay: float) -> None:
     assert not [cause for cause in said(one_at(TIMES - delay), two_at(0.9 * TIMES - delay)) if "the record" in cause]
 
 
+def test_a_late_record_of_a_motion_that_jumps_is_named() -> None:
+    """Its places tell the delay, and no start that was not taken is told beside it."""
+    scene = load_scene("two_spheres")
+    times = 0.02 * np.arange(26)
+    true = truth(scene.fully_asked, times)
+    late = np.maximum(np.arange(26) - 5, 0)
+    run = {name: true[name].to_numpy()[late] for name in ("p_WB", "v_WB", "w_WB", "q_WB")}
+    (only,) = proofroll.judge({"time": times, **run}, scene).causes
+    assert only.startswith("the record is late by 0.1 s (")
+
+
 @pytest.mark.parametrize("whole", [True, False])
 @pytest.mark.parametrize("clock", [True, False])
 def test_a_late_record_is_named(*, whole: bool, clock: bool) -> None:
