@@ -14,10 +14,6 @@ from proofroll.core.events import Event
 from proofroll.engines.exudyn.native import ExudynError, exu, new_settings
 from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
-# Further halvings of a step for impacts: a ball of 4 m/s moves by 0.4 micrometres in a step of 1e-4 s that is halved
-# ten times, and by 0.02 micrometres with four more.
-_FOR_IMPACTS = 4
-
 
 def new_system() -> tuple[Any, Any]:
     """An empty container and system; also silences Exudyn and resets its process-wide timeout."""
@@ -48,14 +44,12 @@ class BallRun(ExudynModel):
         return list(self.integration.events)
 
 
-def simulation_settings(
-    settings: ExudynSettings, *, dependent: bool = False, impacts: bool = False, mass: float = 1.0
-) -> Any:
+def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, mass: float = 1.0) -> Any:
     """Settings in Exudyn's own structure: no files, one thread, a step that only ``halvings`` may shorten.
 
     ``dependent``: constraints may depend on each other, so the linear solver must handle a singular matrix.
-    ``impacts``: steps are halved more often, to end where contacts close and open. ``mass``: of all that moves [kg];
-    Newton's absolute tolerance is a force [N], and round-off of the forces grows with what they move.
+    ``mass``: of all that moves [kg]; Newton's absolute tolerance is a force [N], and round-off of the forces grows with
+    what they move.
     """
     kind = getattr(exu.DynamicSolverType, settings.integrator.upper()) if settings.integrator in EXPLICIT else None
     result = new_settings(dependent=dependent, explicit=kind)
@@ -65,7 +59,7 @@ def simulation_settings(
     # Left alone, a failing Newton iteration halves the step down to 1e-8 s, and the run crawls for minutes.
     time.adaptiveStep = bool(settings.halvings)
     if settings.halvings:
-        time.minimumStepSize = settings.dt / 2 ** (settings.halvings + (_FOR_IMPACTS if impacts else 0))
+        time.minimumStepSize = settings.dt / 2**settings.halvings
     time.newton.relativeTolerance = settings.newton_tolerance
     time.newton.absoluteTolerance = settings.newton_tolerance / 100 * max(1.0, mass)
     time.newton.useModifiedNewton = True  # off by default in 1.11, which explains every difference from 1.13
@@ -99,27 +93,26 @@ class Integration:
         at: float = 0.0,
         *,
         dependent: bool = False,
-        impacts: bool = False,
         mass: float = 1.0,
         moved: Callable[[float], Mapping[Any, float]] | None = None,
     ) -> None:
         """Initialises the solver in the initial configuration of an assembled system, at the time ``at`` [s].
 
         For ``turning`` and ``moved`` (at a time) see :func:`consistent_start`; without them, Exudyn finds the start
-        itself. For ``dependent``, ``impacts`` and ``mass`` see :func:`simulation_settings`.
+        itself. For ``dependent`` and ``mass`` see :func:`simulation_settings`.
 
         Raises:
             Refused: the engine does not accept the model.
         """
         self.t = at
         self._again: Callable[[float], Integration] = lambda t: Integration(
-            system, settings, at=t, dependent=dependent, impacts=impacts, mass=mass, moved=moved
+            system, settings, at=t, dependent=dependent, mass=mass, moved=moved
         )
         self.complaint: str | None = None
         self.events: list[Event] = []
         self.dt = settings.dt
         self.system = system
-        self.options = simulation_settings(settings, dependent=dependent, impacts=impacts, mass=mass)
+        self.options = simulation_settings(settings, dependent=dependent, mass=mass)
         explicit = settings.integrator in EXPLICIT
         pushed = moved(at) if moved else {}
         start = None

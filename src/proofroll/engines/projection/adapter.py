@@ -24,7 +24,6 @@ class Projection:
         **ball.PROVIDES,
         "dependent": mechanism.PROVIDES,
     }
-    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = ball.LACKING
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {

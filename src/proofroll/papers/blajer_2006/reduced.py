@@ -80,10 +80,7 @@ class ReducedModel(ABC):
         if spin_rate is None:
             return None
         e1 = surface.normal(p)
-        e1_rate, v0 = surface.normal_gradient(p) @ v, v
-        if (W := self._body.wall_rate) is not None:  # rolling has the velocity relative to the moving wall
-            v = v - cross(W, p + self._body.ball.radius * e1)
-            acceleration = acceleration - cross(W, v0 + self._body.ball.radius * e1_rate)
+        e1_rate = surface.normal_gradient(p) @ v
         swung = cross(e1_rate, v) + cross(e1, acceleration)
         return np.asarray(spin_rate * e1 + (w @ e1) * e1_rate - swung / self._body.ball.radius)
 
@@ -273,8 +270,8 @@ class Reduced:
     title: ClassVar[str] = "reduced equations"
     witness: ClassVar[bool] = True
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "equations": ROLLS | {BallCapability.MOVING_WALL},
-        "closed_form": (ROLLS | {BallCapability.MOVING_WALL}) - {BallCapability.ROLLING_RESISTANCE},
+        "equations": ROLLS,
+        "closed_form": ROLLS - {BallCapability.ROLLING_RESISTANCE},
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "closed_form": {

@@ -4,10 +4,6 @@ Exudyn has no contact between a ball and a curved wall, but one between a ball a
 (``ObjectContactSphereSphere``). The hollow sphere is moved along before every Newton residual so that it touches the
 wall where the ball does; then its normal and its distance are those of the wall. Its friction is proportional to the
 slip velocity up to ``friction_zone`` and constant beyond, so that a ball that sticks creeps.
-
-A ball that flies meets it, too, where it meets the wall. Its impacts are Exudyn's own: a damping of the normal force
-that stands for a coefficient of restitution (``impactModel`` 2, the mixed model of Gonthier et al. and of Carvalho and
-Martins), while friction stops the contact point.
 """
 
 import dataclasses
@@ -21,7 +17,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event, EventKind
-from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.exudyn.ball.ball import add_ball
@@ -39,8 +35,6 @@ SURELY = 2.0
 LETTING_GO = 0.01
 # Looked up once: the functions that Exudyn calls use them at every iterate and step.
 POSITION, COORDINATES = Output.Position, Output.Coordinates
-# Exudyn wants a coefficient of restitution above zero.
-DEAD = 1e-6
 # What double precision leaves of any quantity, relative to its scale.
 ROUND_OFF = 1e-12
 
@@ -58,18 +52,16 @@ class PenaltyContact(BallRun):
         stiffness, self.zone, self._grip = settings.penalty
         mu = law.mu_kinetic if self.bounded else self._grip
         e1 = body.surface.normal(body.p0)
-        slips = bool(np.any(body.slip0))
-        unsteady = slips or body.gap0 > 0
-        force = initial_response(body)[1] if unsteady else newton_euler(body, body.p0, body.v0, body.w0)[2]
+        force = newton_euler(body, body.p0, body.v0, body.w0)[2]
         N = float(-force @ e1)
-        if N <= 0 and not body.gap0:
+        if N <= 0:
             raise Refused("nothing presses the ball against the wall at time 0, so its contact is not closed")
         friction = force + N * e1
         # At this slip velocity the softened friction is the one that rolling needs, from time 0 on.
         needed = float(np.linalg.norm(friction))
         if needed > mu * N and not self.bounded:
             raise Refused("rolling needs more friction than grip at time 0; use a larger grip")
-        creep = np.zeros(3) if slips else -self.zone * friction / (max(mu * N, needed) or 1.0)
+        creep = -self.zone * friction / (max(mu * N, needed) or 1.0)
         sunk = N / stiffness
         if sunk >= body.ball.radius:
             raise Refused(f"the load presses the ball {sunk:.3g} m into so soft a wall; use a larger stiffness")
@@ -83,7 +75,7 @@ class PenaltyContact(BallRun):
         )
         self.data = self.system.AddNode(
             items.NodeGenericData(
-                initialCoordinates=[body.gap0 - sunk, float(np.linalg.norm(body.slip0 + creep)), 0.0, 0.0],
+                initialCoordinates=[-sunk, float(np.linalg.norm(creep)), 0.0, 0.0],
                 numberOfDataCoordinates=4,
             )
         )
@@ -98,7 +90,6 @@ class PenaltyContact(BallRun):
                 dynamicFriction=mu,
                 frictionProportionalZone=self.zone,
                 contactStiffness=stiffness,
-                **_impacts(law.restitution),
             )
         )
         self.system.SetPreNewtonResidualUserFunction(
@@ -108,12 +99,10 @@ class PenaltyContact(BallRun):
         self._start = body, settings, creep, N, mu, hollow
         self._t = 0.0
         self._left: tuple[float, float] | None = None
-        self._sticks = needed <= mu * N and not slips
-        self._flies = body.flies
-        if not body.flies:  # a ball that flies sticks and slips only in impacts, shorter than any sample interval
-            self.system.SetPostStepUserFunction(self._watch)
-        self.integration = Integration(self.system, settings, impacts=body.flies)
-        if not self._sticks and not body.flies:
+        self._sticks = needed <= mu * N
+        self.system.SetPostStepUserFunction(self._watch)
+        self.integration = Integration(self.system, settings)
+        if not self._sticks:
             self.integration.events.append(Event(EventKind.SLIP, 0.0, 0.0, 0.0))
 
     def _watch(self, system: Any, t: float) -> bool:
@@ -157,26 +146,18 @@ class PenaltyContact(BallRun):
     def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`. The force is that of the contact."""
         force = self.system.GetObjectOutput(self.contact, Output.Force)
-        return dataclasses.replace(
-            self.ball.sample(force), sticking=self._sticks if self.bounded and not self._flies else None
-        )
+        return dataclasses.replace(self.ball.sample(force), sticking=self._sticks if self.bounded else None)
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         contact = self.system.GetObject(self.contact)
         gap = float(self.system.GetObjectOutput(self.contact, Output.DisplacementLocal))
-        # The hollow sphere stops following a ball far from the wall, so an open gap is not reported.
-        built = self.ball.built(float(contact["spheresRadii"][0] + min(gap, 0.0) / 2), None if gap > 0 else gap)
+        built = self.ball.built(float(contact["spheresRadii"][0] + gap / 2), gap)
         mu = float(contact["dynamicFriction"])
         terms = built.terms or frozenset()
         if mu != self._grip:
             terms |= {BallCapability.BOUNDED_FRICTION}
         return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, terms=terms, regularised=_softened(*self._start))
-
-
-def _impacts(restitution: float | None) -> dict[str, float]:
-    """Arguments of Exudyn's contact for a coefficient of restitution; none if the scene gives none."""
-    return {} if restitution is None else {"restitutionCoefficient": max(restitution, DEAD), "impactModel": 2}
 
 
 def _follower(
@@ -186,12 +167,12 @@ def _follower(
 
     Exudyn calls it for every residual, so its own functions are looked up once.
     """
-    output, move, farthest = system.GetNodeOutput, system.SetMarkerParameter, 0.5 * distance
+    output, move = system.GetNodeOutput, system.SetMarkerParameter
 
     def follow(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
         x, y, z = output(node, POSITION).tolist()
         gap, e1x, e1y, e1z = nearby(x, y, z)
-        back = (gap if gap < farthest else farthest) - distance
+        back = gap - distance
         move(marker, "localPosition", [x + back * e1x, y + back * e1y, z + back * e1z])
 
     return follow
@@ -244,12 +225,4 @@ def _softened(
 def _centre(body: RollingBall, distance: float) -> FloatArray:
     """Centre of the hollow sphere at time 0 [m], shape (3,), ``distance`` [m] from the centre of a touching ball."""
     gap, *e1 = body.surface.nearby(*body.p0.tolist())
-    return np.asarray(body.p0 + _back(gap, distance) * np.array(e1))
-
-
-def _back(gap: float, distance: float) -> float:
-    """Coordinate along e1 of the hollow sphere's centre from the ball's [m].
-
-    At most -``distance``/2: beyond a gap of ``distance``/2 the sphere follows the ball, not the wall.
-    """
-    return min(gap, 0.5 * distance) - distance
+    return np.asarray(body.p0 + (gap - distance) * np.array(e1))

@@ -18,29 +18,17 @@ RUNS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
     "rolling_disc": RollingDisc,
     "contact": PenaltyContact,
 }
-_HELD = "its constraint holds the ball on the wall"
-_ROLLS_AT_REST: Mapping[str, str] = {
-    BallCapability.IMPACTS: _HELD,
-    BallCapability.BOUNDED_FRICTION: "its joint rolls without slip",
-    BallCapability.MOVING_WALL: "its joint rolls on a body at rest",
-}
+_ROLLS: Mapping[str, str] = {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip"}
 PROVIDES: Mapping[str, frozenset[str]] = {
-    "generic": (ALL_OF_A_BALL | {BallCapability.MOVING_WALL}) - {BallCapability.ORIENTATION},
+    "generic": ALL_OF_A_BALL - {BallCapability.ORIENTATION},
     "carrier": ROLLS | {BallCapability.ORIENTATION},
     "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
-    "contact": ALL_OF_A_BALL | {BallCapability.IMPACTS},
+    "contact": ALL_OF_A_BALL,
 }
 LACKING: Mapping[str, Mapping[str, str]] = {
-    "generic": {
-        BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation",
-        BallCapability.IMPACTS: _HELD,
-    },
-    "contact": {
-        BallCapability.TANGENTIAL_RESTITUTION: "its friction stops the contact point, and has no restitution",
-        BallCapability.MOVING_WALL: "its hollow sphere has no velocity",
-    },
-    "carrier": _ROLLS_AT_REST,
-    "rolling_disc": _ROLLS_AT_REST,
+    "generic": {BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation"},
+    "carrier": _ROLLS,
+    "rolling_disc": _ROLLS,
 }
 INHERENT: Mapping[str, Mapping[str, str]] = {
     formulation: {BallCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}

@@ -28,8 +28,8 @@ class LocalGeometry:
 
 
 def slides(body: RollingBall) -> bool:
-    """True if the wall is at rest and two rigid motions slide it along itself, so it may be homogeneous."""
-    return body.surface.generators is not None and body.wall_rate is None
+    """True if two rigid motions slide the wall along itself, so it may be homogeneous."""
+    return body.surface.generators is not None
 
 
 def local_geometry(surface: Surface, u0: FloatArray) -> LocalGeometry:

@@ -11,8 +11,6 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
@@ -70,7 +68,7 @@ class SwitchedIntegration:
         self._place_matters, self._shortest = model.place_matters, 0.5 * settings.dt
         self._watching, self._stopped = False, False
         self.system.SetPostStepUserFunction(self._watch)
-        if np.any(body.slip0) or self._margin(self.state.touch) < 0:
+        if self._margin(self.state.touch) < 0:
             self._switch(EventKind.SLIP, 0.0, 0.0, 0.0)
         self._restart()
 

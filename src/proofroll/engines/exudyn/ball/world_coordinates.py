@@ -1,7 +1,7 @@
-"""``generic`` in world coordinates: for walls that move, or that no rigid motion slides along themselves.
+"""``generic`` in world coordinates: for walls that no rigid motion slides along themselves.
 
 Two mass points stand for the ball: one with its mass at its centre, one with its inertia, whose velocity is the angular
-velocity (Euler's equation of a ball is J ω̇ = M). Rolling, v + a ω × e1 = W × (p + a e1), is a constraint on velocities
+velocity (Euler's equation of a ball is J ω̇ = M). Rolling, v + a ω × e1 = 0, is a constraint on velocities
 by user functions (``CoordinateVectorConstraint``); its component along e1 is the wall. As in :mod:`generic`, this tests
 Exudyn's integration of a system with multipliers.
 """
@@ -29,8 +29,8 @@ class WorldCoordinates(BallRun):
         """Builds and initialises; raises Refused if friction is bounded."""
         if math.isfinite(body.contact.mu_static):
             raise Refused(
-                "generic lets a ball slip only on a wall at rest that slides along itself, in whose coordinates its "
-                "friction is built; use contact"
+                "generic lets a ball slip only on a wall that slides along itself, in whose coordinates its friction "
+                "is built; use contact"
             )
         super().__init__()
         add = self.system
@@ -62,8 +62,6 @@ class WorldCoordinates(BallRun):
         # Terms of the rows' derivative without p̈ and ω̇, which Exudyn does not compute.
         a, e1_rate = body.ball.radius, body.surface.normal_gradient(body.p0) @ body.v0
         turning = -a * cross(body.w0, e1_rate)
-        if body.wall_rate is not None:
-            turning += cross(body.wall_rate, body.v0 + a * e1_rate)
         # The block of ω in the rows is a times a matrix with the singular values 1, 1 and 0.
         _, jacobian, _ = initial_matrices(self.system, settings)
         self._radius = float(np.linalg.norm(jacobian[6:, 3:6])) / math.sqrt(2)
@@ -98,14 +96,12 @@ class WorldCoordinates(BallRun):
 
 
 def _rolling(body: RollingBall) -> Callable[..., FloatArray]:
-    """User function for the velocity of the ball at the contact relative to the wall [m/s]."""
-    a, normal, wall_rate = body.ball.radius, body.surface.normal, body.wall_rate
+    """User function for the velocity of the ball at the contact [m/s]."""
+    a, normal = body.ball.radius, body.surface.normal
 
     def constraint(_system: Any, _t: float, _item: int, q: Any, q_t: Any, _velocity_level: bool) -> FloatArray:
         p, rates = np.array(q)[:3], np.array(q_t)
-        e1 = normal(p)
-        relative = rates[:3] + a * cross(rates[3:], e1)
-        return relative if wall_rate is None else relative - cross(wall_rate, p + a * e1)
+        return rates[:3] + a * cross(rates[3:], normal(p))
 
     return constraint
 

@@ -1,6 +1,5 @@
 """Sequence of sticking and slipping of a ball: the present mode, its end, and the next mode."""
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -67,13 +66,7 @@ class Switching:
         self._lost: str | None = None
         self.mode: BallMode = self._stick
         self._survey = Survey(())
-        if not np.any(body.slip0):
-            self._settle(0.0, 0.0, x, was_sticking=True)
-        else:
-            self._event(EventKind.SLIP, 0.0, 0.0)
-            slip = body.surface.frame(body.u0)[:, 1:].T @ body.slip0
-            size, angle = math.hypot(*slip.tolist()), math.atan2(slip[1], slip[0])
-            self._enter(self._free, 0.0, np.concatenate([x, [size, angle]]))
+        self._settle(0.0, 0.0, x, was_sticking=True)
 
     @property
     def x(self) -> FloatArray:

@@ -27,10 +27,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.projection.ball.geometry import Frame, Geometry, Shape, Vector, along, matrix
+from proofroll.engines.projection.ball.geometry import Frame, Geometry, Shape, Vector, along
 from proofroll.engines.projection.ball.orientation import Orientation
 
 Active = Literal["contact", "centre"] | None
@@ -46,10 +46,9 @@ class Kinematics(NamedTuple):
         pose: numbers of the rotation, see :meth:`Orientation.pose`.
         v: D s, six numbers.
         drift: Ḋ s of the centre, along e1, e2, e3 [m/s²].
-        convected: acceleration of the centre along e2, e3 that changes no slip: by the turning of the axes, and of the
-            wall's velocity at the contact [m/s²].
+        convected: acceleration of the centre along e2, e3 by the turning of the axes alone, which changes no slip
+            [m/s²].
         turned: rate of ω' by the turning of the axes alone [rad/s²].
-        carried: velocity of the wall at the contact, along e2 and e3 [m/s]; zero for a wall at rest.
     """
 
     frame: Frame
@@ -61,7 +60,6 @@ class Kinematics(NamedTuple):
     drift: Vector
     convected: tuple[float, float]
     turned: Vector
-    carried: tuple[float, float]
 
 
 class Response(NamedTuple):
@@ -106,7 +104,6 @@ class ProjectedBall:
         self._geometry = geometry
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
-        self._surface, self._wall_rate = body.surface, body.wall_rate
 
     def kinematics(self, x: FloatArray) -> Kinematics:
         """Explicit form of the holonomic constraint at the state x."""
@@ -123,10 +120,7 @@ class ProjectedBall:
         w1, w2, w3 = self._orientation.angular_velocity(pose, r, frame)
         v2, v3 = t2u * s_1 + t2v * s_2, t3u * s_1 + t3v * s_2
         v = (0.0, v2, v3, w1, w2, w3)
-        convected, carried = (-o1 * v3, o1 * v2), (0.0, 0.0)
-        if self._wall_rate is not None:
-            carried, gain2, gain3 = self._carried(matrix(frame), state[:2], self._wall_rate, (v2, v3), (o1, o2, o3))
-            convected = convected[0] + gain2, convected[1] + gain3
+        convected = (-o1 * v3, o1 * v2)
         turned = (o2 * w3 - o3 * w2, o3 * w1 - o1 * w3, o1 * w2 - o2 * w1)
         rates = (s_1, s_2, *self._orientation.rates(angles, r, frame))
         return Kinematics(
@@ -139,18 +133,7 @@ class ProjectedBall:
             drift=drift,
             convected=convected,
             turned=turned,
-            carried=carried,
         )
-
-    def _carried(
-        self, F: FloatArray, place: Sequence[float], W: FloatArray, v: tuple[float, float], turning: Vector
-    ) -> tuple[tuple[float, float], float, float]:
-        """Velocity W × (p + a e1) along e2 and e3 of a wall that turns at W, and its rate along the turning axes."""
-        a, (_, o2, o3) = self.radius, turning
-        W = W @ F
-        velocity = cross(W, self._surface.position(np.array(place)) @ F + [a, 0.0, 0.0])
-        rate = cross(W, np.array([0.0, v[0] + a * o3, v[1] - a * o2])) - cross(np.array(turning), velocity)
-        return (velocity.item(1), velocity.item(2)), rate.item(1), rate.item(2)
 
     def speed(self, x: FloatArray) -> float:
         """Speed of the centre [m/s]."""
@@ -238,9 +221,9 @@ class ProjectedBall:
         return twin
 
     def slip(self, kin: Kinematics) -> tuple[float, float]:
-        """Slip velocity C v along e2 and e3, relative to the wall [m/s]."""
-        (_, v2, v3, _, w2, w3), (carried2, carried3) = kin.v, kin.carried
-        return v2 + self.radius * w3 - carried2, v3 - self.radius * w2 - carried3
+        """Slip velocity C v along e2 and e3 [m/s]."""
+        _, v2, v3, _, w2, w3 = kin.v
+        return v2 + self.radius * w3, v3 - self.radius * w2
 
     def eliminated(self, x: FloatArray, slip: tuple[float, float] = (0.0, 0.0)) -> FloatArray:
         """State x with the violation of C v = ``slip`` [m/s] removed from s (Blajer 2002).

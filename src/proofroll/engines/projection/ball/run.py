@@ -23,10 +23,7 @@ from proofroll.engines.projection.settings import ProjectionSettings
 # Components of the state without the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7
 FORMULATIONS = ("euler", "rotating_frame")
-PROVIDES: Mapping[str, frozenset[str]] = dict.fromkeys(FORMULATIONS, ALL_OF_A_BALL | {BallCapability.MOVING_WALL})
-LACKING: Mapping[str, Mapping[str, str]] = {
-    name: {BallCapability.IMPACTS: "its constraint holds the ball on the wall"} for name in FORMULATIONS
-}
+PROVIDES: Mapping[str, frozenset[str]] = dict.fromkeys(FORMULATIONS, ALL_OF_A_BALL)
 INHERENT: Mapping[str, Mapping[str, str]] = {
     "euler": {BallCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
 }

@@ -140,19 +140,16 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
 
 @overview.register
 def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
-    """Drawings of a slope with its angle, the ball on or above it, and its speeds down and across."""
+    """Drawings of a slope with its angle, the ball on it, and its speeds down and across."""
     a, surface = body.ball.radius, body.surface
-    size = max(6.0 * a, body.gap0)
+    size = 6.0 * a
     drawn, view = Drawing(), View(_direction(-62, 22), (0, 0, 1), _SIZE / size)
     corners = [(-0.8, -0.7), (1.3, -0.7), (1.3, 0.7), (-0.8, 0.7)]
     low, high = (wall.position(size * np.array(u)) for u in (corners[2], corners[3]))
     drawn.path(view([wall.position(size * np.array(u)) for u in corners]), "wall", closed=True)
     _slope(drawn, view, low, high)
-    start, touching, frame = body.p0, surface.position(body.u0), surface.frame(body.u0)
-    foot = touching + a * frame[:, 0]
-    if body.gap0:
-        drawn.path(view([start, touching]), "hidden")
-        drawn.disc(view(touching).tolist(), a * view.scale, "ghost")
+    start, frame = body.p0, surface.frame(body.u0)
+    foot = start + a * frame[:, 0]
     for index, letter in ((1, "V_0"), (2, "V_3")):
         velocity = size * frame[:, index]
         drawn.vector(view([foot, foot + 0.95 * velocity]), "thin", surface.coordinates[index - 1], by=14.0)

@@ -25,7 +25,6 @@ class BallReport(ReportKind):
     groups: ClassVar[Mapping[str, tuple[str, str]]] = {
         "ball rolling": ("Rolling balls", "a ball rolls without slip on a wall"),
         "ball slipping": ("Slipping balls", "a ball sticks, slips and may fall: bounded friction"),
-        "ball impacts": ("Bouncing balls", "a ball hits a wall and leaves it"),
     }
     caption: ClassVar[str] = (
         "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e₁ into the wall, e₂ "
@@ -39,11 +38,8 @@ class BallReport(ReportKind):
 
     @staticmethod
     def group(scene: Scene) -> str:
-        """Group of the ball's contact with the wall: impacts, slipping, or rolling."""
-        needs = scene.elements[0].requires
-        if BallCapability.IMPACTS in needs:
-            return "ball impacts"
-        return "ball slipping" if BallCapability.BOUNDED_FRICTION in needs else "ball rolling"
+        """Group of the ball's contact with the wall: slipping or rolling."""
+        return "ball slipping" if BallCapability.BOUNDED_FRICTION in scene.elements[0].requires else "ball rolling"
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:

@@ -47,8 +47,6 @@ _AFTER: Mapping[str, int] = {
     EventKind.SLIP: SLIPS,
     EventKind.STICK: STICKS,
     EventKind.LIFT_OFF: AWAY,
-    EventKind.BOUNCE: AWAY,
-    EventKind.SETTLE: STICKS,
 }
 
 
@@ -107,18 +105,18 @@ def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
         normal=normal,
         press=press,
         friction=friction,
-        state=_state(sampled, times, flies=body.gap0 > 0),
+        state=_state(sampled, times),
     )
 
 
-def _state(sampled: Sampled, times: FloatArray, flies: bool) -> npt.NDArray[np.uint8] | None:
+def _state(sampled: Sampled, times: FloatArray) -> npt.NDArray[np.uint8] | None:
     """State of the contact at each frame, from the events, whose times are finer than the samples; None: unknown.
 
-    With unbounded friction a ball on the wall sticks; ``flies``: it starts off the wall.
+    With unbounded friction a ball on the wall sticks.
     """
-    if "sticking" not in sampled and not flies and not len(sampled.get("event_kind", ())):
+    if "sticking" not in sampled and not len(sampled.get("event_kind", ())):
         return None
-    start = AWAY if flies else int(sampled["sticking"][0]) if "sticking" in sampled else STICKS
+    start = int(sampled["sticking"][0]) if "sticking" in sampled else STICKS
     state = np.full(times.shape, start, dtype=np.uint8)
     for kind, time in _events(sampled):
         state[times >= time] = _AFTER[kind]  # never at NaN

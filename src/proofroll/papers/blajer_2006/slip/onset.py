@@ -101,16 +101,15 @@ def onset_study(
         progress: called with each finished case.
 
     Raises:
-        InputError: the scene is not one ball that begins on its wall, its friction is unbounded, or a name is
-            unknown.
+        InputError: the scene is not one ball that begins to roll on a plane or in a cylinder, its friction is
+            unbounded, or a name is unknown.
     """
     from proofroll.truth.ball_on_surface.onset import onset
 
     loaded = load_scene(scene, **parameters)
     if len(loaded.elements) > 1 or not isinstance(loaded.elements[0], BallOnSurface):
-        raise InputError("scene", scene, "a first slip needs one ball on one surface; name a scene of these")
-    if loaded.elements[0].rolling.gap0:
-        raise InputError("scene", scene, "its ball begins in the air; name a scene whose ball begins on its wall")
+        advice = "a first slip needs one ball that begins to roll on a plane or in a cylinder; name a scene of these"
+        raise InputError("scene", scene, advice)
     if BallCapability.BOUNDED_FRICTION not in loaded.requires:
         raise InputError("mu_static", "inf", "without bounded friction the ball never slips; give --set mu_static=…")
     with ThreadPoolExecutor(1) as pool:  # engines start while the truth is worked out
