@@ -16,6 +16,7 @@ from scipy.io import netcdf_file
 from proofroll.core.columns import Columns
 from proofroll.core.errors import ProofrollError
 from proofroll.core.events import Event, with_events
+from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import StoredTrajectory, read, read_columns, write
 from proofroll.running.simulation import simulate
 
@@ -37,7 +38,7 @@ RUNS = {
     "kinds": ALL_KINDS,
     "no event": NO_EVENT,
     "an event": with_events(ALL_KINDS, [Event("slip", 0.5, 0.4, 0.6)]),
-    "balls": simulate("slide_to_roll", "projection", until=0.3),
+    "balls": simulate(load_scene("sphere_in_cylinder", mu_static=0.2, mu_kinetic=0.15), "projection", until=0.3),
     "mechanisms": simulate("double_pendulum", until=0.1),
 }
 BOTH = pytest.mark.parametrize("ending", [".npz", ".nc"])
