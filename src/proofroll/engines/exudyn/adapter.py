@@ -1,9 +1,8 @@
 """Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
 
-It has no joint for a sphere on a curved wall. Four formulations of one are built from its items: :mod:`generic` (on a
-wall that moves, or that no rigid motion slides along itself, :mod:`world_coordinates`), :mod:`carrier`,
-:mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all but the first the ball is a
-rigid body; its orientation is always in the model, as Euler parameters of its node.
+It has no joint for a sphere on a curved wall. Four formulations of one are built from its items: :mod:`generic`,
+:mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all but the first
+the ball is a rigid body; its orientation is always in the model, as Euler parameters of its node.
 
 Mechanisms are bodies in redundant coordinates (:mod:`redundant`), with contacts of spheres (:mod:`spheres`) or discs
 that roll (:mod:`discs`), or its kinematic tree (:mod:`tree`).

@@ -6,14 +6,12 @@ from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallC
 from proofroll.engines.exudyn.ball.carrier import Carrier
 from proofroll.engines.exudyn.ball.contact import PenaltyContact
 from proofroll.engines.exudyn.ball.generic import Generic
-from proofroll.engines.exudyn.ball.local_frame import slides
 from proofroll.engines.exudyn.ball.rolling_disc import RollingDisc
-from proofroll.engines.exudyn.ball.world_coordinates import WorldCoordinates
 from proofroll.engines.exudyn.integration import ExudynModel
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 RUNS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
-    "generic": lambda body, settings: (Generic if slides(body) else WorldCoordinates)(body, settings),
+    "generic": Generic,
     "carrier": Carrier,
     "rolling_disc": RollingDisc,
     "contact": PenaltyContact,

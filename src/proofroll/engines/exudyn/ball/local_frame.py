@@ -6,7 +6,6 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator, Surface
 
 
@@ -27,18 +26,11 @@ class LocalGeometry:
     generators: tuple[Generator, Generator]
 
 
-def slides(body: RollingBall) -> bool:
-    """True if two rigid motions slide the wall along itself, so it may be homogeneous."""
-    return body.surface.generators is not None
-
-
 def local_geometry(surface: Surface, u0: FloatArray) -> LocalGeometry:
     """Constant local coefficients of a homogeneous surface. Raises Refused for any other."""
     generators = surface.generators
     if generators is None:
-        raise Refused(
-            "the wall does not slide along itself, so rolling has no constant coefficients; use generic or rolling_disc"
-        )
+        raise Refused("the wall does not slide along itself, so rolling has no constant coefficients; use rolling_disc")
     at_start = _coefficients(surface, generators, u0)
     # Two generators that do not commute give a frame that slides along itself but derivatives that change.
     for step in ((0.3, 0.0), (0.0, 0.3), (-0.7, 0.4)):
