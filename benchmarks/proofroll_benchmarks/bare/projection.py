@@ -18,7 +18,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.projection.ball.geometry import geometry_of
+from proofroll.engines.projection.ball.geometry import Uniform
 from proofroll.engines.projection.ball.method import ProjectedBall, start_and_scales
 from proofroll.engines.projection.ball.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates
@@ -35,7 +35,7 @@ def prepare(scene: Scene, settings: Any) -> Bare:
 
 def _ball(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
     orientation: Orientation = EulerAngles() if settings.formulation == "euler" else RotatingFrame()
-    ball = ProjectedBall(body, geometry_of(body.surface), orientation)
+    ball = ProjectedBall(body, Uniform(body.surface), orientation)
     mu, (start, scales) = body.contact.mu_static, start_and_scales(body, orientation)
 
     def after(x: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.elements.mechanism.run.contacts.on_wall import slip_velocity
 from proofroll.engines.projection.ball import ball_modes
 from proofroll.engines.projection.ball.friction import Friction
-from proofroll.engines.projection.ball.geometry import geometry_of
+from proofroll.engines.projection.ball.geometry import Uniform
 from proofroll.engines.projection.ball.method import ProjectedBall
 from proofroll.engines.projection.ball.orientation import EulerAngles, RotatingFrame
 from proofroll.running.recording import record
@@ -208,7 +208,7 @@ def test_drive_is_the_needed_friction(orientation, seed):
     rng = np.random.default_rng(seed)
     scene = cylinder(rolling_resistance=5e-4, mu_static=0.3)
     describe = orientation()
-    ball = ProjectedBall(rolling_ball(scene), geometry_of(rolling_ball(scene).surface), describe)
+    ball = ProjectedBall(rolling_ball(scene), Uniform(rolling_ball(scene).surface), describe)
     angles = np.array([0.3, 1.2, -0.7])[: describe.size]
     kin = ball.kinematics(np.concatenate([rng.uniform(-2, 2, 2), angles, rng.uniform(-1, 1, 5) * [20, 1, 90, 90, 90]]))
     needed = ball.contact_force(ball.response(kin))[1:]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.surfaces import Generator, Surface
+from proofroll.elements.ball_on_surface.surfaces import Surface
 
 Vector = tuple[float, float, float]
 
@@ -88,11 +88,11 @@ class Uniform:
         column: index of the coordinate that turns the frame; None: there is none.
     """
 
-    def __init__(self, surface: Surface, generators: tuple[Generator, Generator]) -> None:
+    def __init__(self, surface: Surface) -> None:
         self._start = GeneralSurface(surface).at((0.0, 0.0))
         # At most one of two commuting motions of a surface is a rotation.
-        self.column = next((i for i, motion in enumerate(generators) if motion.kind == "rotation"), None)
-        k1, k2, k3 = (0.0, 0.0, 0.0) if self.column is None else generators[self.column].axis
+        self.column = next((i for i, motion in enumerate(surface.generators) if motion.kind == "rotation"), None)
+        k1, k2, k3 = (0.0, 0.0, 0.0) if self.column is None else surface.generators[self.column].axis
         cross = np.array([[0.0, -k3, k2], [k3, 0.0, -k1], [-k2, k1, 0.0]])
         # F0, F1, F2 of the frame F0 + sin α F1 + (1 - cos α) F2 at the coordinate α (Rodrigues).
         self._parts = [(part @ matrix(self._start[0])).T.ravel().tolist() for part in (np.eye(3), cross, cross @ cross)]
@@ -121,18 +121,3 @@ class Uniform:
             z3 + sin * c3 + back * f3,
         )
         return frame, self._start[1]
-
-
-Geometry = GeneralSurface | Uniform
-
-
-def geometry_of(surface: Surface) -> Geometry:
-    """Cheapest description that is exact for this surface."""
-    generators = surface.generators
-    if generators is None:
-        return GeneralSurface(surface)
-    motion_1, motion_2 = generators
-    rotations = (motion_1.kind, motion_2.kind).count("rotation")
-    parallel = not np.any(np.abs(np.cross(motion_1.axis, motion_2.axis)) > 4 * np.finfo(float).eps)
-    commute = rotations == 0 or (rotations == 1 and parallel)
-    return Uniform(surface, generators) if commute else GeneralSurface(surface)

@@ -30,7 +30,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.projection.ball.geometry import Frame, Geometry, Shape, Vector, along
+from proofroll.engines.projection.ball.geometry import Frame, Shape, Uniform, Vector, along
 from proofroll.engines.projection.ball.orientation import Orientation
 
 Active = Literal["contact", "centre"] | None
@@ -94,7 +94,7 @@ class ProjectedBall:
             - a ω2; "centre": also the two of a centre at rest, ω2 and ω3; None: no rows.
     """
 
-    def __init__(self, body: RollingBall, geometry: Geometry, orientation: Orientation) -> None:
+    def __init__(self, body: RollingBall, geometry: Uniform, orientation: Orientation) -> None:
         self.mass, self.inertia, self.radius = float(body.ball.mass), float(body.ball.inertia), float(body.ball.radius)
         self.mobility = 1.0 / self.mass + self.radius**2 / self.inertia
         self.gravity = body.gravity

@@ -14,7 +14,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.projection.ball.ball_switching import Switching
-from proofroll.engines.projection.ball.geometry import geometry_of, matrix
+from proofroll.engines.projection.ball.geometry import Uniform, matrix
 from proofroll.engines.projection.ball.method import ProjectedBall, start_and_scales
 from proofroll.engines.projection.ball.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
 from proofroll.engines.projection.ball.taylor import TaylorSeries
@@ -35,7 +35,7 @@ class ProjectionBall:
     def __init__(self, body: RollingBall, settings: ProjectionSettings, *, follow: bool = False) -> None:
         """Ball at time 0; ``follow``: integrate its orientation too if the formulation does not need it."""
         self._surface = body.surface
-        geometry = geometry_of(body.surface)
+        geometry = Uniform(body.surface)
         self._orientation: Orientation
         if settings.formulation == "euler":
             self._orientation = EulerAngles(renews=settings.singularity == "renew")
