@@ -28,7 +28,7 @@ from proofroll.elements.mechanism.contact.acting import (
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.dynamics.switches import REDUNDANT
 from proofroll.elements.mechanism.scene.kinks import JUMP
-from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.rotations import Array, cross
 from proofroll.elements.mechanism.scene.signal import varies
 from proofroll.truth.followed_paths import CLOSE, TOLERANCES
 from proofroll.truth.numerics.hybrid import Stretch, StretchLaw, integrate_to_guard, states_at
@@ -56,6 +56,8 @@ _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit
 # direction of a slip of 2e-8 is known to 1e-8.
 _SAME_RATES = 1e-6
 
+# Angle [rad] and number of steps by which the direction is found in which a slip stops.
+_NEARBY, _TURNS = 1e-3, 2
 # Guard of the first instants of a slip, which goes on.
 _GOES_ON = -1
 
@@ -333,12 +335,54 @@ class ContactWalks(ABC):
             speeds, changes = zip(*map(one, states.T), strict=True)
             return np.array(speeds), np.array(changes).T
 
+        def line_of(y: Array) -> tuple[Array, Array] | None:
+            return self._straight_end(y, self._as_it_goes(y, mode), k)
+
         compiled = self.by_symbols(state, mode)
         decay = by_states if compiled is None else compiled.decay_of(mode, k, time)
         guard = guards_of(self.contacts, mode).index(ContactGuard(k, "still"))
-        slip = stopping_slip(time, state, mode, guard, decay)
+        slip = stopping_slip(time, state, mode, guard, decay, line_of)
         slows = self._solved(slip.line, self._as_it_goes(slip.line, mode)).slide_rate[k]
-        return replace(slip, blur=(ROUND_OFF + TOLERANCES[1]) / float(np.linalg.norm(slows)))
+        sticking = (*mode[:k], mode[k]._replace(kind="stick", stops=False), *mode[k + 1 :])
+        last = self._equations.eliminated(slip.last, sticking)
+        return replace(slip, last=last, blur=(ROUND_OFF + TOLERANCES[1]) / float(np.linalg.norm(slows)))
+
+    def _straight_end(self, state: Array, mode: ContactMode, k: int) -> tuple[Array, Array] | None:
+        """Changes of a state until a slip stops along one direction, by its first rates and in fact; None: it turns.
+
+        The direction is that in which the slip stops, found at half the time. The slip has to have it within round-off,
+        and its slowing to be even within round-off, in the second order.
+        """
+        touch = self._touching(state, features_of(mode))[k]
+        slip, normal = slip_velocity(touch), touch.normal
+        rate, slows = self._equations.rate(state, mode), self._solved(state, mode).slide_rate[k]
+        speed = float(np.linalg.norm(slip))
+        if not speed or not slows.any():
+            return None
+        lasts = faint_time(touch, slows)
+        half = state + lasts / 2 * rate
+        first, across = slip / speed, cross(normal, slip / speed)
+
+        def held(angle: float) -> tuple[ContactMode, Array]:
+            x, y, z = (np.cos(angle) * first + np.sin(angle) * across).tolist()
+            turned = (*mode[:k], mode[k]._replace(heading=(x, y, z), leads=True), *mode[k + 1 :])
+            return turned, self._solved(half, turned).slide_rate[k]
+
+        before, angle = _NEARBY, 0.0
+        of_before, of_angle = (float(held(turn)[1] @ across) for turn in (before, angle))
+        for _ in range(_TURNS):
+            if of_angle == of_before:
+                break
+            turn = angle - of_angle * (angle - before) / (of_angle - of_before)
+            if abs(turn) * speed > 2 * ROUND_OFF:
+                return None
+            before, of_before, angle, of_angle = angle, of_angle, turn, float(held(turn)[1] @ across)
+        turned, slows = held(angle)
+        found = faint_time(touch, slows)
+        uneven = abs(found - lasts) / (found or 1.0)
+        if abs(angle) * speed > ROUND_OFF or uneven**2 * speed > ROUND_OFF or not found:
+            return None
+        return found * rate, found * self._equations.rate(half, turned)
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""

@@ -1,6 +1,7 @@
 """Last instants of a slip in the plane, below FAINT, for both routes: by the logarithm of its speed, then a line.
 
-The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm.
+The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm. A slip that slows
+gently has turned long before, and its equations are stiff in that logarithm, too: it is a line at once.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,10 +15,12 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import Stretch
 from proofroll.truth.numerics.picard import PicardSteps, StatesInside
 
-_DECAY = 2.0  # decrease of the logarithm in a step; down to round-off, from where on the slip is a straight line
+_DECAY = 2.0  # decrease of the logarithm in a step; from round-off on the slip is a line
 
 # Slip speeds at states (state, places), and changes of the states until the slip would stop at its present rate.
 Decay = Callable[[Array], tuple[Array, Array]]
+# Changes of a state until a slip stops without a turn, at its first rates and in fact; None: it turns.
+LineOf = Callable[[Array], tuple[Array, Array] | None]
 
 
 class _Step(NamedTuple):
@@ -35,11 +38,13 @@ class StoppingSlip(Stretch[ContactMode]):
 
     Attributes:
         steps: in the logarithm of the speed.
-        line: state at the start of the straight line.
+        line: state at the start of the line.
+        begun: change along the line at the rates of its start.
     """
 
     steps: Sequence[_Step] = ()
     line: Any = None
+    begun: Any = None
 
     def at(self, times: Array) -> Array:
         """States at times [s] within it, shape (times, state)."""
@@ -50,8 +55,9 @@ class StoppingSlip(Stretch[ContactMode]):
 
         step = next((step for step in self.steps if time < step.time), None)
         if step is None:
-            begun, span = float(self.line[-1]), self.end - float(self.line[-1])
-            return np.asarray(self.line + (self.last - self.line) * (min(1.0, (time - begun) / span) if span else 1.0))
+            span = self.end - float(self.line[-1])
+            share = min(1.0, (time - float(self.line[-1])) / span) if span else 1.0
+            return np.asarray(self.line + share * self.begun + share**2 * (self.last - self.line - self.begun))
 
         def late(place: float) -> float:
             return float(step.inside(np.array([place]))[-1, 0]) - time
@@ -61,15 +67,20 @@ class StoppingSlip(Stretch[ContactMode]):
         return np.asarray(step.inside(np.array([place]))[:, 0])
 
 
-def stopping_slip(time: float, state: Array, mode: ContactMode, guard: int, decay: Decay) -> StoppingSlip:
+def stopping_slip(
+    time: float, state: Array, mode: ContactMode, guard: int, decay: Decay, line_of: LineOf
+) -> StoppingSlip:
     """Last instants of a slip from a time [s] and state on; ``guard``: that it stops."""
     start, steps, integrator, place = state, list[_Step](), PicardSteps(lambda states: decay(states)[1]), 0.0
     last = float(np.log(np.maximum(decay(state[:, None])[0], ROUND_OFF) / ROUND_OFF)[0])
-    while place < last:
+    while (line := line_of(state)) is None and place < last:
         end, state, inside = integrator.step(place, state, min(last, place + _DECAY))
         steps.append(_Step(place, end, float(state[-1]), inside))
         place = end
-    change = np.asarray(decay(state[:, None])[1][:, 0])
+    if line is None:
+        change = np.asarray(decay(state[:, None])[1][:, 0])
+        line = change, change
+    begun, change = line
     ended = state + change
     return StoppingSlip(
         start=time,
@@ -80,4 +91,5 @@ def stopping_slip(time: float, state: Array, mode: ContactMode, guard: int, deca
         guard=guard,
         steps=steps,
         line=state,
+        begun=begun,
     )

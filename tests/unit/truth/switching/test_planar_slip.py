@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,18 +17,22 @@ from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
+from proofroll.truth.numerics.picard import PicardSteps
 from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.switching import contact_taylor, stopping_slip
 from proofroll.truth.switching.planar_slip import LedValues, begun_slip
 from proofroll_drill.referee.random_contacts import random_contacts
 
 # s: of a ball that starts with 3 m/s in a cylinder, by its own truth
 SLIPS, STICKS = 0.3220872132861903, 0.4999850902951998
 NEAR = 2e-12  # s: error bars of that truth
+# s: slips and ends of slips of one that starts with 4 m/s and friction of 0.15, by the same
+GENTLE = (0.17666799150977489, 0.41209057382659164, 0.6281167309534607, 0.7103113246767829)
 
 
-def ball_in_a_bore(speed: float) -> Mechanism:
+def ball_in_a_bore(speed: float, friction: float = 0.35) -> Mechanism:
     """The ball of the founding scene as body, sphere and bore."""
-    scene = load_scene("sphere_in_cylinder", mu_static=0.35, speed=speed)
+    scene = load_scene("sphere_in_cylinder", mu_static=friction, speed=speed)
     found, wall = rolling_ball(scene), scene.elements[0].surface  # type: ignore[attr-defined]
     moment, radius = float(found.ball.inertia), float(found.ball.radius)
     free = Joint(
@@ -39,7 +44,7 @@ def ball_in_a_bore(speed: float) -> Mechanism:
         Geometry("wall", "world", "bore", radius=float(wall.radius)),
     )
     body = Body("ball", float(found.ball.mass), inertia=(moment,) * 3)
-    return Mechanism((body,), (free,), geometries=shapes, pairs=(Pair("touch", ("sphere", "wall"), 0.35),))
+    return Mechanism((body,), (free,), geometries=shapes, pairs=(Pair("touch", ("sphere", "wall"), friction),))
 
 
 @pytest.mark.drill
@@ -55,6 +60,25 @@ def test_a_ball_slips_from_rest_and_sticks_when_its_own_truth_says() -> None:
         assert event.time == pytest.approx(right, abs=1e-14)
     assert found.bars["p_WB"][-1] < 1e-13
     assert found.bars["v_WB"][-1] < 1e-12
+
+
+@pytest.mark.drill
+def test_a_slip_that_slows_gently_ends_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its last instants take no step of its stiff direction, and end when the ball's own truth says."""
+    taken, step = [0], PicardSteps.step
+
+    def counted(steps: PicardSteps, *arguments: Any) -> Any:
+        taken[0] += 1
+        return step(steps, *arguments)
+
+    monkeypatch.setattr(stopping_slip.PicardSteps, "step", counted)
+    # only the walks of the logarithm call it by this name; others have theirs from contact_taylor
+    monkeypatch.setattr(contact_taylor, "PicardSteps", type("Others", (PicardSteps,), {"step": step}))
+    found = truth_of(ball_in_a_bore(4.0, 0.15), np.linspace(0.0, 0.72, 3))
+    assert [event.kind for event in found.events] == ["slip", "stick", "slip", "stick"]
+    for event, right in zip(found.events, GENTLE, strict=True):
+        assert event.time == pytest.approx(right, abs=1e-13)
+    assert taken[0] <= 12  # of two routes; 550 without lines
 
 
 @pytest.mark.arithmetic
