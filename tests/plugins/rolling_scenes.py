@@ -56,10 +56,6 @@ def _contact(ball: RollingBall) -> RollingContact:
         raise Refused(f"mu_static = {law.mu_static:g} bounds the friction of {name}; rows that always hold do not slip")
     if law.rolling_resistance:
         raise Refused(f"rolling resistance of {name} is a moment that its normal force makes; no row gives it")
-    if ball.flies:
-        raise Refused(f"{name} may leave its wall; rows that always hold do not let it")
-    if ball.wall_rate is not None:
-        raise Refused(f"the wall of {name} moves; rows here are those of walls that stand")
     return RollingContact(name, float(ball.ball.radius), ball.surface, _vector(ball.p0))
 
 

@@ -23,21 +23,12 @@ class BallCapability(StrEnum):
     ROLLING_RESISTANCE = "rolling resistance"
     BOUNDED_FRICTION = "bounded friction (slip)"
     ORIENTATION = "the ball's orientation"
-    SLIPPING_START = "a start that slips"
-    MOVING_WALL = "a wall that moves"
-    IMPACTS = "impacts on the wall (restitution)"
-    TANGENTIAL_RESTITUTION = "restitution along the wall"
 
 
 ROLLS: frozenset[str] = frozenset(
     {BallCapability.ROLLING, BallCapability.CURVED_SURFACE, BallCapability.ROLLING_RESISTANCE}
 )
-# Capabilities for a ball that stays on a wall at rest; few formulations have the others, and declare them themselves.
-ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability) - {
-    BallCapability.MOVING_WALL,
-    BallCapability.IMPACTS,
-    BallCapability.TANGENTIAL_RESTITUTION,
-}
+ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability)
 
 
 @dataclass(frozen=True)
@@ -66,8 +57,6 @@ class RollingBall:
     v0: FloatArray
     w0: FloatArray
 
-    slip0: ClassVar[FloatArray] = read_only(np.zeros(3))
-    gap0: ClassVar[float] = 0.0
     flies: ClassVar[bool] = False
     wall_rate: ClassVar[FloatArray | None] = None
 
