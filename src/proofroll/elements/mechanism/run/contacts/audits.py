@@ -35,18 +35,20 @@ def energy_balance(body: OnWall, dataset: xr.Dataset) -> FloatArray:
     """Energy now plus the work that resistance and friction took, minus the energy at the start [J], shape (time,).
 
     The moment M of the rolling resistance takes the power -M · ω (N f V / a while rolling), friction -F · u, and a wall
-    that moves at the velocity w adds F · w; N, F, ω, V and the slip u are the engine's own. Without a force at time 0,
-    work counts from the first sample that has one, and the shape is (time - 1,). Samples off the grid come last.
+    that moves at the velocity w adds F · w; N, F, ω, V and the slip u are the engine's own. Work counts from the first
+    sample after time 0, where the certificate judges forces and soft contacts have none, and the shape is then (time -
+    1,). Samples off the grid come last.
     """
-    dataset = _with_forces(dataset)
+    bounded, f = "sticking" in dataset, body.contact.rolling_resistance
+    if bounded or f or body.wall_rate is not None:
+        dataset = dataset.isel(time=slice(1, None))
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
-    t, f = dataset["time"].to_numpy(), body.contact.rolling_resistance
+    t = dataset["time"].to_numpy()
     between, few = np.zeros(0), np.zeros(0)
     if BETWEEN in dataset:
         between = dataset[BETWEEN].to_numpy()
         few = _energy(body, dataset, f"{BETWEEN}.") - float(_energy(body, dataset, "")[0])
         between, few = between[between > t[0]], few[between > t[0]]
-    bounded = "sticking" in dataset
     power, rests = np.zeros_like(t), False
     if f:
         e1 = body.surface.normal(dataset["p_WB"].to_numpy())
