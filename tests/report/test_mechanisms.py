@@ -153,6 +153,20 @@ def test_a_bore_is_replayed_as_a_tube_along_the_way() -> None:
     assert len(ring.points) > 50
 
 
+@pytest.mark.parametrize(("name", "letters"), [("bowl", {"ξ", "η"}), ("cone", {"γ", "s"}), ("torus_rim", {"γ", "θ"})])
+def test_a_ball_on_a_curved_wall_is_drawn_on_a_net(name: str, letters: set[str]) -> None:
+    """Lines of coordinates, seen from behind dashed, their directions at the start, the ball inside the picture."""
+    picture = mechanism_drawing(load_scene(name).elements[0])  # type: ignore[arg-type]
+    looks = [getattr(mark, "look", "") for mark in picture.marks]
+    assert looks.count("line") > 10
+    assert looks.count("hidden") > 10
+    assert letters <= {"".join(part.text for part in getattr(mark, "parts", ())) for mark in picture.marks}
+    (ball,) = [mark for mark in picture.marks if getattr(mark, "look", "") == "ball"]
+    left, top, width, height = picture.box
+    assert left < ball.centre[0] < left + width
+    assert top < ball.centre[1] < top + height
+
+
 @pytest.mark.parametrize(("kind", "half"), [("capsule", [0.1, 0.1, 0.1]), ("cylinder", [0.1, 0.1, 0.3])])
 def test_long_bodies_are_replayed_whole(kind: GeometryKind, half: list[float]) -> None:
     """A capsule has its radius and its length in radii, a cylinder half of its length, along the axis of the file."""

@@ -9,12 +9,13 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.contact.start import TOUCHING, touches
 from proofroll.elements.mechanism.dynamics.kinematics import Tree
+from proofroll.elements.mechanism.report.ball_on_net import ball_on_net
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.checks import WORLD
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, SLIDING, JointKind
 from proofroll.elements.mechanism.scene.rotations import frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Shape, SphereShape, Wall
-from proofroll.elements.mechanism.scene.shapes.walls import BowlWall, CurvedWall, Declared, DeclaredWall
+from proofroll.elements.mechanism.scene.shapes.walls import BowlWall, CurvedWall
 from proofroll.report.pen import Drawing, View, across, circle, unit
 
 _SIZE = 240.0  # size of the mechanism in the picture [px]
@@ -35,7 +36,12 @@ _BOX_EDGES = [pair for pair in itertools.combinations(_CORNERS, 2) if np.abs(np.
 
 
 def mechanism_drawing(element: MechanismElement) -> Drawing:
-    """Drawing of a mechanism: lines from centres of mass to the fastenings of bodies, and marks of joints and parts."""
+    """Drawing of a mechanism: lines from centres of mass to the fastenings of bodies, and marks of joints and parts.
+
+    A ball on a curved wall, which is described in its local frame, is drawn on a net.
+    """
+    if (on_net := ball_on_net(element)) is not None:
+        return on_net
     mechanism, start, picture = element.mechanism, element.start, Drawing()
     view = View(*direction(element), _SIZE / _reach(element))
 
@@ -113,9 +119,6 @@ def _shapes(picture: Drawing, view: View, element: MechanismElement) -> None:
                 outline = middle + _PATCH * _reach(element) * np.array([x + y, y - x, -x - y, x - y, x + y])
             elif isinstance(shape, BowlWall) and _is_vertex(contact.shape_a, contact.shape_b):  # a cable
                 outline = np.stack([p + R @ shape.point, touch.place])
-            elif isinstance(shape, DeclaredWall):
-                _coordinate_lines(picture, view, shape.surface, touch.place)
-                continue
             elif isinstance(shape, CurvedWall):  # the circle about its axis through the contact
                 axis, foot = R @ shape.axis, p + R @ shape.point
                 middle = foot + axis * (axis @ (touch.place - foot))
@@ -137,14 +140,6 @@ def _shapes(picture: Drawing, view: View, element: MechanismElement) -> None:
         hull = _hull(np.array([com, *np.concatenate(paths)]))
         if len(paths) > 1 or np.any(np.all(hull == com, axis=1)):  # else the body is drawn by its only shape
             picture.path(hull, "line")
-
-
-def _coordinate_lines(picture: Drawing, view: View, surface: Declared, place: FloatArray) -> None:
-    """Draws the two lines of coordinates of a surface through a place on it."""
-    for column, (low, high) in enumerate(surface.domain):
-        u = np.tile(surface.locate(place), (_OUTLINE, 1))
-        u[:, column] = np.linspace(low, high, _OUTLINE)
-        picture.path(np.asarray(view(surface.position(u))), "hidden")
 
 
 def _is_vertex(*shapes: Shape) -> bool:
