@@ -90,6 +90,15 @@ def test_a_ball_that_does_not_bounce_leaves_its_only_impact_as_one_that_does() -
     assert events_of(found)[-1].time == pytest.approx(lands + brakes, abs=1e-11)
 
 
+def test_a_slip_that_unbounded_friction_would_stop_at_once_ends_the_truth() -> None:
+    """After an impact without rebound the two laws contradict each other; the truth keeps all before it and says so."""
+    scene = load_scene("bouncing_ball", speed=1.0, restitution=0.0, tangential_restitution=0.5)
+    found = truth(scene, np.array([0.0, 0.3, 1.0]))
+    assert found.attrs["ends"] == pytest.approx(math.sqrt(2 / G), abs=1e-12)
+    assert "contradict each other" in found.attrs["ended"]
+    assert np.isfinite(found["p_WB"][1]).all()
+
+
 @pytest.mark.drill
 @settings(max_examples=10, deadline=None)
 @given(

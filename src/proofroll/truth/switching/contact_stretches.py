@@ -311,6 +311,16 @@ class ContactStretches(ContactWalks):
                     "a bound"
                 )
 
+    def _check_slips_end(self, closed_mask: Sequence[bool], slips: Sequence[float], stopped: float) -> None:
+        """Raises Refused if an impact leaves a slip where the contact stays closed and friction has no bound."""
+        for shut, slip, contact in zip(closed_mask, slips, self.contacts, strict=True):
+            if shut and slip > stopped and np.isinf(contact.friction) and contact.tangential_restitution:
+                raise Refused(
+                    f"{contact.name} stays closed after an impact whose tangential_restitution leaves a slip, which "
+                    "friction without a bound stops at once: the two contradict each other; give friction a bound, or "
+                    "leave tangential_restitution out"
+                )
+
     def _settled(
         self, stretch: Stretch[ContactMode], state: Array, stays: Sequence[bool], series: GeometricSeries, speed: float
     ) -> Transition[ContactMode]:
@@ -366,6 +376,7 @@ class ContactStretches(ContactWalks):
         closed_mask, old_features = shut_by_pressing(self.contacts, closed_mask), features_of(stretch.mode)
         features = old_features if features is None else features
         slips = [float(np.linalg.norm(slip_velocity(touch))) for touch in self._touching(state, features)]
+        self._check_slips_end(closed_mask, slips, stopped)
         resting = [shut and slip <= stopped for shut, slip in zip(closed_mask, slips, strict=True)]
         rough = self._moved_on(state, modes_of(closed_mask, resting, features))
         state = self._equations.eliminated(state, rough)
