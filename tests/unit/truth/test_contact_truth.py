@@ -19,7 +19,6 @@ from proofroll.core.observable import Role
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.contact import coulomb
 from proofroll.elements.mechanism.contact.acting import modes_of
@@ -235,16 +234,9 @@ def test_a_ball_moves_as_its_own_truth_says(
 
 
 @pytest.mark.drill
-@pytest.mark.parametrize("flies", [False, True])
-def test_a_ball_in_a_bore_moves_as_in_its_cylinder(flies: bool) -> None:
-    """Body, sphere and bore have the motion of the ball's own routes: rolling upright, and hit and slid in a tilt."""
+def test_a_ball_in_a_bore_moves_as_in_its_cylinder() -> None:
+    """Body, sphere and bore have the motion of the ball's own routes, rolling upright."""
     scene = load_scene("sphere_in_cylinder", mu_static=0.35)
-    if flies:
-        scene = load_scene("tilted_cylinder", radius=0.05, cylinder_radius=0.5, tilt=1.0, mu_static=0.5)
-        element = scene.elements[0]
-        start = {"coordinates": (3.1, 0.0), "velocity": (3.0, 0.0), "tangential_spin": (0.0, 0.0), "gap": 0.02}
-        contact = replace(element.contact, restitution=0.5)  # type: ignore[attr-defined]
-        scene = scene_with(scene, contact=contact, start=replace(element.start, **start))  # type: ignore[attr-defined]
     wall, ball = scene.elements[0].surface, scene.elements[0].rolling  # type: ignore[attr-defined]
     moment, tilt = float(ball.ball.inertia), float(wall.tilt)
     body = Body("ball", float(ball.ball.mass), inertia=(moment, moment, moment))
@@ -261,9 +253,7 @@ def test_a_ball_in_a_bore_moves_as_in_its_cylinder(flies: bool) -> None:
     for field in ("p_WB", "v_WB", "w_WB"):
         apart = np.abs(getattr(found.record, field)[:, 0] - own[field].to_numpy()).max()
         assert apart <= found.bars[field][-1] + own[field].attrs["error_bar"], field
-    told = [{"bounce": "impact"}.get(event.kind, event.kind) for event in events_of(own)]
-    assert told == [event.kind for event in found.events]
-    assert ("impact" in told) == flies
+    assert [event.kind for event in events_of(own)] == [event.kind for event in found.events]
 
 
 @pytest.mark.drill
