@@ -242,6 +242,10 @@ def rolls_evenly(surface: object, contact: Contact, start: InitialMotion) -> boo
 def rolling_ball(scene: Scene) -> RollingBall:
     """Ball of a scene with one ball on one surface. Raises Refused if the scene has another element."""
     (element,) = scene.elements if len(scene.elements) == 1 else (None,)
+    from proofroll.elements.ball_on_surface.as_body import ball_of
+    from proofroll.elements.mechanism.run.element import MechanismElement
+    if isinstance(element, MechanismElement):
+        return ball_of(element)
     if not isinstance(element, BallOnSurface):
         what = ", ".join(item.name for item in scene.elements)
         raise Refused(f"represents one ball on one surface, and the scene holds {what}")

@@ -12,6 +12,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.elements.ball_on_surface.surfaces import Surface
 from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.scene.balls import Ball, Contact
 
 
@@ -25,10 +26,9 @@ class BallCapability(StrEnum):
     ORIENTATION = "the ball's orientation"
 
 
-ROLLS: frozenset[str] = frozenset(
-    {BallCapability.ROLLING, BallCapability.CURVED_SURFACE, BallCapability.ROLLING_RESISTANCE}
-)
-ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability)
+_BODY = MechanismCapability
+ROLLS: frozenset[str] = frozenset({_BODY.FREE, _BODY.CONTACT, _BODY.UNBOUNDED_FRICTION, _BODY.TURNING_FRICTION})
+ALL_OF_A_BALL: frozenset[str] = ROLLS | {_BODY.CONTACT_FRICTION, _BODY.STATIC_FRICTION}
 
 
 @dataclass(frozen=True)

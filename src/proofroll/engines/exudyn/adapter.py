@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunAsBody
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
@@ -144,7 +145,7 @@ class Exudyn:
         if settings.formulation in OF_MECHANISMS:
             return OF_MECHANISMS[settings.formulation](scene, settings)
         require_provided(cls, settings.formulation, scene)
-        return ball.RUNS[settings.formulation](rolling_ball(scene), settings)
+        return RunAsBody(ball.RUNS[settings.formulation](rolling_ball(scene), settings), scene.elements[0])
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:

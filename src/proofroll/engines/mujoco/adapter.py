@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import mujoco
+from proofroll.elements.ball_on_surface.as_body import RunAsBody
 import numpy as np
 
 from proofroll.core.engine_abilities import Level, Term, require_provided
@@ -85,7 +86,7 @@ class Mujoco:
         if settings.formulation in _MECHANISMS:
             return _MECHANISMS[settings.formulation](scene, settings)
         require_provided(cls, settings.formulation, scene)
-        return ball.MujocoBall.of(scene, settings)
+        return RunAsBody(ball.MujocoBall.of(scene, settings), scene.elements[0])
 
     @classmethod
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:

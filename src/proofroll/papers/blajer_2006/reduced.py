@@ -19,6 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.rolling import parameters, reduced, supports
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
+from proofroll.elements.ball_on_surface.as_body import RunAsBody
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability, RollingBall
@@ -303,5 +304,5 @@ class Reduced:
         require_provided(cls, settings.formulation, scene)
         body = rolling_ball(scene)
         if settings.rtol is None:
-            return ClosedFormModel(body)
-        return (Compiled if settings.integrator == "taylor" else Integrated)(body, settings.rtol)
+            return RunAsBody(ClosedFormModel(body), scene.elements[0])
+        return RunAsBody((Compiled if settings.integrator == "taylor" else Integrated)(body, settings.rtol), scene.elements[0])

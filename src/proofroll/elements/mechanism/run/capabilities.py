@@ -56,6 +56,7 @@ class MechanismCapability(StrEnum):
     SIGNALS = "drives and targets that change in time"
     HELD = "targets held between instants"
     MOTIONS = "prescribed motions of joints"
+    ANY_CONTACT = "contacts other than one ball's that rolls on a plane or in a cylinder"
 
 
 ALL_JOINTS = frozenset(MechanismCapability[kind.upper()] for kind in FACTS)

@@ -110,7 +110,13 @@ class MechanismElement:
     def requires(self) -> frozenset[str]:
         """See the protocol."""
         redundant = {MechanismCapability.REDUNDANT} if self.analysis.redundant else set()
-        return frozenset(required(self.mechanism) | redundant)
+        other = {MechanismCapability.ANY_CONTACT} if self.mechanism.contacts and not self._rolls else set()
+        return frozenset(required(self.mechanism) | redundant | other)
+
+    @property
+    def _rolls(self) -> bool:
+        on_wall = self.on_wall
+        return on_wall is not None and not on_wall.flies and len(self.bodies) == 1 and on_wall.surface.coordinates in (("gamma", "z"), ("down", "across"))
 
     def commands(self) -> Commands | None:
         """See :class:`proofroll.core.element_abilities.HoldsTargets`."""

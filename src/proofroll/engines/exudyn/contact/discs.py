@@ -25,7 +25,7 @@ from proofroll.engines.exudyn.smooth import redundant
 from proofroll.engines.exudyn.smooth.redundant import Redundant
 
 _CAPABILITY = MechanismCapability
-PROVIDES = redundant.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.UNBOUNDED_FRICTION}
+PROVIDES = redundant.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.ANY_CONTACT, _CAPABILITY.UNBOUNDED_FRICTION}
 _HELD = "its joint holds a disc on its plane"
 _STICKS = "its joint never slips (friction = inf)"
 LACKING: Mapping[str, str] = {

@@ -36,7 +36,7 @@ from proofroll.engines.exudyn.smooth import redundant
 from proofroll.engines.exudyn.smooth.redundant import Redundant
 
 _CAPABILITY = MechanismCapability
-_OF_CONTACT = {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.UNBOUNDED_FRICTION}
+_OF_CONTACT = {_CAPABILITY.CONTACT, _CAPABILITY.ANY_CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.UNBOUNDED_FRICTION}
 PROVIDES = redundant.PROVIDES | _OF_CONTACT | {_CAPABILITY.TURNING_FRICTION}
 LACKING: Mapping[str, str] = {
     **redundant.LACKING,

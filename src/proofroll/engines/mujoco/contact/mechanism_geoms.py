@@ -34,7 +34,7 @@ _SOFT = (
     "contacts are soft, start without load, lift what slips and lack the turning of their normals (J̇v); hard ones "
     "would change that much"
 )
-PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
+PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.ANY_CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
 PROVIDES |= {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION}
 LACKING: Mapping[str, str] = {
     **mechanism.LACKING,

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunAsBody
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
 from proofroll.engines.pinocchio.ball.contact import ContactRun
@@ -29,7 +30,7 @@ def ball_run(scene: Scene, settings: PinocchioSettings) -> BallRun:
         Refused: the scene requires the orientation, and the settings exclude it.
     """
     settings = _decided(scene, settings)
-    return (ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings)
+    return RunAsBody((ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings), scene.elements[0])
 
 
 def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
@@ -40,7 +41,7 @@ def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
     """
     if settings.formulation == "contact":
         return settings
-    asked = BallCapability.ORIENTATION in scene.requires
+    asked = True
     if asked and settings.orientation is False:
         raise Refused(f"needs {BallCapability.ORIENTATION}, which orientation=false leaves out")
     return dataclasses.replace(settings, orientation=asked) if settings.orientation is None else settings

@@ -10,6 +10,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunAsBody
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
@@ -162,7 +163,7 @@ class ProjectionBall:
 
 def ball_run(scene: Scene, settings: ProjectionSettings) -> ProjectionBall:
     """Run of the scene's ball. Raises Refused: the compiled series do not follow the orientation."""
-    follow = BallCapability.ORIENTATION in scene.requires
+    follow = settings.integrator != 'taylor'
     if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
         raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
-    return ProjectionBall(rolling_ball(scene), settings, follow=follow)
+    return RunAsBody(ProjectionBall(rolling_ball(scene), settings, follow=follow), scene.elements[0])

@@ -48,7 +48,7 @@ PROVIDES = frozenset(
         MechanismCapability.JOINT_FRICTION,
         MechanismCapability.STOPS,
         MechanismCapability.REBOUNDS,
-        MechanismCapability.CONTACT,
+        MechanismCapability.CONTACT, MechanismCapability.ANY_CONTACT,
         MechanismCapability.CONTACT_FRICTION,
         MechanismCapability.UNBOUNDED_FRICTION,
         MechanismCapability.STATIC_FRICTION,
