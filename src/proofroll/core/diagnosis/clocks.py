@@ -59,8 +59,8 @@ def best_delay(
 
     def left(delay: float) -> FloatArray:
         moments = time[inner] - delay
-        known = (moments <= time[-1]) & ((moments >= time[0]) | (time[0] == 0))
-        return np.where(known[:, None], flat - curve(np.clip(moments, time[0], time[-1])), np.nan)
+        valid_mask = (moments <= time[-1]) & ((moments >= time[0]) | (time[0] == 0))
+        return np.where(valid_mask[:, None], flat - curve(np.clip(moments, time[0], time[-1])), np.nan)
 
     begin = 0.0
     if farthest is not None:

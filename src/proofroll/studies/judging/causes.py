@@ -175,7 +175,7 @@ def _first_row(wrong: Mapping[str, GivenVariable], times: FloatArray) -> Iterato
         size = float(np.max(np.abs(item.true), initial=0.0)) or 1.0
         begun, start = (np.ravel(values[0]) for values in (item.values, item.true))
         if np.max(np.abs(begun - start)) > 10 * _LIKE_ITS_TRUTH * size:
-            given, expected = (", ".join(number(value, 4) for value in row) for row in (begun, start))
-            apart.append(f"{name} {given} instead of {expected}{spaced(item.unit)}")
+            given_text, start_text = (", ".join(number(value, 4) for value in row) for row in (begun, start))
+            apart.append(f"{name} {given_text} instead of {start_text}{spaced(item.unit)}")
     if apart:
         yield f"the first row is not the scene's start: {', '.join(apart)}"

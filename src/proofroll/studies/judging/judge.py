@@ -267,8 +267,8 @@ def _causes(reference: Reference, user_run: GivenRun, run: xr.Dataset) -> list[s
     free = [f"{name}.{axis}" for name in points for axis in "xyz"]
     laws = {name for name, item in scene.observables.items() if item.role is Role.RESIDUAL}
     names = (user_run.besides.keys() or set(_states(reference, list(map(str, run.data_vars))))) - laws
-    given = {name: item for name, item in _given(run, true).items() if name in names}
-    causes = causes_of(given, run["time"].to_numpy(), free)
+    given_columns = {name: item for name, item in _given(run, true).items() if name in names}
+    causes = causes_of(given_columns, run["time"].to_numpy(), free)
     if causes or not user_run.twice or not user_run.besides:  # proofroll's own engines have studies that say more
         return causes
     return [item.sentence for item in diagnose_scene(scene, [], run, true)]

@@ -337,10 +337,10 @@ def _twice(
     for name, item in follows.variables.items():
         if name not in given or item.dims[:1] != ("time",) or given[name].shape != item.shape or name == "time":
             continue
-        own, values = item.values, given[name].values
-        known = np.isfinite(own)
-        values = turned_alike(values, own) if item.dims[-1:] == ("wxyz",) else values
-        turned = on_turns_of(own, values, str(name), (follows, run))
-        if turned is not None and known.any():
-            columns[str(name)] = np.where(known, turned, 0.0), np.where(known, own, 0.0)
+        derived_values, values = item.values, given[name].values
+        finite_mask = np.isfinite(derived_values)
+        values = turned_alike(values, derived_values) if item.dims[-1:] == ("wxyz",) else values
+        turned = on_turns_of(derived_values, values, str(name), (follows, run))
+        if turned is not None and finite_mask.any():
+            columns[str(name)] = np.where(finite_mask, turned, 0.0), np.where(finite_mask, derived_values, 0.0)
     return columns

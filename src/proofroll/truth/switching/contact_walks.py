@@ -359,8 +359,8 @@ class ContactWalks(ABC):
         speed = float(np.linalg.norm(slip))
         if not speed or not slows.any():
             return None
-        lasts = faint_time(touch, slows)
-        half = state + lasts / 2 * rate
+        first_duration = faint_time(touch, slows)
+        half = state + first_duration / 2 * rate
         first, across = slip / speed, cross(normal, slip / speed)
 
         def held(angle: float) -> tuple[ContactMode, Array]:
@@ -368,21 +368,21 @@ class ContactWalks(ABC):
             turned = (*mode[:k], mode[k]._replace(heading=(x, y, z), leads=True), *mode[k + 1 :])
             return turned, self._solved(half, turned).slide_rate[k]
 
-        before, angle = _NEARBY, 0.0
-        of_before, of_angle = (float(held(turn)[1] @ across) for turn in (before, angle))
+        angle_before, angle = _NEARBY, 0.0
+        residual_before, residual = (float(held(turn)[1] @ across) for turn in (angle_before, angle))
         for _ in range(_TURNS):
-            if of_angle == of_before:
+            if residual == residual_before:
                 break
-            turn = angle - of_angle * (angle - before) / (of_angle - of_before)
+            turn = angle - residual * (angle - angle_before) / (residual - residual_before)
             if abs(turn) * speed > 2 * ROUND_OFF:
                 return None
-            before, of_before, angle, of_angle = angle, of_angle, turn, float(held(turn)[1] @ across)
-        turned, slows = held(angle)
-        found = faint_time(touch, slows)
-        uneven = abs(found - lasts) / (found or 1.0)
-        if abs(angle) * speed > ROUND_OFF or uneven**2 * speed > ROUND_OFF or not found:
+            angle_before, residual_before, angle, residual = angle, residual, turn, float(held(turn)[1] @ across)
+        turned_mode, slows = held(angle)
+        duration = faint_time(touch, slows)
+        uneven = abs(duration - first_duration) / (duration or 1.0)
+        if abs(angle) * speed > ROUND_OFF or uneven**2 * speed > ROUND_OFF or not duration:
             return None
-        return found * rate, found * self._equations.rate(half, turned)
+        return duration * rate, duration * self._equations.rate(half, turned_mode)
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""
