@@ -15,18 +15,14 @@ from robot_templates import urdf
 
 from proofroll.cli import app
 from proofroll.core.certificate import Line
-from proofroll.core.comparison import ExceptAt
+from proofroll.core.comparison import Band, ExceptAt, Row, Tolerance
 from proofroll.core.diagnosis import Cause
 from proofroll.files.json_data import MERGED
 from proofroll.papers.blajer_2006.slip.onset import EngineOnset, OnsetStudy
 from proofroll.report.comparison.records import (
-    CauseAt,
-    Claims,
-    Cost,
     ReportedComparison,
     ReportedRow,
     ReportedRun,
-    ShownBand,
     ShownObservable,
     WorstJudgement,
 )
@@ -43,6 +39,7 @@ from proofroll.robots.check.records import (
     UsedTruth,
 )
 from proofroll.robots.files.robot_file import LintRemark
+from proofroll.running.timing import Interval
 from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.fuzz.hunt import FoundKind, Hunt
 from proofroll.studies.fuzz.surprises import Surprise, SurpriseKind
@@ -161,8 +158,8 @@ def test_two_files_of_a_robot(proofroll: Proofroll, tmp_path: Path) -> None:
 
 ROBOT = (RobotCheck, LintRemark, UsedTruth, ImporterRow, HeldLayer, RobotCause, DrawnRobot, DrawnBody, DrawnJoint)
 COMPARISON = (
-    ReportedComparison, ReportedRow, ReportedRun, WorstJudgement, CauseAt, Cause, Claims, ExceptAt, Cost, Line,
-    ShownObservable, ShownBand,
+    ReportedComparison, ReportedRow, ReportedRun, WorstJudgement, Cause, Row, ExceptAt, Tolerance, Interval, Line,
+    ShownObservable, Band,
 )  # fmt: skip
 LADDER = (LadderContent, RungFound, Ran, TermFound, SideFound, KnownTruth, Absence)
 MAP = (StabilityStudy, Axis, BoundaryPoint, Boundary, ExplainedBoundary, MappedValue, Effort, Measured, JudgedFile)

@@ -22,11 +22,12 @@ from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import StoredTrajectory, write
 from proofroll.report.comparison.plots import MOST_POINTS, kept, point_curves
-from proofroll.report.comparison.records import Claims, Cost
-from proofroll.report.comparison.tables import cost_title, costs, expectations
+from proofroll.report.comparison.records import clean_cost
+from proofroll.report.comparison.tables import cost_interval, cost_title, costs, expectations
 from proofroll.report.page.html import page
 from proofroll.report.page.records import report_content
 from proofroll.report.styles import OUTLINES, styles
+from proofroll.running.case import Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import point_name
@@ -143,18 +144,16 @@ def test_an_engine_has_one_colour_on_a_page() -> None:
 
 def test_cost_has_an_interval_where_there_is_one() -> None:
     """Six runs or more: 95 % or more; three: their range, which holds the median in three cases of four; one: none."""
-    assert Cost.of([]) is None
-    assert Cost.of([2.0]) == Cost(2.0, None, None, None, 1)
-    three = Cost.of([3.0, 1.0, 2.0])
-    assert three == Cost(2.0, 1.0, 3.0, 0.75, 3)
-    many = Cost.of([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 9.0])
-    assert many
-    assert many.low
-    assert many.high
-    assert many.confidence == 1 - 2 / 2**7
-    assert 1.0 <= many.low < many.median == 1.3 < many.high <= 9.0
-    assert "holds it with 75 %" in cost_title(three)
-    assert "no interval" in cost_title(Cost.of([2.0]))
+
+    def told(*timings: float) -> str:
+        cost = clean_cost(Result(Status.DONE, "done", timings=[*timings]))
+        run: Any = SimpleNamespace(cost=cost, timings=timings)
+        return f"{cost_interval(cost)}; {cost_title(run)}"
+
+    assert told() == "–; not timed"
+    assert told(2.0) == "–; one clean run, so no interval is known"
+    assert told(3.0, 1.0, 2.0) == "1 to 3; median of 3 clean runs; 1 to 3 s/s holds it with 75 %"
+    assert told(1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 9.0).endswith("1 to 9 s/s holds it with 98.4 %")
 
 
 def test_costs_are_on_the_page(made: tuple[Outcome, Store], parse: Any) -> None:
@@ -169,7 +168,7 @@ def test_costs_are_on_the_page(made: tuple[Outcome, Store], parse: Any) -> None:
     content = report_content([dataclasses.replace(outcome, runs=runs)], "proofroll report invented")
     lines = costs(content.comparisons[0])
     assert len(lines) == 3
-    assert [run.cost.median for run in lines[0][1:] if run.cost] == [0.45, 0.25]
+    assert [run.cost.value for run in lines[0][1:] if run.cost] == [0.45, 0.25]
     text = " ".join(parse(page(content, [point_curves(made[0])])).text.split())
     assert "0.4 to 0.5" in text
     assert "0.2 to 0.3" in text
@@ -186,8 +185,7 @@ def test_all_that_is_claimed_of_a_row_is_said() -> None:
         bound={"N": Tolerance(1e-3, True)},
     )  # fmt: skip
     entry: Any = SimpleNamespace(
-        name="alpha", formulation=None, setting="", resolution=None, engine="alpha", expected=["agrees"],
-        expected_for={}, because="", tolerance="band", resolution_value=None, claims=Claims.of(row),
+        name="alpha", formulation=None, setting="", resolution=None, engine="alpha", resolution_value=None, claim=row,
     )  # fmt: skip
     assert expectations([entry])[0].further == (
         "N within 0.1 % of its scale",

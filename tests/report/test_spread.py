@@ -66,7 +66,7 @@ def said(content: ReportContent) -> str:
     own = content.comparisons[0].evidence
     assert own is not None
     told = [item.sentence for item in advice(content.choice, 1e-4, forces=False)]
-    return " ".join([*content.findings.sentences, own.findings.answer, *own.findings.sentences, *told])
+    return " ".join([*content.findings, own.findings.answer, *own.findings.sentences, *told])
 
 
 def test_points_are_held_to_laws_alone_where_no_truth_is_unique_and_no_motion_is_judged(
@@ -84,18 +84,18 @@ def test_no_sentence_speaks_of_agreement_with_a_truth(content: ReportContent) ->
     text = said(content)
     for word in ("with the truth", "from the truth", "Closest", "closest is", "obvious model", "nothing was run"):
         assert word not in text, word
-    assert content.findings.sentences[0].startswith(
+    assert content.findings[0].startswith(
         "Of 4 settings judged by laws of mechanics alone, as there is no unique truth (invented), 3 keep the "
         "laws that are judged in every case and 1 gives no result at some points."
     )
-    assert content.findings.sentences[1] == "No setting that ran to its end breaks a law of mechanics."
+    assert content.findings[1] == "No setting that ran to its end breaks a law of mechanics."
     assert "Over all: motion is judged in no scene." in text
     assert "3 keep the laws that are judged in every case" in text
 
 
 def test_a_broken_law_is_called_one(made: tuple[Outcome, Store]) -> None:
     """Who breaks a law differs from no truth, and its reason is told."""
-    sentences = report_content([_alone(made[0], 0.1)], "").findings.sentences
+    sentences = report_content([_alone(made[0], 0.1)], "").findings
     assert "3 break a law at some points" in sentences[0]
     assert sentences[1].startswith("3 settings break a law of mechanics and run to the end without a warning, worst ")
     assert "truth" not in sentences[1].partition(":")[0]
@@ -150,7 +150,7 @@ def test_page_terminal_and_json_show_the_spread(alone: Outcome, content: ReportC
 
 def test_an_ordinary_comparison_beside_it_is_told_as_ever(made: tuple[Outcome, Store], alone: Outcome) -> None:
     """Beside a comparison with a truth the laws have a clause of their own."""
-    ordinary = report_content([made[0]], "").findings.sentences
-    both = report_content([made[0], dataclasses.replace(alone, comparison=alone.comparison)], "").findings.sentences
+    ordinary = report_content([made[0]], "").findings
+    both = report_content([made[0], dataclasses.replace(alone, comparison=alone.comparison)], "").findings
     assert both[0].startswith(ordinary[0].removesuffix("."))
     assert "; of 4 settings judged by laws of mechanics alone" in both[0]

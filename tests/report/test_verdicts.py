@@ -312,7 +312,7 @@ def test_the_cheapest_is_the_same_in_each_sentence_and_in_the_matrix(
     first = content.choice.standings(column, FIRST_TOLERANCE, True)[0]
     cell = first.cell
     assert "4e-3 s" in cell.name if coarse < 0.2 else cell.cost == 0.2
-    assert "alpha for rolling balls" in content.findings.sentences[2]
+    assert "alpha for rolling balls" in content.findings[2]
     assert content.comparisons[0].evidence
     held = "To hold 0.1 mm per metre of the true path and forces within 1e-4 of the largest"
     answer = content.comparisons[0].evidence.findings.answer

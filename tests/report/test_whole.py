@@ -117,7 +117,7 @@ def test_error_against_cost_is_drawn_where_runs_allow_it(report: Report, written
 
 def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     """What agrees best, what is silent, what to use; other data give other sentences, none at all still give three."""
-    found = report.content.findings.sentences
+    found = report.content.findings
     assert len(found) == 3
     assert found[0].startswith(
         "Of 4 settings in one comparison, 1 agrees with the truth in every observable and every case, 1 agrees without "

@@ -16,6 +16,7 @@ from proofroll.core.number_format import number
 from proofroll.core.plugins import load_engine, parse_engine
 
 if TYPE_CHECKING:
+    from proofroll.core.comparison import Tolerance
     from proofroll.core.verdict import Judgement
     from proofroll.report.comparison.records import ReportedComparison, ReportedRow, ReportedRun, Setting
     from proofroll.running.case import EngineFacts
@@ -75,7 +76,7 @@ def unjudged(content: ReportedComparison) -> int:
     from proofroll.studies.comparison.expectations import NOBODY
 
     open_runs = [run for run in content.runs if run.verdict in NOBODY or run.status == Status.MISSING]
-    return sum(run.verdict not in content.rows[run.row].expected for run in open_runs)
+    return sum(run.verdict not in content.rows[run.row].claim.expect for run in open_runs)
 
 
 def verdict_text(row: ReportedRow, runs: Sequence[ReportedRun] = ()) -> str:
@@ -111,6 +112,13 @@ def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:
 def unit(text: str) -> str:
     """Unit as shown to readers; empty for a number without unit."""
     return "" if text == "1" else text.replace("^2", "²").replace("^3", "³")
+
+
+def bound_words(bound: Tolerance) -> str:
+    """A tolerance with its unit: ``1e-3 m``, ``0.1 % of its scale``."""
+    if bound.relative:
+        return f"{100 * bound.value:g} % of its scale"
+    return f"{number(bound.value, 6)} {unit(bound.unit)}".strip()
 
 
 def symbol(name: str) -> str:

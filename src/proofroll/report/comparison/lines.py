@@ -6,7 +6,7 @@ from typing import Any
 
 from proofroll.core.engine_abilities import by_hand
 from proofroll.core.verdict import Judgement, Verdict
-from proofroll.report.comparison.records import Cost, rough_cost
+from proofroll.report.comparison.records import clean_cost, rough_cost
 from proofroll.report.comparison.summary import facts_of
 from proofroll.report.kinds import group_of
 from proofroll.report.long_table import COLUMNS, TableLine, setting_columns
@@ -52,13 +52,13 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
 
 def _ended(outcome: Outcome, result: Result) -> dict[str, Any]:
     """Status and cost of a run; without clean runs the rough cost of the sampled run."""
-    cost, done = Cost.of(result.timings), result.status == Status.DONE
+    cost, done = clean_cost(result), result.status == Status.DONE
     return {
         "status": result.status,
         "message": "" if done else result.message,
-        "cost": cost.median if cost else rough_cost(result, outcome.comparison.until),
-        "cost_low": cost.low if cost else None,
-        "cost_high": cost.high if cost else None,
+        "cost": cost.value if cost else rough_cost(result, outcome.comparison.until),
+        "cost_low": cost.low if cost and cost.confidence else None,
+        "cost_high": cost.high if cost and cost.confidence else None,
         "clean": cost is not None,
     }
 

@@ -3,44 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core.comparison import ExceptAt, Row, Tolerance
+from proofroll.core.comparison import Band, Row
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
-from proofroll.core.number_format import counted, number
+from proofroll.core.number_format import counted
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import MERGED
 from proofroll.report.comparison.spread import Spread
-from proofroll.report.labels import names, unit
+from proofroll.report.labels import names
 from proofroll.report.pages import section_id, slug
 from proofroll.running.case import Result, Status
-from proofroll.running.timing import Timing
+from proofroll.running.timing import Interval, Timing
 
 if TYPE_CHECKING:
     from proofroll.report.page.records import ComparisonEvidence
 
 
-@dataclass(frozen=True)
-class Cost:
-    """Wall seconds per simulated second over ``runs`` clean runs; a single run has no interval."""
-
-    median: float
-    low: float | None
-    high: float | None
-    confidence: float | None
-    runs: int
-
-    @classmethod
-    def of(cls, timings: Sequence[float]) -> Cost | None:
-        """Cost of runs with these timings [s/s]; None without timings."""
-        if not timings:
-            return None
-        interval = Timing(tuple(timings)).interval
-        if not interval.confidence:
-            return cls(interval.value, None, None, None, len(timings))
-        return cls(interval.value, interval.low, interval.high, interval.confidence, len(timings))
+def clean_cost(result: Result) -> Interval | None:
+    """Wall seconds per simulated second over clean runs, with their interval [s/s]; None without such runs."""
+    return Timing(tuple(result.timings)).interval if result.timings else None
 
 
 def rough_cost(result: Result, until: float) -> float | None:
@@ -50,30 +34,6 @@ def rough_cost(result: Result, until: float) -> float | None:
     """
     spent = min(result.wall_seconds, result.processor.get("advance") or math.inf)
     return spent / until if result.status == Status.DONE and not result.host and spent else None
-
-
-@dataclass(frozen=True)
-class Claims:
-    """Expectations of a row besides its verdict: bounds, orders, limits, and verdicts at other points."""
-
-    bound: dict[str, str]
-    order: dict[str, tuple[float, float]]
-    limit: dict[str, str]
-    except_at: list[ExceptAt]
-    only: dict[str, list[float]]
-
-    @classmethod
-    def of(cls, row: Row) -> Claims:
-        """Claims of a row of a comparison file."""
-        bound, limit = ({name: in_words(item) for name, item in bounds.items()} for bounds in (row.bound, row.limit))
-        return cls(bound, row.order, limit, row.except_at, row.only)
-
-
-def in_words(bound: Tolerance) -> str:
-    """A tolerance with its unit: ``1e-3 m``, ``0.1 % of its scale``."""
-    if bound.relative:
-        return f"{100 * bound.value:g} % of its scale"
-    return f"{number(bound.value, 6)} {unit(bound.unit)}".strip()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,17 +67,9 @@ class WorstJudgement(Judgement):
     largest: float
 
 
-@dataclass(frozen=True)
-class CauseAt:
-    """A proven cause and the points at which it was found."""
-
-    cause: Diagnosis = field(metadata=MERGED)
-    points: list[str]
-
-
 @dataclass(frozen=True, kw_only=True)
 class ReportedRow(Setting):
-    """Summary of a row over the points of the parameters: the worst of everything."""
+    """Summary of a row over the points of the parameters: the worst of everything; ``claim``: what is expected."""
 
     verdict: Verdict
     verdicts: dict[str, int]
@@ -126,13 +78,8 @@ class ReportedRow(Setting):
     shared: str
     missing: list[str]
     remarks: list[str]
-    diagnosis: list[CauseAt]
-    expected: list[Verdict]
-    expected_for: dict[str, list[Verdict]]
-    because: str
-    short: str
-    tolerance: str
-    claims: Claims
+    diagnosis: list[Diagnosis]
+    claim: Row
     as_expected: bool
     observables: dict[str, WorstJudgement]
     seconds_per_second: float | None
@@ -163,7 +110,7 @@ class ReportedRun(Setting):
     rough_cost: float | None
     build_seconds: float | None
     timings: list[float]
-    cost: Cost | None
+    cost: Interval | None
     versions: dict[str, str]
     trajectory: str | None
     host: str
@@ -179,14 +126,6 @@ class ShownObservable:
     role: str
     headline: bool
     audit: bool
-
-
-@dataclass(frozen=True)
-class ShownBand:
-    """Tolerances of a band in words, by observable, with their reason."""
-
-    because: str
-    bounds: dict[str, str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,7 +158,7 @@ class ReportedComparison:
     left_out: int
     as_expected: bool
     contradictions: list[str]
-    tolerances: dict[str, ShownBand]
+    tolerances: dict[str, Band]
     rows: list[ReportedRow]
     runs: list[ReportedRun]
     hosts: dict[str, int]
@@ -236,7 +175,7 @@ class ReportedComparison:
     @property
     def claims(self) -> bool:
         """False if every verdict is expected of every row, as in the default comparison of a scene."""
-        return any(len(row.expected) < len(Verdict) for row in self.rows)
+        return any(len(row.claim.expect) < len(Verdict) for row in self.rows)
 
     @property
     def section(self) -> str:

@@ -3,24 +3,21 @@
 import dataclasses
 from typing import Any
 
-from proofroll.core.comparison import Comparison, Row
+from proofroll.core.comparison import Comparison
+from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
 from proofroll.core.element_abilities import step_bound
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.records import (
-    CauseAt,
-    Claims,
-    Cost,
     ReportedComparison,
     ReportedRow,
     ReportedRun,
     Setting,
-    ShownBand,
     ShownObservable,
     WorstJudgement,
-    in_words,
+    clean_cost,
     rough_cost,
 )
 from proofroll.report.comparison.spread import spread_of
@@ -36,7 +33,7 @@ def reported(outcome: Outcome) -> tuple[list[ReportedRow], list[ReportedRun]]:
     """Rows of a comparison, and its runs."""
     until = outcome.comparison.until
     runs = [[_run(run, number, until) for run in of_row] for number, of_row in enumerate(outcome.rows)]
-    rows = [_row(of_row[0].row, made) for of_row, made in zip(outcome.rows, runs, strict=True)]
+    rows = [ReportedRow(claim=of_row[0].row, **_summary(made)) for of_row, made in zip(outcome.rows, runs, strict=True)]
     return rows, [run for made in runs for run in made]
 
 
@@ -67,10 +64,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         left_out=comparison.left_out,
         as_expected=not outcome.contradictions,
         contradictions=outcome.contradictions,
-        tolerances={
-            name: ShownBand(band.because, {key: in_words(bound) for key, bound in band.bounds.items()})
-            for name, band in comparison.bands.items()
-        },
+        tolerances=comparison.bands,
         rows=rows,
         runs=runs,
         hosts=hosts(run.result for run in outcome.runs),
@@ -124,18 +118,6 @@ def runs_at(outcome: Outcome, point: str) -> list[tuple[int, Run, StoredTrajecto
     ]
 
 
-def _row(row: Row, runs: list[ReportedRun]) -> ReportedRow:
-    return ReportedRow(
-        expected=row.expect,
-        expected_for=row.expect_for,
-        because=row.because,
-        short=row.short,
-        tolerance=row.tolerance,
-        claims=Claims.of(row),
-        **_summary(runs),
-    )
-
-
 def row_at(row: ReportedRow, runs: list[ReportedRun]) -> ReportedRow:
     """Row over its runs at one point, whose reason names no point; without remarks, which are about all runs."""
     return dataclasses.replace(row, **_summary(runs) | {"remarks": [], "reason": runs[0].reason})
@@ -147,6 +129,9 @@ def _summary(runs: list[ReportedRun]) -> dict[str, Any]:
     judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
     names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
     reason, limit = _why(judged)
+    causes: dict[str, Diagnosis] = {}
+    for item in (item for run in runs for item in run.diagnosis):
+        causes.setdefault(item.cause.id, item)
     return {
         **{item.name: getattr(runs[0], item.name) for item in dataclasses.fields(Setting)},
         "verdict": max((run.verdict for run in judged), key=SEVERITY.index),
@@ -156,7 +141,7 @@ def _summary(runs: list[ReportedRun]) -> dict[str, Any]:
         "shared": next((run.shared for run in runs if run.shared), ""),
         "missing": sorted({name for run in runs for name in run.missing}),
         "remarks": _remarks(runs),
-        "diagnosis": _diagnosis(runs),
+        "diagnosis": list(causes.values()),
         "as_expected": not any(run.contradictions for run in runs),
         "observables": {name: _worst(judged, name) for name in names},
         "seconds_per_second": max((x for run in runs if (x := run.seconds_per_second) is not None), default=None),
@@ -200,15 +185,6 @@ def _remarks(runs: list[ReportedRun]) -> list[str]:
         run, item = max(floors, key=lambda pair: pair[1].error / pair[1].tolerance)
         remarks.append(f"{item.observable}{at_point(run.parameters)}: {item.floor}")
     return remarks
-
-
-def _diagnosis(runs: list[ReportedRun]) -> list[CauseAt]:
-    """Proven causes, each once, with the points where it was proven."""
-    causes: dict[str, CauseAt] = {}
-    for run in runs:
-        for item in run.diagnosis:
-            causes.setdefault(item.cause.id, CauseAt(item, [])).points.append(run.point)
-    return list(causes.values())
 
 
 def _furthest(judged: list[tuple[ReportedRun, Judgement | None]]) -> tuple[ReportedRun, Judgement | None]:
@@ -269,7 +245,7 @@ def _run(run: Run, row: int, until: float) -> ReportedRun:
         rough_cost=rough_cost(result, until),
         build_seconds=result.build_seconds,
         timings=result.timings,
-        cost=Cost.of(result.timings),
+        cost=clean_cost(result),
         versions=result.versions,
         trajectory=result.trajectory,
         host=result.host,

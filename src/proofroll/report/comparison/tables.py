@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from proofroll.core.certificate import Standing, not_reported
+from proofroll.core.comparison import Row
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Judgement
-from proofroll.report.comparison.records import Claims, Cost, ReportedComparison, ReportedRow, ReportedRun
+from proofroll.report.comparison.records import ReportedComparison, ReportedRow, ReportedRun
 from proofroll.report.comparison.spread import Spread
-from proofroll.report.labels import names, symbol
+from proofroll.report.labels import bound_words, names, symbol
+from proofroll.running.timing import Interval
 
 _COMPILES = 10.0  # s before the first step, beyond which the time is listed; to compile equations takes one or two
 
@@ -47,20 +49,21 @@ def expectations(rows: Sequence[ReportedRow]) -> list[Expectation]:
     """Expectations, each with all settings that share it."""
     groups: dict[tuple[str, str, str, tuple[str, ...]], list[str]] = {}
     for name, row in zip(names(rows), rows, strict=True):
-        text = " or ".join(row.expected)
-        for observable, verdicts in row.expected_for.items():
+        claim = row.claim
+        text = " or ".join(claim.expect)
+        for observable, verdicts in claim.expect_for.items():
             text += f"; {symbol(observable)}: {' or '.join(verdicts)}"
-        groups.setdefault((row.tolerance, text, row.because, tuple(_further(row.claims))), []).append(name)
+        groups.setdefault((claim.tolerance, text, claim.because, tuple(_further(claim))), []).append(name)
     return [Expectation(settings, *shared) for shared, settings in groups.items()]
 
 
-def _further(claims: Claims) -> list[str]:
+def _further(claim: Row) -> list[str]:
     """Claims of a row besides its verdict, as sentences without a full stop."""
-    sentences = [f"{symbol(name)} within {bound}" for name, bound in claims.bound.items()]
-    sentences += [f"order of {symbol(name)} {low:g} to {high:g}" for name, (low, high) in claims.order.items()]
-    sentences += [f"limit of {symbol(name)} within {bound}" for name, bound in claims.limit.items()]
-    sentences += [f"{' or '.join(item.expect)} at {_where(item.where)}" for item in claims.except_at]
-    return [*sentences, f"run only at {_where(claims.only)}"] if claims.only else sentences
+    sentences = [f"{symbol(name)} within {bound_words(bound)}" for name, bound in claim.bound.items()]
+    sentences += [f"order of {symbol(name)} {low:g} to {high:g}" for name, (low, high) in claim.order.items()]
+    sentences += [f"limit of {symbol(name)} within {bound_words(bound)}" for name, bound in claim.limit.items()]
+    sentences += [f"{' or '.join(item.expect)} at {_where(item.where)}" for item in claim.except_at]
+    return [*sentences, f"run only at {_where(claim.only)}"] if claim.only else sentences
 
 
 def _where(values: Mapping[str, Sequence[float]]) -> str:
@@ -72,34 +75,34 @@ def costs(content: ReportedComparison) -> list[tuple[str, ReportedRun, ReportedR
     """Name of each timed row with its slowest and its fastest case."""
     lines = []
     for name, _, runs in content.lines():
-        timed = sorted((run.cost.median, index, run) for index, run in enumerate(runs) if run.cost)
+        timed = sorted((run.cost.value, index, run) for index, run in enumerate(runs) if run.cost)
         if timed:
             lines.append((name, timed[-1][-1], timed[0][-1]))
     return lines
 
 
-def cost_interval(cost: Cost | None) -> str:
+def cost_interval(cost: Interval | None) -> str:
     """Interval of a cost, as ``0.011 to 0.013``; a dash where it was measured once or never."""
-    return "–" if not cost or cost.low is None else f"{number(cost.low)} to {number(cost.high)}"
+    return f"{number(cost.low)} to {number(cost.high)}" if cost and cost.confidence else "–"
 
 
-def cost_title(cost: Cost | None) -> str:
-    """Sentence that describes a cost."""
-    if not cost:
+def cost_title(run: ReportedRun) -> str:
+    """Sentence that describes the cost of a run."""
+    if not run.cost:
         return "not timed"
-    if cost.confidence is None:
+    if not run.cost.confidence:
         return "one clean run, so no interval is known"
-    percent = f"{100 * cost.confidence:.3g} %"
-    return f"median of {cost.runs} clean runs; {cost_interval(cost)} s/s holds it with {percent}"
+    percent = f"{100 * run.cost.confidence:.3g} %"
+    return f"median of {len(run.timings)} clean runs; {cost_interval(run.cost)} s/s holds it with {percent}"
 
 
 def cost_cell(row: ReportedRow, runs: Sequence[ReportedRun]) -> tuple[str, str]:
     """Text of the cost of a row's slowest case [s/s], rough ones after ``≈``, and a sentence that describes it."""
     if row.seconds_per_second is not None:
-        slowest = next(run.cost for run in runs if run.seconds_per_second == row.seconds_per_second)
+        slowest = next(run for run in runs if run.seconds_per_second == row.seconds_per_second)
         return number(row.seconds_per_second), cost_title(slowest)
     if row.rough_cost is None:
-        return "–", cost_title(None)
+        return "–", "not timed"
     return f"≈ {number(row.rough_cost)}", "of one run beside which others ran: to a factor of about two"
 
 

@@ -45,7 +45,7 @@ def title(judgement: Judgement, point: str) -> str:
 def notes(row: ReportedRow) -> list[str]:
     """Sentences below a row: why there is no result or no judgement, proven causes with remedies, remarks."""
     reasons = [row.reason] if row.reason and row.verdict in _TOLD else []
-    causes = [f"{told.cause.sentence}: {told.cause.cause.remedy}" for told in row.diagnosis]
+    causes = [f"{told.sentence}: {told.cause.remedy}" for told in row.diagnosis]
     return [*reasons, *causes, *(f"* {remark}" for remark in row.remarks)]
 
 

@@ -113,6 +113,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "error": number_format.error,
         "symbol": labels.symbol,
         "unit": labels.unit,
+        "bound": labels.bound_words,
         "full_stop": lambda text: text if text.endswith((".", "!", "?")) else f"{text}.",
         "engine": labels.engine_title,
         "values": labels.values,

@@ -90,15 +90,8 @@ class KnownFinding:
     gone: str
 
 
-@dataclass(frozen=True)
-class Sentences:
-    """Three sentences for the whole report."""
-
-    sentences: list[str]
-
-
-# Of report.json: 2 has no lines of records in its table, which format 1 had.
-FORMAT = 2
+# Of report.json: 2 has no lines of records in its table; 3 has what a file claims, costs and causes in its own words.
+FORMAT = 3
 
 
 @dataclass(frozen=True)
@@ -131,7 +124,7 @@ class ReportContent:
     names: dict[str, str]
     provides: dict[str, dict[str, list[str]]]
     environment: MadeWith
-    findings: Sentences
+    findings: list[str]
     table: LongTable
     format: int = FORMAT
     replay: Sequence[Any] | None = field(default=None, metadata=OPTIONAL)
@@ -151,9 +144,7 @@ class ReportContent:
     @property
     def summarised(self) -> ReportContent:
         """Content with its three sentences recomputed."""
-        return dataclasses.replace(
-            self, findings=Sentences(three_sentences(self.comparisons, self.entries, self.choice))
-        )
+        return dataclasses.replace(self, findings=three_sentences(self.comparisons, self.entries, self.choice))
 
     @cached_property
     def choice(self) -> ChoiceMatrix:
@@ -164,7 +155,7 @@ class ReportContent:
                 href=item.section,
                 runs={(run.row, run.point): item.run_id(run.row, run.point) for run in item.runs},
                 requires=frozenset(item.requires),
-                short={number: row.short for number, row in enumerate(item.rows) if row.short},
+                short={number: row.claim.short for number, row in enumerate(item.rows) if row.claim.short},
             )
             for item in self.comparisons
         }
@@ -240,7 +231,7 @@ def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
         names=names,
         provides=provides,
         environment=MadeWith(command, f"{facts['system']}, {facts['processor']}", versions),
-        findings=Sentences([]),
+        findings=[],
         table=LongTable([line for outcome_lines in lines for line in outcome_lines]),
     )
     return content.summarised

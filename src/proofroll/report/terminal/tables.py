@@ -169,7 +169,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
     for name, row, _ in content.lines():
         if row.reason and not row.reason.startswith(Status.LEFT_OUT):
             lines.append(f"{SYMBOLS[row.verdict]} {name}: {row.reason}")
-        lines += [f"  {told.cause.sentence}: {told.cause.cause.remedy}" for told in row.diagnosis]
+        lines += [f"  {told.sentence}: {told.cause.remedy}" for told in row.diagnosis]
     lines += [f"* {name}: {remark}" for name, remark in remarks(content)]
     if content.contradictions:
         count = len(content.contradictions)
@@ -240,7 +240,7 @@ def first_lines(content: ReportContent) -> list[str]:
     if missing:
         lines.append(_one_line(f"Missing ({len(missing)}): {missing[0].title}: {missing[0].missing}"))
     if not unexpected:
-        lines.append(_one_line(content.findings.sentences[1]))
+        lines.append(_one_line(content.findings[1]))
     return lines
 
 
