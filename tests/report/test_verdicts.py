@@ -310,7 +310,7 @@ def test_the_cheapest_is_the_same_in_each_sentence_and_in_the_matrix(
     content = report_content([with_runs(made[0], runs)], "proofroll report invented")
     (column,) = content.choice.kinds
     first = content.choice.standings(column, FIRST_TOLERANCE, True)[0]
-    cell = first.cell
+    cell = first
     assert "4e-3 s" in cell.name if coarse < 0.2 else cell.cost == 0.2
     assert "alpha for rolling balls" in content.findings[2]
     assert content.comparisons[0].evidence

@@ -134,7 +134,7 @@ def _from_report(
     from proofroll.files.scene_file import is_scene
     from proofroll.files.toml import named_file
     from proofroll.report.page.advice import advice
-    from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix, naming
+    from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
     from proofroll.report.terminal.tables import answer_table
 
     path, lines = report.path, report.lines
@@ -161,7 +161,7 @@ def _from_report(
         # in the unit of the motion: a quantity whose scale is one unit has that error as its part
         lines = [replace(line, scale=1.0) for line in lines if line.unit == unit or not line.quantity]
     part = bound.value
-    matrix = choice_matrix(lines, studies, naming(report.names))
+    matrix = choice_matrix(lines, studies, report.names)
     advised = advice(matrix, part, forces)
     costs = _engine_costs(matrix, part, forces=forces)
     content = {

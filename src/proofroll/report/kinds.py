@@ -128,6 +128,12 @@ def kind_of(scene: Scene) -> type[ReportKind] | None:
     return report_kinds().get(kind_name(scene))
 
 
+def group_words(group: str) -> tuple[str, str]:
+    """Title of a group of scenes for a reader, and what its scenes are, as a clause."""
+    named = {name: words for kind in report_kinds().values() for name, words in kind.groups.items()}
+    return named.get(group, (group[:1].upper() + group[1:], ""))
+
+
 def group_of(scene: Scene) -> str:
     """Group of a scene: a column of the matrix of engines and scenes."""
     kind = kind_of(scene)

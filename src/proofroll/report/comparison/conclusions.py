@@ -54,7 +54,7 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
         asked = ReaderQuestion(FIRST_TOLERANCE, not choice.unjudged[True].issuperset(column.studies))
         taken = of_column(choice, column, asked).taken
         if taken is not None:
-            text += f" To hold {asked.words}, the cheapest is {told(choice, taken)}: {taken.cell.text} real time."
+            text += f" To hold {asked.words}, the cheapest is {told(choice, taken)}: {taken.text} real time."
     return text
 
 

@@ -62,10 +62,10 @@ def _of_column(
     taken = item.taken
     if taken is None:
         return Advised(column.name, f"{head}: {closest_words(matrix, item)}.")
-    speed = f"{taken.cell.text} real time{taken.cell.share}"
+    speed = f"{taken.text} real time{taken.share}"
     sentence = f"{head}: take {told(matrix, taken)} ({speed}); next: {next_words(matrix, item)}"
     sentence += "." if forces else f"; if forces count: {forces_words(matrix, motion, both)}."
-    return Advised(column.name, sentence, taken.cell.name or take_words(matrix, taken), taken.cell.cost)
+    return Advised(column.name, sentence, taken.name or take_words(matrix, taken), taken.cost)
 
 
 def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
 from proofroll.report.page.choice_cell import CANNOT, NO_RUN, PARTLY, ChoiceCell, cell_of
-from proofroll.report.page.choice_matrix import ChoiceColumn, ChoiceMatrix, ChoiceRow, EngineStanding
+from proofroll.report.page.choice_matrix import ChoiceColumn, ChoiceMatrix, ChoiceRow
 
 # Lengths per metre of path, in words, by negative power of ten of the tolerance.
 LENGTHS = {
@@ -49,15 +49,6 @@ class ReaderQuestion:
 
 
 @dataclass(frozen=True)
-class Failure:
-    """A setting that does not hold the tolerance: state, who, and why in at most twelve words."""
-
-    state: str
-    who: str
-    why: str
-
-
-@dataclass(frozen=True)
 class ColumnAnswer:
     """FirstAnswer for a kind of scenes or for one scene.
 
@@ -65,35 +56,35 @@ class ColumnAnswer:
         column: of the matrix.
         standings: of the engines that may be taken, the best first.
         scenes: best cell of these in each scene of the column.
-        failures: settings that fail, each with its reason.
+        failures: cells of settings that fail; ``name`` for a reader, ``why`` in at most twelve words.
         judged: False: what is asked for is judged in none of its scenes.
     """
 
     column: ChoiceColumn
-    standings: list[EngineStanding]
+    standings: list[ChoiceCell]
     scenes: list[ChoiceCell]
-    failures: list[Failure]
+    failures: list[ChoiceCell]
     judged: bool
 
     @property
-    def taken(self) -> EngineStanding | None:
+    def taken(self) -> ChoiceCell | None:
         """The engine to take; None: nothing holds the tolerance."""
-        return self.standings[0] if self.standings and self.standings[0].cell.holds else None
+        return self.standings[0] if self.standings and self.standings[0].holds else None
 
     @property
-    def next(self) -> EngineStanding | None:
+    def next(self) -> ChoiceCell | None:
         """The next engine that holds the tolerance, or None."""
-        return self.standings[1] if self.taken and len(self.standings) > 1 and self.standings[1].cell.holds else None
+        return self.standings[1] if self.taken and len(self.standings) > 1 and self.standings[1].holds else None
 
     @property
-    def tied(self) -> list[EngineStanding]:
+    def tied(self) -> list[ChoiceCell]:
         """Engines whose costs overlap with that of the one to take."""
         return [item for item in self.standings if self.taken and item.ties(self.taken)]
 
     @property
     def most_held(self) -> int:
         """Largest number of the column's scenes that one engine holds."""
-        return max((sum(cell.holds for cell in item.scenes) for item in self.standings), default=0)
+        return max((sum(cell.holds for cell in item.by_scene) for item in self.standings), default=0)
 
 
 @dataclass(frozen=True)
@@ -152,7 +143,7 @@ def of_column(
 ) -> ColumnAnswer:
     """FirstAnswer for one column of the matrix."""
     standings = matrix.standings(column, asked.tolerance, asked.forces, engines)
-    best = [min(cells, key=_state_rank) for cells in zip(*(item.scenes for item in standings), strict=True)]
+    best = [min(cells, key=_state_rank) for cells in zip(*(item.by_scene for item in standings), strict=True)]
     judged = not matrix.unjudged[asked.forces].issuperset(column.studies)
     return ColumnAnswer(
         column=column,
@@ -169,9 +160,9 @@ def _state_rank(cell: ChoiceCell) -> tuple[bool, bool]:
 
 def _failures(
     matrix: ChoiceMatrix, column: ChoiceColumn, asked: ReaderQuestion, engines: Collection[str] | None
-) -> list[Failure]:
+) -> list[ChoiceCell]:
     """Rows of the column's comparisons that do not hold the tolerance and have a short reason, one per formulation."""
-    entries: list[tuple[int, float, Failure, str]] = []
+    entries: list[tuple[int, float, ChoiceCell, str]] = []
     for row in matrix.rows:
         if not row.setting or row.own_equations or (engines is not None and row.engine not in engines):
             continue
@@ -185,7 +176,7 @@ def _failures(
                 preset = f" {row.setting}" if row.setting == "default" else ""
                 who = f"{take_words(matrix, row)}{preset}"
                 place = _STATES.index(cell.state) if cell.state in _STATES else len(_STATES)
-                entries.append((place, -min(sizes, default=0.0), Failure(cell.state, who, short), row.name))
+                entries.append((place, -min(sizes, default=0.0), cell._replace(name=who, why=short), row.name))
     entries.sort(key=lambda item: item[:2])
     best_of = {name: item for *_, item, name in reversed(entries)}
     return [item for *_, item, name in entries if best_of[name] is item][:_REASONS]
@@ -199,12 +190,12 @@ def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
         name = _lower(item.column.title)
         many = len(item.column.scenes)
         if item.taken is not None:
-            equals = [tie.engine for tie in item.tied if tie.cell.absent == item.taken.cell.absent]
+            equals = [tie.engine for tie in item.tied if tie.absent == item.taken.absent]
             engines = sorted([item.taken.engine, *equals], key=lambda engine: matrix.title(engine).lower())
             taken.setdefault(tuple(engines), []).append(name)
         elif not item.judged:
             silent.append(name)
-        elif all(x.cell.state in {NO_RUN, CANNOT, Verdict.NOT_JUDGED} for x in item.standings):
+        elif all(x.state in {NO_RUN, CANNOT, Verdict.NOT_JUDGED} for x in item.standings):
             silent.append(f"{name} (no result)")
         else:
             nobody.append(
@@ -234,12 +225,12 @@ def listed(words: Sequence[str]) -> str:
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
-def take_words(matrix: ChoiceMatrix, taken: EngineStanding | ChoiceRow) -> str:
+def take_words(matrix: ChoiceMatrix, taken: ChoiceCell | ChoiceRow) -> str:
     """Engine and formulation for a reader."""
     return f"{matrix.title(taken.engine)} {taken.formulation.replace('_', ' ')}".strip()
 
 
-def told(matrix: ChoiceMatrix, taken: EngineStanding) -> str:
+def told(matrix: ChoiceMatrix, taken: ChoiceCell) -> str:
     """Engine, formulation, setting and step for a reader."""
     return ", ".join(filter(None, (take_words(matrix, taken), taken.setting)))
 
@@ -251,7 +242,7 @@ def next_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
         return "no other engine holds it" if best else ""
     if second.ties(best):
         return f"{take_words(matrix, second)}, a tie"
-    ratio = float(f"{second.cell.cost / best.cell.cost:.2g}")
+    ratio = float(f"{second.cost / best.cost:.2g}")
     return f"{take_words(matrix, second)}, {ratio:g}× the cost"
 
 
@@ -259,20 +250,20 @@ def closest_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
     """Text in place of a choice where nothing holds the tolerance."""
     if not item.judged:
         return "not judged"
-    ran = [standing for standing in item.standings if standing.cell.state != NO_RUN]
+    ran = [standing for standing in item.standings if standing.state != NO_RUN]
     if not ran:
         return "no engine was run"
-    if all(standing.cell.state == Verdict.NOT_JUDGED for standing in ran):
+    if all(standing.state == Verdict.NOT_JUDGED for standing in ran):
         return NOT_REACHED
     best = item.standings[0]
-    if best.cell.state == PARTLY:
+    if best.state == PARTLY:
         held = [
             f"{scene.words} {cell.text}"
-            for scene, cell in zip(item.column.scenes, best.scenes, strict=True)
+            for scene, cell in zip(item.column.scenes, best.by_scene, strict=True)
             if cell.holds
         ]
-        return f"none for all; {matrix.title(best.engine)} holds {best.cell.text}: {', '.join(held)}"
-    return f"none; closest {take_words(matrix, best)}: {best.cell.why or best.cell.state}"
+        return f"none for all; {matrix.title(best.engine)} holds {best.text}: {', '.join(held)}"
+    return f"none; closest {take_words(matrix, best)}: {best.why or best.state}"
 
 
 def forces_words(matrix: ChoiceMatrix, motion: ColumnAnswer, both: ColumnAnswer) -> str:
@@ -283,7 +274,7 @@ def forces_words(matrix: ChoiceMatrix, motion: ColumnAnswer, both: ColumnAnswer)
         return "✗ none"
     # A kind of several scenes is held by settings that only the cells of these name.
     best, second = (
-        item.taken and (item.taken.engine, item.taken.cell.name, [cell.name for cell in item.taken.scenes])
+        item.taken and (item.taken.engine, item.taken.name, [cell.name for cell in item.taken.by_scene])
         for item in (motion, both)
     )
-    return "✓ the same choice" if best == second else f"{take_words(matrix, both.taken)}, {both.taken.cell.text}"
+    return "✓ the same choice" if best == second else f"{take_words(matrix, both.taken)}, {both.taken.text}"

@@ -16,6 +16,8 @@ ORDER = [
     *(Verdict.AGREES, PARTLY, Verdict.CONVERGES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE, Verdict.DIFFERS),
     *(Verdict.FAILED, Verdict.ANOTHER_SCENE, Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.REFUSED, NO_RUN, CANNOT),
 ]
+# Ratio of rough costs below which two engines tie.
+TIE = 2.0
 _WHY = {
     LimitResult.WITHIN: "finer steps come closer",
     LimitResult.NO_LADDER: "the closest of what was run",
@@ -39,6 +41,8 @@ class ChoiceCell(NamedTuple):
         why: short reason why the tolerance is not held; empty: it is.
         scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
         absent: number of the latter without a run of it, as it may be unable to represent them; others were left out.
+        engine, formulation: that of an engine's best formulation, or of several in words; empty: not of an engine.
+        by_scene: best cell of that engine in each scene.
     """
 
     state: str
@@ -52,6 +56,9 @@ class ChoiceCell(NamedTuple):
     scenes: int = 1
     lacking: int = 0
     absent: int = 0
+    engine: str = ""
+    formulation: str = ""
+    by_scene: tuple["ChoiceCell", ...] = ()
 
     @property
     def holds(self) -> bool:
@@ -62,6 +69,32 @@ class ChoiceCell(NamedTuple):
     def share(self) -> str:
         """Words for the part of the column's scenes in which it was judged; empty: in all."""
         return f" in {self.scenes} of {self.scenes + self.lacking} scenes" if self.lacking else ""
+
+    @property
+    def rank(self) -> tuple[float, float, int]:
+        """Sort key: what holds in all scenes comes first, the cheapest first; then by state."""
+        return self.absent if self.holds else math.inf, self.cost, ORDER.index(self.state)
+
+    def ties(self, best: "ChoiceCell") -> bool:
+        """True if its cost overlaps with that of the first."""
+        rough = not (self.clean and best.clean)
+        return self is not best and self.holds and rough and self.cost < TIE * best.cost
+
+    @property
+    def setting(self) -> str:
+        """Setting and step without engine and formulation; empty if scenes need different ones."""
+        words = self.name.removeprefix(f"{self.engine} {self.formulation}".strip()).strip()
+        return words.removeprefix("at ").replace(" at ", ", ")
+
+    @property
+    def held_with(self) -> str:
+        """Formulation and presets that hold its scenes, for a reader; of more than two presets none is named."""
+        start = f"{self.engine} {self.formulation}".strip()
+        names = [cell.name for cell in self.by_scene if cell.holds]
+        presets = {name.removeprefix(start).partition(" at ")[0].strip() for name in names}
+        few = len(presets) <= 2 and all(name.startswith(start) for name in names)
+        words = self.formulation.replace("_", " ")
+        return ", ".join(filter(None, (words, " or ".join(sorted(presets)) if few else "settings vary")))
 
 
 def speed(cost: float, clean: bool) -> str:

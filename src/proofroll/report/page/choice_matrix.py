@@ -1,6 +1,5 @@
 """Matrix of engines and kinds of scenes: the cheapest run that holds a tolerance, or the reason why none does."""
 
-import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
@@ -9,7 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.kinds import report_kinds
+from proofroll.report.kinds import group_words
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.candidates import Candidate, candidates
 from proofroll.report.page.choice_cell import CANNOT, NO_RUN, ORDER, PARTLY, ChoiceCell, cell_of, joined
@@ -21,8 +20,6 @@ FIRST = 4
 FIRST_TOLERANCE = 10.0**-FIRST
 # All questions that a reader can ask: with forces or not, and the tolerance.
 ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DECADES)]
-# Ratio of rough costs below which two engines tie.
-TIE = 2.0
 
 
 class ChoiceStudy(NamedTuple):
@@ -41,31 +38,6 @@ class ChoiceStudy(NamedTuple):
     runs: Mapping[tuple[int, str], str] = MappingProxyType({})
     requires: frozenset[str] | None = None
     short: Mapping[int, str] = MappingProxyType({})
-
-
-class Naming(NamedTuple):
-    """Names for readers, and abilities.
-
-    Attributes:
-        engines: code name -> name for readers.
-        kinds: group of scenes -> title and meaning.
-        provides: engine -> formulation -> capabilities.
-    """
-
-    engines: Mapping[str, str] = MappingProxyType({})
-    kinds: Mapping[str, tuple[str, str]] = MappingProxyType({})
-    provides: Mapping[str, Mapping[str, Collection[str]]] = MappingProxyType({})
-
-
-UNNAMED = Naming()
-
-
-def naming(
-    engines: Mapping[str, str], provides: Mapping[str, Mapping[str, Collection[str]]] = UNNAMED.provides
-) -> Naming:
-    """Names of engines for readers, capabilities, and the titles that report kinds give their groups of scenes."""
-    kinds = {name: words for kind in report_kinds().values() for name, words in kind.groups.items()}
-    return Naming(engines=engines, kinds=kinds, provides=provides)
 
 
 @dataclass(frozen=True)
@@ -130,49 +102,21 @@ class ChoiceRow:
 
 
 @dataclass(frozen=True)
-class EngineStanding:
-    """Cell of an engine in a column: that of its best formulation; ``scenes``: its best cell in each scene."""
-
-    engine: str
-    formulation: str
-    cell: ChoiceCell
-    scenes: tuple[ChoiceCell, ...]
-
-    @property
-    def rank(self) -> tuple[float, float, int]:
-        """Sort key: what holds in all scenes comes first, the cheapest first; then by state."""
-        return self.cell.absent if self.cell.holds else math.inf, self.cell.cost, ORDER.index(self.cell.state)
-
-    def ties(self, best: "EngineStanding") -> bool:
-        """True if its cost overlaps with that of the first."""
-        rough = not (self.cell.clean and best.cell.clean)
-        return self is not best and self.cell.holds and rough and self.cell.cost < TIE * best.cell.cost
-
-    @property
-    def setting(self) -> str:
-        """Setting and step without engine and formulation; empty if scenes need different ones."""
-        words = self.cell.name.removeprefix(f"{self.engine} {self.formulation}".strip()).strip()
-        return words.removeprefix("at ").replace(" at ", ", ")
-
-    @property
-    def held_with(self) -> str:
-        """Formulation and presets that hold its scenes, for a reader; of more than two presets none is named."""
-        start = f"{self.engine} {self.formulation}".strip()
-        names = [cell.name for cell in self.scenes if cell.holds]
-        presets = {name.removeprefix(start).partition(" at ")[0].strip() for name in names}
-        few = len(presets) <= 2 and all(name.startswith(start) for name in names)
-        words = self.formulation.replace("_", " ")
-        return ", ".join(filter(None, (words, " or ".join(sorted(presets)) if few else "settings vary")))
-
-
-@dataclass(frozen=True)
 class ChoiceMatrix:
-    """Matrix of engines and scenes; ``studies`` by name, ``naming`` for readers."""
+    """Matrix of engines and scenes.
+
+    Attributes:
+        columns, rows: in the order of the studies.
+        studies: by name.
+        names: code name of an engine -> its name for readers.
+        provides: engine -> formulation -> capabilities.
+    """
 
     columns: list[ChoiceColumn]
     rows: list[ChoiceRow]
     studies: Mapping[str, ChoiceStudy]
-    naming: Naming = UNNAMED
+    names: Mapping[str, str]
+    provides: Mapping[str, Mapping[str, Collection[str]]]
 
     @property
     def titles(self) -> dict[str, str]:
@@ -197,7 +141,7 @@ class ChoiceMatrix:
 
     def title(self, engine: str) -> str:
         """Name of an engine for a reader."""
-        return self.naming.engines.get(engine.partition("@")[0], engine)
+        return self.names.get(engine.partition("@")[0], engine)
 
     @cached_property
     def cell(self) -> Callable[[ChoiceRow, ChoiceColumn, float, bool], ChoiceCell]:
@@ -235,7 +179,7 @@ class ChoiceMatrix:
 
     def _without_run(self, row: ChoiceRow, column: ChoiceColumn) -> ChoiceCell:
         """Cell without a run: the formulation cannot represent the scenes, or was not tried."""
-        provided = self.naming.provides.get(row.engine, {}).get(row.formulation)
+        provided = self.provides.get(row.engine, {}).get(row.formulation)
         needs = [need for name in column.studies if (need := self.studies[name].requires) is not None]
         if provided is None or not needs:
             return ChoiceCell(NO_RUN, "", "was not run in this report")
@@ -270,59 +214,60 @@ class ChoiceMatrix:
         return [row for row in self.rows if row.engine == engine and not row.setting and (witness or row.is_model)]
 
     @cached_property
-    def standing(self) -> Callable[[str, ChoiceColumn, float, bool], EngineStanding]:
-        """Function (engine, column, tolerance, whether forces count) -> standing of the engine in the column.
+    def standing(self) -> Callable[[str, ChoiceColumn, float, bool], ChoiceCell]:
+        """Function (engine, column, tolerance, whether forces count) -> cell of the engine in the column.
 
         A formulation that holds all scenes comes first, the cheapest of these; then the best one for each scene.
         """
         return cache(self._standing)
 
-    def _standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> EngineStanding:
-        rows = self.formulations(engine)
+    def _standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
         of_rows = [
-            EngineStanding(engine, row.formulation, cell, (cell,))
-            for row in rows
-            for cell in [self.cell(row, column, tolerance, forces)]
+            self.cell(row, column, tolerance, forces)._replace(engine=engine, formulation=row.formulation)
+            for row in self.formulations(engine)
         ]
         best = min(of_rows, key=lambda item: item.rank)
         single = [item for item in self.columns if not item.whole and item.group == column.group]
         if not column.whole or len(column.scenes) == 1 or len(single) < len(column.scenes):
-            return best
+            return best._replace(by_scene=(best,))
         by_scene = [self.standing(engine, item, tolerance, forces) for item in single]
-        best = EngineStanding(engine, best.formulation, best.cell, tuple(item.cell for item in by_scene))
-        ran = [item for item in by_scene if item.cell.state not in {NO_RUN, CANNOT, Verdict.NOT_JUDGED}]
-        asked = [
-            item for item in by_scene if item in ran or (item.cell.state in {NO_RUN, CANNOT} and best.cell.lacking)
-        ]
-        held = [item for item in asked if item.cell.holds]
-        if (best.cell.holds and not best.cell.absent) or not ran:
+        best = best._replace(by_scene=tuple(by_scene))
+        ran = [item for item in by_scene if item.state not in {NO_RUN, CANNOT, Verdict.NOT_JUDGED}]
+        asked = [item for item in by_scene if item in ran or (item.state in {NO_RUN, CANNOT} and best.lacking)]
+        held = [item for item in asked if item.holds]
+        if (best.holds and not best.absent) or not ran:
             return best
-        slowest = max(held, key=lambda item: item.cell.cost, default=best)
+        slowest = max(held, key=lambda item: item.cost, default=best)
         words = ", ".join(dict.fromkeys(item.formulation for item in held)) or best.formulation
         named = {scene.name: scene.words for scene in column.scenes}
         says = "; ".join(
-            f"{named[item.name]}: {item_of_scene.cell.title}"
-            for item, item_of_scene in zip(single, by_scene, strict=True)
+            f"{named[item.name]}: {item_of_scene.title}" for item, item_of_scene in zip(single, by_scene, strict=True)
         )
         if len(held) == len(asked):
-            return EngineStanding(engine, words, slowest.cell._replace(title=says, name=""), best.scenes)
-        state = PARTLY if held else max((item.cell.state for item in ran), key=ORDER.index)
+            return slowest._replace(title=says, name="", formulation=words, by_scene=best.by_scene)
+        state = PARTLY if held else max((item.state for item in ran), key=ORDER.index)
         text = f"{len(held)} of {len(asked)}"
-        cell = ChoiceCell(state, text, says, best.cell.href, why=f"holds {text} scenes", scenes=len(ran))
-        return EngineStanding(engine, words, cell, best.scenes)
+        cell = ChoiceCell(state, text, says, best.href, why=f"holds {text} scenes", scenes=len(ran))
+        return cell._replace(engine=engine, formulation=words, by_scene=best.by_scene)
 
     def standings(
         self, column: ChoiceColumn, tolerance: float, forces: bool, engines: Collection[str] | None = None
-    ) -> list[EngineStanding]:
-        """Standings of the engines that may be taken, the best first; ``engines``: of these alone."""
+    ) -> list[ChoiceCell]:
+        """Cells of the engines that may be taken, the best first; ``engines``: of these alone."""
         names = [name for name in self.engines if name not in self.witnesses and (engines is None or name in engines)]
         return sorted((self.standing(name, column, tolerance, forces) for name in names), key=lambda item: item.rank)
 
 
 def choice_matrix(
-    lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy], naming: Naming = UNNAMED
+    lines: Iterable[TableLine],
+    studies: Mapping[str, ChoiceStudy],
+    names: Mapping[str, str] = MappingProxyType({}),
+    provides: Mapping[str, Mapping[str, Collection[str]]] = MappingProxyType({}),
 ) -> ChoiceMatrix:
-    """Matrix of the lines of some studies, in their order; rows by engine and formulation as the studies have them."""
+    """Matrix of the lines of some studies, in their order; rows by engine and formulation as the studies have them.
+
+    ``names`` and ``provides``: see :class:`ChoiceMatrix`.
+    """
     order = {name: number for number, name in enumerate(studies)}
     chosen = sorted((line for line in lines if line.study in order), key=lambda x: (order[x.study], x.row, x.engine))
     rows: dict[tuple[str, str, str], ChoiceRow] = {}
@@ -337,9 +282,9 @@ def choice_matrix(
             row = rows.setdefault(key, ChoiceRow(*key, own_equations=key[:2] in derived))
             row.found.setdefault(name, []).extend(steps)
     columns = []
-    for group, names in groups.items():
-        scenes = tuple(ChoiceScene(name, tuple(group_lines)) for name, group_lines in names.items())
-        title, meaning = naming.kinds.get(group, (group[:1].upper() + group[1:], ""))
+    for group, studies_of in groups.items():
+        scenes = tuple(ChoiceScene(name, tuple(group_lines)) for name, group_lines in studies_of.items())
+        title, meaning = group_words(group)
         whole = ChoiceColumn(group=group, title=title, meaning=meaning, href="", scenes=scenes)
         single = []
         for scene in scenes:
@@ -352,4 +297,4 @@ def choice_matrix(
         columns += [replace(whole, href=single[0].href if len(single) == 1 else ""), *single]
     orders = [list(dict.fromkeys(key[:end] for key in rows)) for end in (1, 2, 3)]
     keys = sorted(rows, key=lambda key: [order_of.index(key[: end + 1]) for end, order_of in enumerate(orders)])
-    return ChoiceMatrix(columns, [rows[key] for key in keys], dict(studies), naming)
+    return ChoiceMatrix(columns, [rows[key] for key in keys], dict(studies), names, provides)

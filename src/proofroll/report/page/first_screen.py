@@ -19,7 +19,6 @@ from proofroll.report.page.choice_matrix import (
     ChoiceColumn,
     ChoiceMatrix,
     ChoiceRow,
-    EngineStanding,
 )
 from proofroll.report.page.profile import Profile, profile
 from proofroll.report.pages import addressed, packed, unbroken
@@ -142,12 +141,12 @@ class FirstScreen:
         if row.row is not None:
             return self._view(row, column, self.matrix.cell(row.row, column, tolerance, forces))
         standing = self.matrix.standing(row.engine, column, tolerance, forces)
-        view = self._view(row, column, standing.cell)
-        dots = tuple(cell.holds for cell in standing.scenes) if len(standing.scenes) > 1 else ()
+        view = self._view(row, column, standing)
+        dots = tuple(cell.holds for cell in standing.by_scene) if len(standing.by_scene) > 1 else ()
         if view.look in {CANNOT, NO_RUN, "unjudged"}:
             return view
-        if standing.cell.state == PARTLY:
-            pairs = zip(column.scenes, standing.scenes, strict=True)
+        if standing.state == PARTLY:
+            pairs = zip(column.scenes, standing.by_scene, strict=True)
             return view._replace(sub=", ".join(f"{s.words} {c.text}" for s, c in pairs if c.holds), dots=dots)
         words = standing.formulation.replace("_", " ")
         finer = ", finer steps" if view.look == "converges" else ""
@@ -252,11 +251,11 @@ class FirstScreen:
         return packed(json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "replace"))
 
 
-def bar(standing: EngineStanding) -> int:
+def bar(cell: ChoiceCell) -> int:
     """Length of the bar of a speed [%], logarithmic from 1× to 300× real time; 0 where the tolerance is not held."""
-    if not standing.cell.holds or standing.cell.cost <= 0:
+    if not cell.holds or cell.cost <= 0:
         return 0
-    part = math.log(max(1.0, 1 / standing.cell.cost)) / math.log(FASTEST)
+    part = math.log(max(1.0, 1 / cell.cost)) / math.log(FASTEST)
     return round(100 * min(1.0, max(0.02, part)))
 
 

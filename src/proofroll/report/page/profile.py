@@ -70,12 +70,12 @@ def profile(matrix: ChoiceMatrix, answered: FirstAnswer, engines: Collection[str
     def y_of(held: int) -> float:
         return round(HEIGHT - BELOW - (HEIGHT - BELOW - TOP) * held / (count or 1), 1)
 
-    least = [item.taken.cell.cost if item.taken else math.inf for item in scenes]
+    least = [item.taken.cost if item.taken else math.inf for item in scenes]
     lines = []
     for name in matrix.engines:
         if engines is not None and name not in engines and name not in matrix.witnesses:
             continue
-        costs = [matrix.standing(name, item.column, asked.tolerance, asked.forces).cell.cost for item in scenes]
+        costs = [matrix.standing(name, item.column, asked.tolerance, asked.forces).cost for item in scenes]
         pairs = [(cost, low) for cost, low in zip(costs, least, strict=True) if math.isfinite(cost) and low > 0]
         ratios = sorted(max(1.0, cost / low) if math.isfinite(low) else math.inf for cost, low in pairs)
         ratios = [item for item in ratios if math.isfinite(item)]

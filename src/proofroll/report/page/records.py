@@ -22,7 +22,7 @@ from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine
-from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, choice_matrix, naming
+from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, choice_matrix
 from proofroll.report.page.first_sentences import Kept, kept, three_sentences
 from proofroll.report.page.precision import WorkPrecision, work_precision
 from proofroll.report.page.scene_sheet import SceneSheet, sheet_of
@@ -161,7 +161,7 @@ class ReportContent:
         }
         swept = [item for item in self.entries.get("tradeoffs", ()) if item.study]
         studies |= {item.name: ChoiceStudy(item.title, item.section) for item in swept}
-        return choice_matrix(self.table.lines, studies, naming(self.names, self.provides))
+        return choice_matrix(self.table.lines, studies, self.names, self.provides)
 
     @property
     def sheets(self) -> dict[str, SceneSheet]:
@@ -252,7 +252,7 @@ def _comparison(outcome: Outcome, lines: Sequence[TableLine], names: Mapping[str
     content = dataclasses.replace(content, runs=runs)
     points = outcome.points.values()
     sheet = sheet_of(outcome.file, [item.case.parameters for item in points], [item.scene for item in points])
-    choice = choice_matrix(lines, {content.name: ChoiceStudy(content.title, "")}, naming(names))
+    choice = choice_matrix(lines, {content.name: ChoiceStudy(content.title, "")}, names)
     evidence = ComparisonEvidence(truths, sheet, conclusions(content, choice, truths, kind), growth(content, truths))
     return dataclasses.replace(content, evidence=evidence)
 

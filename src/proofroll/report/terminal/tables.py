@@ -266,7 +266,7 @@ def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes
         table.add_row(
             Text(item.column.title),
             Text(told(matrix, taken) if taken else closest_words(matrix, item)),
-            Text(f"{taken.cell.text}{taken.cell.share}" if taken else "–"),
+            Text(f"{taken.text}{taken.share}" if taken else "–"),
             Text(next_words(matrix, item)),
             *([] if forces else [Text(forces_words(matrix, item, item_with_forces))]),
         )

@@ -8,7 +8,7 @@ import pytest
 from table_lines import ARM, FORCE, LINE, line
 
 from proofroll.report.page.answer import ReaderQuestion, answer, closest_words, forces_words, listed, next_words
-from proofroll.report.page.choice_matrix import ChoiceStudy, Naming, choice_matrix
+from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.page.profile import profile
 from proofroll.report.terminal.tables import answer_table
 
@@ -16,7 +16,7 @@ STUDIES = {name: ChoiceStudy(f"A {name}", f"c{number}") for number, name in enum
 BETA = line(engine="beta", row=3, error=1e-9, cost=0.5)
 OWN = line(engine="gamma", row=4, error=1e-12, cost=1e-6, own_equations=True)
 BALL = line(study="ball", scene="ball", group="ball rolling", error=0.1)
-NAMES = Naming(engines={"alpha": "Alpha"}, kinds={"ball rolling": ("Rolling balls", "a ball rolls")})
+NAMES = {"alpha": "Alpha"}
 
 
 def test_the_cheapest_engine_of_each_kind_is_told_and_a_witness_never_is() -> None:
@@ -101,7 +101,7 @@ def test_what_fails_is_told_in_the_words_of_its_comparison() -> None:
     studies = STUDIES | {"arm": STUDIES["arm"]._replace(short={0: "it is soft", 5: "it falls"})}
     matrix = choice_matrix([LINE, wrong], studies)
     told = answer(matrix, 1e-6, False).kinds[0].failures
-    assert [(item.who, item.why) for item in told] == [
+    assert [(item.name, item.why) for item in told] == [
         ("delta joints default", "it falls"), ("alpha joints default", "it is soft"),
     ]  # fmt: skip
     assert [item.why for item in answer(matrix, 1e-2, False).kinds[0].failures] == ["it falls"]

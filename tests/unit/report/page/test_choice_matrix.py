@@ -13,7 +13,7 @@ from proofroll.report.long_table import TableLine
 from proofroll.report.page.advice import advice
 from proofroll.report.page.answer import answer
 from proofroll.report.page.choice_cell import CANNOT, NO_RUN, PARTLY, ChoiceCell, speed
-from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, Naming, choice_matrix
+from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, choice_matrix
 
 STUDIES = {
     "arm": ChoiceStudy("An arm", "c0", {(0, ""): "c0.joints", (0, "mass=2"): "c0.joints.mass-2"}),
@@ -170,7 +170,7 @@ def test_a_group_holds_where_all_its_scenes_do() -> None:
     assert at([*ARM, *coarse], 3)[:2] == (Verdict.CONVERGES, "1 of 2")
     columns = choice_matrix([*ARM, *coarse, line(study="ball", scene="ball", group="ball rolling")], STUDIES).columns
     assert [(item.title, item.whole) for item in columns] == [
-        ("Trees", True), ("arm", False), ("chain", False), ("Ball rolling", True), ("ball", False),
+        ("Trees", True), ("arm", False), ("chain", False), ("Rolling balls", True), ("ball", False),
     ]  # fmt: skip
 
 
@@ -190,7 +190,7 @@ def test_a_scene_that_was_left_out_says_nothing_against_those_that_ran() -> None
     assert at([*ARM, gone, other], 4)[:2] == at(ARM, 4)[:2], "also where another engine ran it"
     taken = answer(choice_matrix([*ARM, gone, other], STUDIES), 1e-4, False).kinds[0].taken
     assert taken is not None
-    assert taken.cell.name == "alpha joints default at dt 2.5e-4 s"
+    assert taken.name == "alpha joints default at dt 2.5e-4 s"
     assert at([gone], 4).state == Verdict.NOT_JUDGED
 
 
@@ -231,7 +231,7 @@ def test_what_cannot_be_represented_is_told_from_what_was_not_run(whole: ChoiceM
     assert whole.cell(row, column, 1e-4, False) == ChoiceCell(NO_RUN, "", "was not run in this report")
     needs = {name: study._replace(requires=frozenset({"a wall"})) for name, study in STUDIES.items()}
     for provided, state in (([], CANNOT), (["a wall"], NO_RUN)):
-        told = replace(whole, studies=needs, naming=Naming(provides={"beta": {"joints": provided}}))
+        told = replace(whole, studies=needs, provides={"beta": {"joints": provided}})
         cell = told.cell(row, column, 1e-4, False)
         assert (cell.state, "lacks “a wall”" in cell.title) == (state, state == CANNOT)
 
@@ -247,15 +247,15 @@ def test_an_engine_stands_by_its_formulations() -> None:
     ]
     found = choice_matrix(lines, STUDIES)
     standing = found.standing("alpha", found.kinds[0], 1e-4, False)
-    assert (standing.formulation, standing.cell.cost) == ("joints", 0.3)
+    assert (standing.formulation, standing.cost) == ("joints", 0.3)
     found = choice_matrix([lines[1], lines[2]], STUDIES)
     standing = found.standing("alpha", found.kinds[0], 1e-4, False)
-    assert (set(standing.formulation.split(", ")), standing.cell.cost) == ({"joints", "maps"}, 0.3)
+    assert (set(standing.formulation.split(", ")), standing.cost) == ({"joints", "maps"}, 0.3)
     found = choice_matrix(lines[2:], STUDIES)
     standing = found.standing("alpha", found.kinds[0], 1e-4, False)
-    assert (standing.cell.state, standing.cell.text) == (PARTLY, "1 of 2")
-    assert [cell.holds for cell in standing.scenes] == [True, False]
-    assert found.standing("alpha", found.kinds[0], 1e-12, False).cell.text == "0 of 2"
+    assert (standing.state, standing.text) == (PARTLY, "1 of 2")
+    assert [cell.holds for cell in standing.by_scene] == [True, False]
+    assert found.standing("alpha", found.kinds[0], 1e-12, False).text == "0 of 2"
 
 
 def test_what_holds_all_scenes_comes_before_what_is_cheaper_in_some() -> None:
@@ -263,7 +263,7 @@ def test_what_holds_all_scenes_comes_before_what_is_cheaper_in_some() -> None:
     both = [line(error=1e-9, cost=0.5), line(error=1e-9, cost=2.0, study="chain", scene="chain")]
     found = choice_matrix([*both, line(engine="beta", row=3, error=1e-9, cost=0.1)], STUDIES)
     ranked = found.standings(found.kinds[0], 1e-4, False)
-    assert [(item.engine, item.cell.state) for item in ranked] == [("alpha", Verdict.AGREES), ("beta", PARTLY)]
+    assert [(item.engine, item.state) for item in ranked] == [("alpha", Verdict.AGREES), ("beta", PARTLY)]
     late = line(
         engine="beta",
         row=3,
@@ -285,5 +285,5 @@ def test_a_scene_of_two_kinds_has_two_columns() -> None:
     rolls = line(study="arm", scene="wall", group="rolling", error=1e-9, cost=0.1)
     slips = line(study="chain", scene="wall", group="slipping", error=1e-9, cost=0.5)
     found = choice_matrix([rolls, slips], STUDIES)
-    costs = [found.standing("alpha", column, 1e-4, False).cell.cost for column in found.columns]
+    costs = [found.standing("alpha", column, 1e-4, False).cost for column in found.columns]
     assert costs == [0.1, 0.1, 0.5, 0.5]
