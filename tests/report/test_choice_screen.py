@@ -73,7 +73,7 @@ def test_everything_follows_the_question(seen: Visit, screen: FirstScreen) -> No
         dots = "[...document.querySelectorAll('#answer-chips li')].map((chip) => chip.querySelectorAll('.dot').length)"
         assert seen.page.evaluate(dots) == [len(chip.engines) for chip in found.chips]
         assert seen.page.locator("#answer-cards > li").count() == len(found.kinds)
-        too = [f"Forces, too: {words}" for words in screen.forces(found)]
+        too = [f"Forces, too: {kind.forces_words}" for kind in found.kinds if not forces]
         assert [text.strip() for text in seen.page.locator("#answer-cards .too").all_inner_texts()] == too
         assert len(too) == (0 if forces else len(found.kinds))
         assert seen.page.locator("#uses tbody tr:not(.group)").count() == len(found.scenes)
@@ -162,7 +162,7 @@ def test_the_first_screen_is_there_without_a_program(report_page: Path, screen: 
         text = " ".join(seen.page.locator("main").inner_text().split())
     for chip in screen.first.chips:
         assert f"{chip.title} {chip.words}" in text
-    for words in screen.forces(screen.first):
+    for words in [kind.forces_words for kind in screen.first.kinds]:
         assert f"Forces, too: {words}" in text
     for row in screen.rows:
         if row.level == "engine":

@@ -9,9 +9,6 @@ from proofroll.report.page.answer import (
     NOT_REACHED,
     ColumnAnswer,
     answer,
-    closest_words,
-    forces_words,
-    next_words,
     take_words,
     told,
 )
@@ -44,27 +41,25 @@ def advice(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> list[Advised
 
     Where forces are asked for and are not judged, the advice is for motion alone and says so.
     """
-    motion, both = (answer(matrix, tolerance, need).columns for need in (False, True))
-    advised = [_of_column(matrix, *pair, tolerance, forces) for pair in zip(motion, both, strict=True)]
-    return [*advised, over_all(matrix, tolerance, forces)]
+    columns = answer(matrix, tolerance, False).columns
+    return [*(_of_column(matrix, item, forces) for item in columns), over_all(matrix, tolerance, forces)]
 
 
-def _of_column(
-    matrix: ChoiceMatrix, motion: ColumnAnswer, both: ColumnAnswer, tolerance: float, forces: bool
-) -> Advised:
-    """Advice for a column in the words of the answer's table; ``motion`` and ``both``: without and with forces."""
-    column, item = motion.column, both if forces and both.judged else motion
+def _of_column(matrix: ChoiceMatrix, motion: ColumnAnswer, forces: bool) -> Advised:
+    """Advice for a column in the words of the answer's table; ``motion``: the answer without forces."""
+    column, both = motion.column, motion.both
+    item = both if forces and both.judged else motion
     head = f"{column.title}{'' if column.whole else f' ({column.meaning})'}"
     if not motion.judged:
         return Advised(column.name, f"{head}: motion is not judged there.", judged=False)
     alone = ": forces are not judged; for motion alone" if forces and not both.judged else ""
-    head = f"{head}{alone} to {number(tolerance)}{' with forces' if item is both else ''}"
+    head = f"{head}{alone} to {number(motion.asked.tolerance)}{' with forces' if item is both else ''}"
     taken = item.taken
     if taken is None:
-        return Advised(column.name, f"{head}: {closest_words(matrix, item)}.")
+        return Advised(column.name, f"{head}: {item.closest_words}.")
     speed = f"{taken.text} real time{taken.share}"
-    sentence = f"{head}: take {told(matrix, taken)} ({speed}); next: {next_words(matrix, item)}"
-    sentence += "." if forces else f"; if forces count: {forces_words(matrix, motion, both)}."
+    sentence = f"{head}: take {told(matrix, taken)} ({speed}); next: {item.next_words}"
+    sentence += "." if forces else f"; if forces count: {motion.forces_words}."
     return Advised(column.name, sentence, taken.name or take_words(matrix, taken), taken.cost)
 
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
@@ -48,33 +49,39 @@ class ReaderQuestion:
         return f"{length} per metre of the true path" if length else f"{number(self.tolerance)} of the path"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ColumnAnswer:
-    """FirstAnswer for a kind of scenes or for one scene.
+    """Answer for a kind of scenes or for one scene; ``engines``: among these alone, None: among all."""
 
-    Attributes:
-        column: of the matrix.
-        standings: of the engines that may be taken, the best first.
-        scenes: best cell of these in each scene of the column.
-        failures: cells of settings that fail; ``name`` for a reader, ``why`` in at most twelve words.
-        judged: False: what is asked for is judged in none of its scenes.
-    """
-
+    matrix: ChoiceMatrix
     column: ChoiceColumn
-    standings: list[ChoiceCell]
-    scenes: list[ChoiceCell]
-    failures: list[ChoiceCell]
-    judged: bool
+    asked: ReaderQuestion
+    engines: Collection[str] | None = None
+
+    @cached_property
+    def standings(self) -> list[ChoiceCell]:
+        """Cells of the engines that may be taken, the best first."""
+        return self.matrix.standings(self.column, self.asked.tolerance, self.asked.forces, self.engines)
+
+    @cached_property
+    def scenes(self) -> list[ChoiceCell]:
+        """Best cell of these in each scene of the column."""
+        return [min(cells, key=_state_rank) for cells in zip(*(item.by_scene for item in self.standings), strict=True)]
+
+    @property
+    def judged(self) -> bool:
+        """False if what is asked for is judged in none of its scenes."""
+        return not self.matrix.unjudged[self.asked.forces].issuperset(self.column.studies)
+
+    @cached_property
+    def both(self) -> ColumnAnswer:
+        """Answer where forces count."""
+        return self if self.asked.forces else replace(self, asked=replace(self.asked, forces=True))
 
     @property
     def taken(self) -> ChoiceCell | None:
         """The engine to take; None: nothing holds the tolerance."""
         return self.standings[0] if self.standings and self.standings[0].holds else None
-
-    @property
-    def next(self) -> ChoiceCell | None:
-        """The next engine that holds the tolerance, or None."""
-        return self.standings[1] if self.taken and len(self.standings) > 1 and self.standings[1].holds else None
 
     @property
     def tied(self) -> list[ChoiceCell]:
@@ -85,6 +92,68 @@ class ColumnAnswer:
     def most_held(self) -> int:
         """Largest number of the column's scenes that one engine holds."""
         return max((sum(cell.holds for cell in item.by_scene) for item in self.standings), default=0)
+
+    @property
+    def failures(self) -> list[ChoiceCell]:
+        """Cells of settings that fail, one per formulation; ``name`` for a reader, ``why`` in at most twelve words."""
+        entries: list[tuple[int, float, ChoiceCell, str]] = []
+        for row in self.matrix.rows:
+            if not row.setting or row.own_equations or (self.engines is not None and row.engine not in self.engines):
+                continue
+            for study in self.column.studies:
+                for number_of_row, short in self.matrix.studies[study].short.items():
+                    steps = [item for item in row.found.get(study, ()) if item.row == number_of_row]
+                    cell = cell_of(steps, self.asked.tolerance, self.asked.forces) if steps else None
+                    if cell is None or cell.state in _SILENT:
+                        continue
+                    sizes = [size for item in steps if (size := item.tolerance(self.asked.forces)) is not None]
+                    preset = f" {row.setting}" if row.setting == "default" else ""
+                    failure = cell._replace(name=f"{take_words(self.matrix, row)}{preset}", why=short)
+                    place = _STATES.index(cell.state) if cell.state in _STATES else len(_STATES)
+                    entries.append((place, -min(sizes, default=0.0), failure, row.name))
+        entries.sort(key=lambda item: item[:2])
+        best_of = {name: item for *_, item, name in reversed(entries)}
+        return [item for *_, item, name in entries if best_of[name] is item][:_REASONS]
+
+    @property
+    def next_words(self) -> str:
+        """The next engine and what it costs relative to the one to take; or what it does not do."""
+        best, second = self.taken, next((item for item in self.standings[1:2] if item.holds), None)
+        if second is None or best is None:
+            return "no other engine holds it" if best else ""
+        if second.ties(best):
+            return f"{take_words(self.matrix, second)}, a tie"
+        ratio = float(f"{second.cost / best.cost:.2g}")
+        return f"{take_words(self.matrix, second)}, {ratio:g}× the cost"
+
+    @property
+    def closest_words(self) -> str:
+        """Text in place of a choice where nothing holds the tolerance."""
+        if not self.judged:
+            return "not judged"
+        ran = [standing for standing in self.standings if standing.state != NO_RUN]
+        if not ran:
+            return "no engine was run"
+        if all(standing.state == Verdict.NOT_JUDGED for standing in ran):
+            return NOT_REACHED
+        best = self.standings[0]
+        if best.state == PARTLY:
+            pairs = zip(self.column.scenes, best.by_scene, strict=True)
+            held = ", ".join(f"{scene.words} {cell.text}" for scene, cell in pairs if cell.holds)
+            return f"none for all; {self.matrix.title(best.engine)} holds {best.text}: {held}"
+        return f"none; closest {take_words(self.matrix, best)}: {best.why or best.state}"
+
+    @property
+    def forces_words(self) -> str:
+        """Effect of forces on the answer for motion alone."""
+        taken = self.both.taken
+        if taken is None:
+            return "✗ none" if self.both.judged else "not judged"
+        # A kind of several scenes is held by settings that only the cells of these name.
+        best, second = (
+            item and (item.engine, item.name, [cell.name for cell in item.by_scene]) for item in (self.taken, taken)
+        )
+        return "✓ the same choice" if best == second else f"{take_words(self.matrix, taken)}, {taken.text}"
 
 
 @dataclass(frozen=True)
@@ -134,52 +203,12 @@ class FirstAnswer:
 def answer(matrix: ChoiceMatrix, tolerance: float, forces: bool, engines: Collection[str] | None = None) -> FirstAnswer:
     """FirstAnswer of a matrix to a question; ``engines``: of these alone."""
     asked = ReaderQuestion(tolerance, forces)
-    columns = [of_column(matrix, item, asked, engines) for item in matrix.columns]
+    columns = [ColumnAnswer(matrix, item, asked, engines) for item in matrix.columns]
     return FirstAnswer(asked, columns, _chips(matrix, [item for item in columns if item.column.whole]))
-
-
-def of_column(
-    matrix: ChoiceMatrix, column: ChoiceColumn, asked: ReaderQuestion, engines: Collection[str] | None = None
-) -> ColumnAnswer:
-    """FirstAnswer for one column of the matrix."""
-    standings = matrix.standings(column, asked.tolerance, asked.forces, engines)
-    best = [min(cells, key=_state_rank) for cells in zip(*(item.by_scene for item in standings), strict=True)]
-    judged = not matrix.unjudged[asked.forces].issuperset(column.studies)
-    return ColumnAnswer(
-        column=column,
-        standings=standings,
-        scenes=best,
-        failures=_failures(matrix, column, asked, engines),
-        judged=judged,
-    )
 
 
 def _state_rank(cell: ChoiceCell) -> tuple[bool, bool]:
     return not cell.holds, cell.state in _SILENT
-
-
-def _failures(
-    matrix: ChoiceMatrix, column: ChoiceColumn, asked: ReaderQuestion, engines: Collection[str] | None
-) -> list[ChoiceCell]:
-    """Rows of the column's comparisons that do not hold the tolerance and have a short reason, one per formulation."""
-    entries: list[tuple[int, float, ChoiceCell, str]] = []
-    for row in matrix.rows:
-        if not row.setting or row.own_equations or (engines is not None and row.engine not in engines):
-            continue
-        for study in column.studies:
-            for number_of_row, short in matrix.studies[study].short.items():
-                steps = [item for item in row.found.get(study, ()) if item.row == number_of_row]
-                cell = cell_of(steps, asked.tolerance, asked.forces) if steps else None
-                if cell is None or cell.state in _SILENT:
-                    continue
-                sizes = [size for item in steps if (size := item.tolerance(asked.forces)) is not None]
-                preset = f" {row.setting}" if row.setting == "default" else ""
-                who = f"{take_words(matrix, row)}{preset}"
-                place = _STATES.index(cell.state) if cell.state in _STATES else len(_STATES)
-                entries.append((place, -min(sizes, default=0.0), cell._replace(name=who, why=short), row.name))
-    entries.sort(key=lambda item: item[:2])
-    best_of = {name: item for *_, item, name in reversed(entries)}
-    return [item for *_, item, name in entries if best_of[name] is item][:_REASONS]
 
 
 def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
@@ -233,48 +262,3 @@ def take_words(matrix: ChoiceMatrix, taken: ChoiceCell | ChoiceRow) -> str:
 def told(matrix: ChoiceMatrix, taken: ChoiceCell) -> str:
     """Engine, formulation, setting and step for a reader."""
     return ", ".join(filter(None, (take_words(matrix, taken), taken.setting)))
-
-
-def next_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
-    """The next engine and what it costs relative to the one to take; or what it does not do."""
-    second, best = item.next, item.taken
-    if second is None or best is None:
-        return "no other engine holds it" if best else ""
-    if second.ties(best):
-        return f"{take_words(matrix, second)}, a tie"
-    ratio = float(f"{second.cost / best.cost:.2g}")
-    return f"{take_words(matrix, second)}, {ratio:g}× the cost"
-
-
-def closest_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
-    """Text in place of a choice where nothing holds the tolerance."""
-    if not item.judged:
-        return "not judged"
-    ran = [standing for standing in item.standings if standing.state != NO_RUN]
-    if not ran:
-        return "no engine was run"
-    if all(standing.state == Verdict.NOT_JUDGED for standing in ran):
-        return NOT_REACHED
-    best = item.standings[0]
-    if best.state == PARTLY:
-        held = [
-            f"{scene.words} {cell.text}"
-            for scene, cell in zip(item.column.scenes, best.by_scene, strict=True)
-            if cell.holds
-        ]
-        return f"none for all; {matrix.title(best.engine)} holds {best.text}: {', '.join(held)}"
-    return f"none; closest {take_words(matrix, best)}: {best.why or best.state}"
-
-
-def forces_words(matrix: ChoiceMatrix, motion: ColumnAnswer, both: ColumnAnswer) -> str:
-    """Effect of forces on the answer: ``motion`` and ``both``: answers for motion alone and with forces."""
-    if not both.judged:
-        return "not judged"
-    if both.taken is None:
-        return "✗ none"
-    # A kind of several scenes is held by settings that only the cells of these name.
-    best, second = (
-        item.taken and (item.taken.engine, item.taken.name, [cell.name for cell in item.taken.by_scene])
-        for item in (motion, both)
-    )
-    return "✓ the same choice" if best == second else f"{take_words(matrix, both.taken)}, {both.taken.text}"

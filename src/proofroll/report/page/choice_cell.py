@@ -41,7 +41,7 @@ class ChoiceCell(NamedTuple):
         why: short reason why the tolerance is not held; empty: it is.
         scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
         absent: number of the latter without a run of it, as it may be unable to represent them; others were left out.
-        engine, formulation: that of an engine's best formulation, or of several in words; empty: not of an engine.
+        engine, formulation: names of an engine and its best formulation, or of several; empty: not of an engine.
         by_scene: best cell of that engine in each scene.
     """
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.page.answer import ColumnAnswer, FirstAnswer, answer, forces_words, next_words
+from proofroll.report.page.answer import FirstAnswer, answer
 from proofroll.report.page.choice_cell import CANNOT, NO_RUN, PARTLY, ChoiceCell
 from proofroll.report.page.choice_matrix import (
     ASKED,
@@ -177,29 +177,6 @@ class FirstScreen:
         place = {row.name: number for number, row in enumerate(self.rows) if row.level == "engine"}
         taken = (item.taken for item in answered.columns)
         return [-1 if item is None else place[item.engine] for item in taken]
-
-    def uses(self, answered: FirstAnswer) -> Iterator[tuple[ColumnAnswer, str, str]]:
-        """Each scene of an answer with the next engine, and what changes if forces count."""
-        with_forces = self._with_forces(answered)
-        for number, item in enumerate(answered.scenes):
-            both = "" if with_forces is None else forces_words(self.matrix, item, with_forces.scenes[number])
-            yield item, next_words(self.matrix, item), both
-
-    def forces(self, answered: FirstAnswer) -> list[str]:
-        """Effect of forces on the answer for each kind; empty where the question counts them already."""
-        with_forces = self._with_forces(answered)
-        if with_forces is None:
-            return []
-        pairs = zip(answered.kinds, with_forces.kinds, strict=True)
-        return [forces_words(self.matrix, motion, both) for motion, both in pairs]
-
-    def _with_forces(self, answered: FirstAnswer) -> FirstAnswer | None:
-        engines = frozenset(item.engine for column in answered.scenes for item in column.standings)
-        return None if answered.question.forces else self._answer_with_forces(answered.question.tolerance, engines)
-
-    @cached_property
-    def _answer_with_forces(self) -> Callable[[float, frozenset[str]], FirstAnswer]:
-        return cache(lambda tolerance, engines: answer(self.matrix, tolerance, True, engines))
 
     def kind_title(self, group: str) -> str:
         """Title of a kind of scenes."""

@@ -20,7 +20,7 @@ from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page import profile
-from proofroll.report.page.answer import LENGTHS, closest_words
+from proofroll.report.page.answer import LENGTHS
 from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE
 from proofroll.report.page.first_screen import STATES, FirstScreen, bar, look
 from proofroll.report.pages import environment, folded, packed, rendered, slug
@@ -142,7 +142,6 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "look": look,
         "bar": bar,
         "lengths": LENGTHS,
-        "closest_words": closest_words,
         "profiles": profile,
         "loop_key": slug,
         "again": _again,

@@ -23,7 +23,7 @@ from proofroll.report.labels import (
     unjudged,
     verdict_text,
 )
-from proofroll.report.page.answer import answer, closest_words, forces_words, next_words, told
+from proofroll.report.page.answer import answer, told
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
 from proofroll.running.case import Status, host_sentences
@@ -251,8 +251,7 @@ def _one_line(text: str) -> str:
 
 def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes: bool = False) -> Table:
     """The answer of the first screen: for each kind of scenes, or each scene, what to take, its speed, and the next."""
-    answered, with_forces = (answer(matrix, tolerance, need) for need in (forces, True))
-    columns, both = (found.scenes if scenes else found.kinds for found in (answered, with_forces))
+    answered = answer(matrix, tolerance, forces)
     table = plain_table(
         Column("scene" if scenes else "kind of scene", min_width=_WORD),
         Column("take", min_width=_WORD),
@@ -261,13 +260,13 @@ def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes
         *([] if forces else [Column("if forces count", min_width=_WORD)]),
         title=f"The cheapest that holds {answered.question.words}",
     )
-    for item, item_with_forces in zip(columns, both, strict=True):
+    for item in answered.scenes if scenes else answered.kinds:
         taken = item.taken
         table.add_row(
             Text(item.column.title),
-            Text(told(matrix, taken) if taken else closest_words(matrix, item)),
+            Text(told(matrix, taken) if taken else item.closest_words),
             Text(f"{taken.text}{taken.share}" if taken else "–"),
-            Text(next_words(matrix, item)),
-            *([] if forces else [Text(forces_words(matrix, item, item_with_forces))]),
+            Text(item.next_words),
+            *([] if forces else [Text(item.forces_words)]),
         )
     return table

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from table_lines import ARM, FORCE, LINE, line
 
-from proofroll.report.page.answer import ReaderQuestion, answer, closest_words, forces_words, listed, next_words
+from proofroll.report.page.answer import ReaderQuestion, answer, listed
 from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.page.profile import profile
 from proofroll.report.terminal.tables import answer_table
@@ -35,12 +35,12 @@ def test_the_cheapest_engine_of_each_kind_is_told_and_a_witness_never_is() -> No
 def test_a_tie_is_told_of_rough_costs_alone() -> None:
     """Costs known to a factor of two that are nearer than that tie; clean ones do not."""
     dear = choice_matrix([line(error=1e-9, cost=0.2), replace(BETA, cost=23.0)], STUDIES)
-    assert next_words(dear, answer(dear, 1e-4, False).kinds[0]) == "beta joints, 120× the cost"
+    assert answer(dear, 1e-4, False).kinds[0].next_words == "beta joints, 120× the cost"
     for clean, words in ((False, "beta joints, a tie"), (True, "beta joints, 1.5× the cost")):
         lines = [line(error=1e-9, cost=0.2, clean=clean), replace(BETA, cost=0.3, clean=clean)]
         matrix = choice_matrix(lines, STUDIES)
         item = answer(matrix, 1e-4, False).kinds[0]
-        assert next_words(matrix, item) == words
+        assert item.next_words == words
         assert [tied.engine for tied in item.tied] == ([] if clean else ["beta"])
 
 
@@ -56,10 +56,10 @@ def test_where_nothing_holds_it_the_closest_is_told() -> None:
     """By what it is off; of several scenes how many the best engine holds, and at which speed."""
     matrix = choice_matrix([BALL], STUDIES)
     item = answer(matrix, 1e-3, False).kinds[0]
-    assert closest_words(matrix, item).startswith("none; closest alpha joints: off by 0.1")
+    assert item.closest_words.startswith("none; closest alpha joints: off by 0.1")
     matrix = choice_matrix([LINE, replace(LINE, study="chain", scene="chain", error=0.5)], STUDIES)
     item = answer(matrix, 1e-3, False).kinds[0]
-    assert closest_words(matrix, item) == "none for all; alpha holds 1 of 2: arm 100×"
+    assert item.closest_words == "none for all; alpha holds 1 of 2: arm 100×"
     assert item.most_held == 1
 
 
@@ -71,8 +71,7 @@ def test_forces_are_told_where_they_change_the_choice() -> None:
         ([LINE], "not judged"),
     ):
         matrix = choice_matrix(lines, STUDIES)
-        motion, both = (answer(matrix, 1e-3, forces).kinds[0] for forces in (False, True))
-        assert forces_words(matrix, motion, both) == words
+        assert answer(matrix, 1e-3, False).kinds[0].forces_words == words
 
 
 def test_a_kind_is_held_with_one_setting_or_with_one_by_scene() -> None:
@@ -91,8 +90,7 @@ def test_a_kind_is_held_with_one_setting_or_with_one_by_scene() -> None:
     forces = [replace(FORCE, error=1e-9), replace(FORCE, study="chain", scene="chain", error=0.5)]
     forces.append(replace(forces[1], row=9, preset="tuned", setting="tuned", cost=tuned.cost, error=1e-9))
     matrix = choice_matrix([LINE, chain, tuned, *forces], STUDIES)
-    motion, both = (answer(matrix, 1e-3, forces).kinds[0] for forces in (False, True))
-    assert forces_words(matrix, motion, both) == "alpha joints, 50×"
+    assert answer(matrix, 1e-3, False).kinds[0].forces_words == "alpha joints, 50×"
 
 
 def test_what_fails_is_told_in_the_words_of_its_comparison() -> None:
