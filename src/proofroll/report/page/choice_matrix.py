@@ -297,4 +297,6 @@ def choice_matrix(
         columns += [replace(whole, href=single[0].href if len(single) == 1 else ""), *single]
     orders = [list(dict.fromkeys(key[:end] for key in rows)) for end in (1, 2, 3)]
     keys = sorted(rows, key=lambda key: [order_of.index(key[: end + 1]) for end, order_of in enumerate(orders)])
-    return ChoiceMatrix(columns, [rows[key] for key in keys], dict(studies), names, provides)
+    return ChoiceMatrix(
+        columns=columns, rows=[rows[key] for key in keys], studies=dict(studies), names=names, provides=provides
+    )
