@@ -25,6 +25,10 @@ _OF_SCALE, _OF_ERROR = 1e-9, 1e-3
 _COST, _SCATTERS = 1.5, 6.0
 # Digits for changed errors: the first that shows a difference is taken.
 _DIGITS = (2, 4, 8, 17)
+# Kinds of changes, the gravest first, with words for their number.
+_KINDS = {
+    "verdict": "verdicts", "value": "errors", "cost": "costs", "gone": "runs that are gone", "new": "new runs",
+}  # fmt: skip
 # Least number of costs that show how much slower the machine was.
 _ENOUGH = 5
 
@@ -35,7 +39,7 @@ class RunChange:
 
     Attributes:
         study, run, place: names of the study and the run, and parameters of the run in words.
-        kind: ``verdict``, ``value``, ``cost``, ``gone`` or ``new``; the first of these that applies.
+        kind: the first of ``verdict``, ``value``, ``cost``, ``gone`` and ``new`` that applies.
         says: the changes as clauses.
     """
 
@@ -79,14 +83,7 @@ class Against:
     def sentence(self) -> str:
         """Sentence with the number of changes of each kind."""
         kinds = [item.kind for item in self.changes]
-        words = {
-            "verdict": "verdicts",
-            "value": "errors",
-            "cost": "costs",
-            "gone": "runs that are gone",
-            "new": "new runs",
-        }
-        counts = ", ".join(f"{kinds.count(kind)} {text}" for kind, text in words.items() if kind in kinds)
+        counts = ", ".join(f"{kinds.count(kind)} {text}" for kind, text in _KINDS.items() if kind in kinds)
         costs = f"; costs are {number(self.drift)} of the old ones throughout; this factor is left out"
         if not self.costs:
             costs = "; costs are of another machine and not compared"
@@ -140,18 +137,11 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
         study, place, run, *_ = key
         if study not in shared:
             continue
-        if key not in new_runs or key not in old_runs:
-            changes.append(
-                RunChange(study=study, run=run, place=place, kind="gone" if key not in new_runs else "new", says=[])
-            )
-            continue
-        differences = list(_changes(old_runs[key], new_runs[key], (drift, factor) if costs else None))
+        differences = list(_changes(old_runs.get(key), new_runs.get(key), (drift, factor) if costs else None))
         if differences:
-            kinds = [kind for kind, _ in differences]
-            first_kind = next(kind for kind in ("verdict", "value", "cost") if kind in kinds)
-            changes.append(
-                RunChange(study=study, run=run, place=place, kind=first_kind, says=[text for _, text in differences])
-            )
+            kind = min((kind for kind, _ in differences), key=list(_KINDS).index)
+            says = [text for _, text in differences if text]
+            changes.append(RunChange(study=study, run=run, place=place, kind=kind, says=says))
     others = {
         name: (version, versions[name])
         for name, version in old.versions.items()
@@ -181,9 +171,12 @@ def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[
 
 
 def _changes(
-    old_lines: dict[str, TableLine], new_lines: dict[str, TableLine], noise: tuple[float, float] | None
+    old_lines: dict[str, TableLine] | None, new_lines: dict[str, TableLine] | None, noise: tuple[float, float] | None
 ) -> Iterator[tuple[str, str]]:
-    """(kind, clause) of each change of a run."""
+    """(kind, clause) of each change of a run; None: only the other report has it, which needs no clause."""
+    if old_lines is None or new_lines is None:
+        yield "new" if old_lines is None else "gone", ""
+        return
     old_line, new_line = _first(old_lines), _first(new_lines)
     if old_line.status != new_line.status:
         yield "verdict", f"{old_line.status} → {new_line.status}: {new_line.message}".removesuffix(": ")

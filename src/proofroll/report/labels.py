@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError
@@ -178,6 +178,11 @@ def name_of(point: SweptSetting) -> str:
     """Engine, formulation and setting of a point of a study."""
     words = engine_words(point.engine, point.settings.get("formulation")), setting_words(point.curve, point)
     return " ".join(filter(None, words))
+
+
+def curve_names(points: Iterable[SweptSetting]) -> dict[str, str]:
+    """Engine, formulation and setting of each curve of a study, for readers."""
+    return {point.curve: name_of(point) for point in points}
 
 
 def listed(parameters: Mapping[str, float]) -> str:

@@ -134,29 +134,20 @@ def ladder_content(study: Ladder) -> LadderContent:
 
 
 def _rung(study: Ladder, rung: Rung) -> RungFound:
-    model = rung.model
-    if model is None:
-        return RungFound(
-            level=rung.level.value,
-            variant=rung.variant,
-            engine=None,
-            formulation=None,
-            preset=None,
-            ran=Ran(settings=None, status="empty", message=rung.message, error=None, seconds_per_second=None),
-        )
-    case = study.answers[key_of(model)].case
+    model, case = rung.model, None
+    ran = Ran(settings=None, status="empty", message=rung.message, error=None, seconds_per_second=None)
+    if model is not None:
+        case, ran = study.answers[key_of(model)].case, _ran(study, model, {})
     resolution = case.engine.resolution if case else None
-    value = case.engine.settings.get(resolution) if case and resolution else None
-    preset, ran = model.options["preset"], _ran(study, model, {})
     return RungFound(
         level=rung.level.value,
         variant=rung.variant,
-        engine=model.engine,
-        formulation=model.formulation,
-        preset=preset,
+        engine=model.engine if model else None,
+        formulation=model.formulation if model else None,
+        preset=model.options["preset"] if model else None,
         ran=ran,
         resolution=resolution,
-        resolution_value=value,
+        resolution_value=case.engine.settings.get(resolution) if case and resolution else None,
     )
 
 

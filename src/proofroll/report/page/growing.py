@@ -40,20 +40,18 @@ class Report:
     parts: list[Part] = field(default_factory=list)
     pictures: dict[str, str] = field(default_factory=dict)
     earlier: EarlierReport | None = None
-    _entries: dict[int, PartEntry] = field(default_factory=dict)
-    _lines: dict[int, Sequence[TableLine]] = field(default_factory=dict)
+    _made: dict[int, tuple[Part, PartEntry, Sequence[TableLine]]] = field(default_factory=dict)
 
     @cached_property
     def content(self) -> ReportContent:
         """Content of the report, with the further studies that have an entry so far; made anew after each."""
-        keyed = [(part.key, self._entries[id(part)]) for part in self.parts if id(part) in self._entries]
-        entries = {key: [entry for entry_key, entry in keyed if entry_key == key] for key in self.compared.entries}
+        made = [self._made[id(part)] for part in self.parts if id(part) in self._made]
+        entries = {key: [entry for part, entry, _ in made if part.key == key] for key in self.compared.entries}
         environment = self.compared.environment
-        for _, entry in keyed:
+        for _, entry, _ in made:
             if isinstance(entry.study, dict):  # a stored study was made with the present versions
                 environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
-        further = [line for part in self.parts for line in self._lines.get(id(part), ())]
-        table = LongTable([*self.compared.table.lines, *further])
+        table = LongTable([*self.compared.table.lines, *(line for *_, lines in made for line in lines)])
         content = replace(self.compared, entries=entries, environment=environment, table=table).summarised
         if self.earlier is None:
             return content
@@ -104,10 +102,9 @@ class Report:
         write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
 
     def _put(self, part: Part, entry: PartEntry) -> None:
-        self._entries[id(part)] = entry
+        self._made[id(part)] = part, entry, () if entry.study is None else part.lines()
         self.__dict__.pop("content", None)
         if entry.study is not None:
-            self._lines[id(part)] = part.lines()
             alike = [id(rival) for rival in self.parts if rival.key == part.key]
             prefix = f"{part.key}{alike.index(id(part))}-"
             self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))

@@ -126,6 +126,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "tables": tables,
         "verdict_matrix": verdict_matrix,
         "names": labels.names,
+        "curve_names": labels.curve_names,
         "step": labels.step,
         "detail": labels.detail,
         "verdict_text": labels.verdict_text,

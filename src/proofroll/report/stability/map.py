@@ -45,11 +45,6 @@ def letters(study: StabilityStudy) -> dict[str, str]:
     return letter_of
 
 
-def curve_names(study: StabilityStudy) -> dict[str, str]:
-    """Engine, formulation and setting of each curve, for readers."""
-    return {point.curve: name_of(point) for point in study.points}
-
-
 def address(point: BoundaryPoint) -> str:
     """Part of the HTML id of a point that is the same in a map of more points."""
     return slug(f"{point.curve} {point.axis} {point.value:g}")

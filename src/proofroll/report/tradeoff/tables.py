@@ -10,7 +10,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.number_format import error, number
-from proofroll.report.labels import family_and_caveat, listed, name_of, omitted_lines, step, with_caveat
+from proofroll.report.labels import curve_names, family_and_caveat, listed, name_of, omitted_lines, step, with_caveat
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
@@ -77,11 +77,6 @@ def advised(advice: Sequence[Advice]) -> dict[str, tuple[str, list[Advice]]]:
         for quantity, items in groups.items()
     }
     return {key: (", then ".join(named[key]) or "nothing holds it", items) for key, items in groups.items()}
-
-
-def curve_names(study: TradeoffStudy) -> dict[str, str]:
-    """Engine, formulation and preset of each curve."""
-    return {point.curve: name_of(point) for point in study.points}
 
 
 def _ranges(study: TradeoffStudy) -> str:
@@ -214,7 +209,7 @@ def budget_table(study: TradeoffStudy, quantity: str) -> Table:
         *unbroken("dominated by"),
         title=title,
     )
-    names = curve_names(study)
+    names = curve_names(study.points)
     for item in study.budgets:
         if item.quantity != quantity:
             continue
