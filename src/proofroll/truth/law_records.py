@@ -214,7 +214,10 @@ class LawRecorder:
                     start, end, lambda times: stretch.at(times).T, stretch.recorded if stretch.compiled else None
                 )
         elif isinstance(stretch, StoppingSlip):
-            return  # where a slip fades away its force has a direction by round-off alone
+            # In the steps before its line, a slip has a direction by round-off alone
+            start = float(stretch.line[-1])
+            if stretch.end > start:
+                yield from self._parts(start, stretch.end, lambda times: stretch.at(times).T, None)
         elif isinstance(stretch, CompiledStretch) and stretch.by is not None:
             recorded = stretch.by.record_of(stretch.mode, stretch.start)
             for start, end, inside_step in stretch.by.steps_of(stretch):

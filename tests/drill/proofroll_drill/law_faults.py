@@ -100,6 +100,7 @@ SCENES: dict[str, tuple[Callable[[], Mechanism], float]] = {
     "grip": (lambda: _ball(0.1, _THROWN, restitution=0.7, friction=0.05), 0.4),
     "rod": (lambda: _model("falling_rod"), 0.6),
     "sled": (lambda: _model("sled"), 0.05),
+    "stops": (lambda: _model("sled"), 0.6),
     "stop": (lambda: _model("stop"), 0.6),
 }
 
