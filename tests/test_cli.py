@@ -278,7 +278,7 @@ def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (code, err) == (0, "")
     found = {engine["name"]: engine for engine in json.loads(out)}
     assert found["oracle"]["status"] == "installed"
-    assert found["oracle"]["provides"] == {"only": ["a curved surface", "rolling without slip"]}
+    assert found["oracle"]["provides"] == {"only": ["rolling without slip"]}
     assert found["absent"]["status"] == "missing"
     assert "no_such_module_anywhere" in found["absent"]["message"]
     assert found["misspelt"]["status"] == "broken"
@@ -407,7 +407,7 @@ def test_an_engine_of_a_report_without_a_row(proofroll: Proofroll, tmp_path: Pat
 def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Path, engine: str) -> None:
     """An engine that is missing or crashes ends a comparison without claims with exit 3, and has a row that says so."""
     code, out, err = proofroll(
-        "compare", "inclined_plane", "--budget", "60", "--engine", engine, "--out", str(tmp_path)
+        "compare", "sphere_in_cylinder", "--budget", "60", "--engine", engine, "--out", str(tmp_path)
     )
     assert code == 3, err
     assert f"{engine}" in out
@@ -416,7 +416,7 @@ def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Pa
 
 def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--until`` and ``--every`` are those of a scene's comparison; a comparison file has its own."""
-    command = ["compare", "inclined_plane", "--engine", "oracle", "--out", str(tmp_path), "--json"]
+    command = ["compare", "sphere_in_cylinder", "--engine", "oracle", "--out", str(tmp_path), "--json"]
     code, out, err = proofroll(*command, "--until", "0.2", "--every", "0.05")
     assert code == 0, err
     document = json.loads(out)
@@ -523,7 +523,7 @@ def test_onset_without_a_ball(proofroll: Proofroll) -> None:
     """A scene that has no ball on a surface is refused for that, and not for friction that it has not."""
     code, out, err = proofroll("onset", "pendulum")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "one ball that begins to roll on a plane or in a cylinder" in err
+    assert "one ball that begins to roll in an upright cylinder" in err
     assert "mu_static" not in err
 
 
