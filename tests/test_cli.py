@@ -208,8 +208,9 @@ def test_run_tells_events(proofroll: Proofroll) -> None:
     """Each event stands with its bracket; of a long sequence the first ones do, and how many more there are."""
     slips = ["run", "sphere_in_cylinder", "--engine", "truth", "--set", "mu_static=0.15"]
     said = [" ".join(proofroll(*slips, "--until", until)[1].split()) for until in ("0.5", "4")]
-    assert re.search(r"events: slip at 0\.1766679915\d* ± \de-\d+ s, stick at 0\.4120905738\d* ± \de-\d+ s \d", said[0])
-    assert re.search(r"stick at \S+ ± \de-\d+ s and 6 more", said[1])
+    place, bar = "of ball_on_wall at", r"± \de-\d+ s"
+    assert re.search(rf"events: slip {place} 0\.1766679915\d* {bar}, stick {place} 0\.4120905738\d* {bar} \d", said[0])
+    assert re.search(rf"stick {place} \S+ {bar} and 6 more", said[1])
 
 
 def test_run_writes_netcdf(proofroll: Proofroll, tmp_path: Path) -> None:
@@ -278,7 +279,7 @@ def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (code, err) == (0, "")
     found = {engine["name"]: engine for engine in json.loads(out)}
     assert found["oracle"]["status"] == "installed"
-    assert found["oracle"]["provides"] == {"only": ["a curved surface", "rolling without slip"]}
+    assert found["oracle"]["provides"] == {"only": ["rolling without slip"]}
     assert found["absent"]["status"] == "missing"
     assert "no_such_module_anywhere" in found["absent"]["message"]
     assert found["misspelt"]["status"] == "broken"
@@ -407,7 +408,7 @@ def test_an_engine_of_a_report_without_a_row(proofroll: Proofroll, tmp_path: Pat
 def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Path, engine: str) -> None:
     """An engine that is missing or crashes ends a comparison without claims with exit 3, and has a row that says so."""
     code, out, err = proofroll(
-        "compare", "inclined_plane", "--budget", "60", "--engine", engine, "--out", str(tmp_path)
+        "compare", "sphere_in_cylinder", "--budget", "60", "--engine", engine, "--out", str(tmp_path)
     )
     assert code == 3, err
     assert f"{engine}" in out
@@ -416,7 +417,7 @@ def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Pa
 
 def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--until`` and ``--every`` are those of a scene's comparison; a comparison file has its own."""
-    command = ["compare", "inclined_plane", "--engine", "oracle", "--out", str(tmp_path), "--json"]
+    command = ["compare", "sphere_in_cylinder", "--engine", "oracle", "--out", str(tmp_path), "--json"]
     code, out, err = proofroll(*command, "--until", "0.2", "--every", "0.05")
     assert code == 0, err
     document = json.loads(out)
@@ -448,9 +449,10 @@ def test_a_name_that_a_scene_and_a_comparison_share(proofroll: Proofroll, tmp_pa
 # The paper's case, and one that slips early, in an engine that locates its events.
 PAPER = ["--set", "rolling_resistance=5e-4", "--set", "mu_static=0.35"]
 EARLY = ["onset", "sphere_in_cylinder", "--set", "mu_static=0.12", "--until", "0.2"]
-LOCATING = "projection[formulation=rotating_frame]"
+LOCATING = "pinocchio[formulation=impulses,preset=tuned]"  # in steps of 1e-3 s
 
 
+@pytest.mark.drill
 def test_run_lists_events(proofroll: Proofroll) -> None:
     """With bounded friction ``run --json`` lists each slip and stick with its time and its bracket."""
     code, out, err = proofroll(
@@ -460,16 +462,16 @@ def test_run_lists_events(proofroll: Proofroll) -> None:
     events = json.loads(out)["events"]
     assert [set(event) for event in events] == [{"kind", "time", "time_low", "time_high", "name"}] * 2
     assert [event["kind"] for event in events] == ["slip", "stick"]
-    for event, expected in zip(events, (1.720183172, 2.00812799), strict=True):
-        assert event["time"] == pytest.approx(expected, abs=1e-8)
-        assert event["time_low"] <= event["time"] <= event["time_high"] < event["time_low"] + 1e-9
+    for event, expected in zip(events, (1.720183172, 2.00809167), strict=True):
+        assert event["time"] == pytest.approx(expected, abs=1e-3)
+        assert event["time_low"] <= event["time"] <= event["time_high"] < event["time_low"] + 1.1e-3
 
 
 @pytest.mark.parametrize(
     ("engine", "code", "verdict", "status"),
     [
         (LOCATING, 0, "agree", "done"),
-        ("broken[formulation=hidden_limit]", 1, "disagree", "done"),
+        ("mujoco[formulation=geoms,preset=default]", 1, "disagree", "done"),
         ("refuses", 3, "refused", "refused"),
         ("absent", 3, "failed", "missing"),
     ],
@@ -491,7 +493,7 @@ def test_onset(proofroll: Proofroll, tmp_path: Path, engine: str, code: int, ver
     assert (row["onset"] is not None) == (status == "done")
     if code == 0:
         assert set(row["onset"]) == {"kind", "time", "time_low", "time_high", "name"}
-        assert abs(row["difference"]) < 1e-9
+        assert abs(row["difference"]) < 1e-3
 
 
 @pytest.mark.parametrize(("soon", "reached"), [(None, "reached 0.17 s"), (0.05, "reached 0.2 s")])
@@ -523,7 +525,7 @@ def test_onset_without_a_ball(proofroll: Proofroll) -> None:
     """A scene that has no ball on a surface is refused for that, and not for friction that it has not."""
     code, out, err = proofroll("onset", "pendulum")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "one ball that begins to roll on a plane or in a cylinder" in err
+    assert "one ball that begins to roll in an upright cylinder" in err
     assert "mu_static" not in err
 
 

@@ -297,7 +297,7 @@ def test_onset_to_one_percent(proofroll: Proofroll, tmp_path: Path) -> None:
         "--out",
         str(tmp_path),
     ]
-    given += ["--engine", ENGINE, "--quantity", "first_slip"]
+    given += ["--engine", "pinocchio[formulation=impulses,preset=tuned]", "--quantity", "first_slip"]
     code, out, err = proofroll("recommend", *given, "--tolerance", "1 %", "--measure", "--json")
     assert (code, err) == (0, "")
     answer = json.loads(out)

@@ -67,7 +67,7 @@ def test_coordinates_of_a_surface_are_explained(kind: str) -> None:
     cos, sin = np.cos, np.sin
     places = {
         "cylinder": lambda: (wall.radius * cos(u), wall.radius * sin(u), v),
-        "plane": lambda: (u * cos(wall.tilt), -v, -u * sin(wall.tilt)),
+        "plane": lambda: (u * wall.normal[2], -v, -u * wall.normal[0]),
         "cone": lambda: (v * cos(wall.slope) * cos(u), v * cos(wall.slope) * sin(u), v * sin(wall.slope)),
         "torus": lambda: (
             (wall.ring_radius + wall.radius * sin(v)) * cos(u),

@@ -51,7 +51,7 @@ def interrupted(arguments: list[str], ready: Callable[[int], bool], times: int =
     return process.returncode, out, err
 
 
-@pytest.mark.parametrize("command", [["engines"], ["run", "inclined_plane", "--engine", "sleeper"]])
+@pytest.mark.parametrize("command", [["engines"], ["run", "sphere_in_cylinder", "--engine", "sleeper"]])
 def test_while_an_engine_is_asked(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

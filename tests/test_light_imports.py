@@ -34,7 +34,7 @@ from proofroll.running.run_case import run
 from proofroll.studies.cases import case_of
 
 facts = EngineFacts(**resolve("reduced", {}))
-case = case_of("inclined_plane", load_scene("inclined_plane"), {}, facts, 0.1, 0.01)
+case = case_of("sphere_in_cylinder", load_scene("sphere_in_cylinder"), {}, facts, 0.1, 0.01)
 assert run(dataclasses.asdict(case), "run.npz")["status"] == "done"
 """
 _DATASET = """
@@ -71,7 +71,7 @@ STEPS: dict[str, tuple[str, set[str]]] = {
         {"xarray", "pandas", "scipy.io"},
     ),
     "worker": (_WORKER, {"xarray", "pandas", "scipy.io"}),
-    "run": (_command("run inclined_plane --engine reduced --until 0.1"), {"xarray", "pandas", "scipy.io"}),
+    "run": (_command("run sphere_in_cylinder --engine reduced --until 0.1"), {"xarray", "pandas", "scipy.io"}),
     # Neither imported nor hidden from a program that wants it.
     "dataset": (_DATASET, {"dask", "distributed"}),
 }

@@ -24,17 +24,17 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = (ROOT / "docs" / "json.md").read_text(encoding="utf-8")
 CLAIM = """title = "Balls"
 question = "Does it agree?"
-scene = "inclined_plane"
+scene = "sphere_in_cylinder"
 until = 0.4
 every = 0.08
 [tolerances.close]
 because = "Euler's rule leaves more than this at this step, and the midpoint rule does not"
-down = "1e-6 m"
+z = "1e-3 m"
 [[rows]]
-engine = "aged[formulation=midpoint,dt=0.01]"
+engine = "aged[formulation=midpoint,dt=0.002]"
 tolerance = "close"
 [[rows]]
-engine = "aged[formulation=walls,dt=0.01]"
+engine = "aged[formulation=walls,dt=0.002]"
 tolerance = "close"
 """
 

@@ -14,13 +14,12 @@ from typing import Any, Literal
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Diverged
 from proofroll.core.heyoka_library import TIGHTEST, require_heyoka
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import projection, rolling
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Cylinder
 
 Model = Literal["reduced", "rotating_frame", "euler"]
 
@@ -61,7 +60,7 @@ class FirstSlip:
             Refused: heyoka is missing, or the scene is another.
         """
         mu = min(body.contact.mu_static, UNREACHABLE)
-        require_supported(body)
+        require_supported()
         self._scales = np.array(body.surface.length_scales)
         if model == "reduced":
             compiled, margin = _reduced(tolerance)
@@ -107,17 +106,12 @@ class FirstSlip:
         return self._surface.position(self.x[:2] / self._scales)
 
 
-def require_supported(body: RollingBall) -> None:
+def require_supported() -> None:
     """Refuses what the compiled equations cannot follow to the first slip.
 
-    Elsewhere than on a cylinder along whose axis gravity points, a ball may come to rest, where the direction of its
-    rolling resistance jumps: a series sees no jump.
-
     Raises:
-        Refused: heyoka is missing, or the scene is another.
+        Missing: heyoka is not installed.
     """
-    if not (rolling.supports(body) and isinstance(body.surface, Cylinder)) or np.any(rolling.local_gravity(body)[:2]):
-        raise Refused("compiled first slips need a cylinder along whose axis gravity points")
     require_heyoka("a compiled first slip")
 
 

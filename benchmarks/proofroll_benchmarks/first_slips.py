@@ -53,7 +53,7 @@ def first_slips(scene: Scene, until: float, v2: npt.ArrayLike, mu: npt.ArrayLike
         Refused: heyoka is missing, or the scene is another.
     """
     body = rolling_ball(scene)
-    require_supported(body)
+    require_supported()
     varied = np.broadcast_arrays(*(np.asarray(values, dtype=np.float64) for values in (v2, mu, f)))
     return _Lanes(body, *varied).run(until)
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.heyoka_library import require_heyoka
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.runner import Runner
@@ -24,7 +25,6 @@ from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.store import Store
 from proofroll.running.timing import Interval, Timing, machine, ratio, time_in_rounds
 from proofroll.truth.ball_on_surface.onset import first_slip as true_first_slip
-from proofroll.truth.ball_on_surface.rolling import unreduced
 from proofroll_benchmarks.compiled import Onsets, Timed, compiled, numeric
 from proofroll_benchmarks.first_slip import first_slip
 from proofroll_benchmarks.search import SAMPLES, Configuration, search
@@ -58,14 +58,14 @@ def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
     scene = load_scene(_SCENE, **_PARAMETERS, mu_static=_MU)
     free = load_scene(_SCENE, **_PARAMETERS)
     progress("the truth")
-    slip = true_first_slip(scene, _ONSETS_UNTIL)
+    slip = true_first_slip(rolling_ball(scene), _ONSETS_UNTIL)
     assert slip is not None  # the paper's case slips
     # Fixed steps reach whole hundredths of a second; what is left, 0.2 ms, is a ten-thousandth of the way.
     until = float(np.floor(slip * 100) / 100)
     grid = np.linspace(0.0, until, SAMPLES + 1)
     true_z = simulate(free, "truth", until=until, every=until / SAMPLES)["z"].to_numpy()
     times = np.append(grid[1:], slip)
-    true_p = unreduced(rolling_ball(free), np.append(0.0, times)).p_WB[1:]  # shares nothing with what is judged
+    true_p = truth(free, np.append(0.0, times))["p_WB"].to_numpy()[1:]  # shares nothing with what is judged
 
     progress("compiling")
     models = _models(scene, free, times, true_p)

@@ -128,12 +128,9 @@ LAST_SPECIAL = 2.25
 
 @pytest.mark.drill
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["projection[formulation=rotating_frame]", "mujoco[formulation=chart,preset=tuned]"])
+@pytest.mark.parametrize("engine", ["pinocchio[formulation=impulses,preset=tuned,dt=5e-4]"])
 def test_row_at_the_special_points(engine: str, store: Store) -> None:
-    """Claims hold with kinetic friction below static, and at a stair edge, where the time of slip is not judged.
-
-    By one engine with an adaptive step and one with a ladder; ``test_bounded_friction`` has the events of others.
-    """
+    """Claims hold with kinetic friction below static, and at a stair edge, where the time of slip is not judged."""
     comparison = loaded("stick_slip")
     (row,) = (row for row in comparison.rows if row.engine == engine)
     special = [point for point in comparison.points if "mu_kinetic" in point or isinstance(point["mu_static"], Edge)]
@@ -159,7 +156,6 @@ OMITTED = {
     ("reduced", "equations", "matched"): "shares its equations with the truth; what it reaches stands in accuracy",
     ("reduced", "equations", "tuned"): "the same equations, compiled",
     ("reduced", "closed_form", "matched"): "is the truth where it exists",
-    ("mujoco", "chart", "tuned"): "differs from matched only in slip, which the paper's comparison does not have",
     ("exudyn", "contact", "tuned"): "differs from matched by a stiffer spring and by twice the cost",
 }
 

@@ -142,10 +142,10 @@ def test_what_follows_a_wrong_event_is_no_decision(found: list[str], kept: list[
 @pytest.mark.drill
 def test_what_a_comparison_decides_is_recorded(tmp_path: Path) -> None:
     """A run with its verdict, its events and its limits, and the truth that it is held against."""
-    row = Row("mujoco[formulation=free]", "loose", ladder=[1.0, 0.5, 0.25])
-    claim = Comparison("claim", "A claim", "Does it hold?", "inclined_plane", 0.1, 0.02, rows=[row])
+    row = Row("mujoco[formulation=geoms]", "loose", ladder=[1.0, 0.5, 0.25])
+    claim = Comparison("claim", "A claim", "Does it hold?", "slide_to_roll", 0.1, 0.02, rows=[row])
     bands = {"loose": Band("as any", {"down": Tolerance(0.01, True, "m")})}
-    claim = replace(claim, bands=bands, vary={"mu_static": [0.1]}, timed=False)
+    claim = replace(claim, bands=bands, vary={"speed": [0.2]}, timed=False)
     runner = Runner(Store(tmp_path), jobs=1)
     outcome = compare(claim, runner)
     found = decided(outcome, runner.store)
@@ -160,8 +160,8 @@ def test_what_a_comparison_decides_is_recorded(tmp_path: Path) -> None:
     assert said == [*found["decisions"], "truth at point 0"]
     ((place, run),) = found["decisions"].items()
     assert (run["status"], run["verdict"]) == ("done", outcome.runs[0].verdict)
-    assert found["truths"]["point 0"]["decisions"]["events"] == {"ball": ["slip"]}
-    assert run["events"]["ball"][0] == "slip"
+    assert found["truths"]["point 0"]["decisions"]["events"] == {"ball": ["stick"]}
+    assert run["events"]["ball"][0] == "stick"
     assert found["limits"][place]["down"][1] > 0
     assert (tmp_path / found["truths"]["point 0"]["file"]).exists()
 

@@ -55,7 +55,7 @@ class SilentBall(Mutant):
     """Ball with one per cent of inertia too much, which the engine does not report."""
 
     fault = "inertia 1.01 times, and nothing is said of it"
-    scene = ("inclined_plane", {})
+    scene = ("sphere_in_cylinder", {})
 
     def misread(self, scene: Scene) -> Scene:
         """A little stiffer."""

@@ -141,7 +141,7 @@ def test_everybody_is_told_the_same_cause(
     """A conformance check, run and report, data and page, name the cause of a wrong model in the same words."""
     mutant = ball_models.ToldInertia
     with pytest.raises(AssertionError) as told:
-        run_check(mutant, f"certificate_holds[{mutant.formulation}-default-plane]")
+        run_check(mutant, f"certificate_holds[{mutant.formulation}-default-cylinder]")
     install_engines({"mutant": "proofroll_drill.mutants.ball_models:ToldInertia"})
     claim = tmp_path / "claim.toml"
     claim.write_text(CLAIM, encoding="utf-8")

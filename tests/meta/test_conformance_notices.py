@@ -95,7 +95,7 @@ def test_a_buffer_that_is_filled_anew_is_named(engine: type[Tiny]) -> None:
 @pytest.mark.parametrize("engine", [Views, OneBuffer, OneForAll])
 def test_a_buffer_that_is_filled_anew_spoils_no_run(engine: type[Tiny]) -> None:
     """A run of such an engine is that of one that returns copies, and its model is not called a wrong one."""
-    ran, right = (simulate("inclined_plane", kind, until=0.1) for kind in (engine, Tiny))
+    ran, right = (simulate("sphere_in_cylinder", kind, until=0.1) for kind in (engine, Tiny))
     for name in ("p_WB", "v_WB", "w_WB", "N"):
         assert ran[name].to_numpy().tolist() == right[name].to_numpy().tolist()
 
@@ -151,7 +151,7 @@ def test_the_reproducer_runs() -> None:
 
 def test_a_known_failure_is_skipped_with_its_reason() -> None:
     """A check that is known to fail is skipped, and the reason is shown."""
-    check = next(c for c in checks(Heavy, {"certificate_holds[*-plane]": "it is heavy"}) if c.known)
+    check = next(c for c in checks(Heavy, {"certificate_holds[*-cylinder]": "it is heavy"}) if c.known)
     with pytest.raises(SkipTest, match="known: it is heavy"):
         check()
 

@@ -42,12 +42,6 @@ def _resistance(scene: Scene) -> Scene:
     return scene_with(scene, contact=contact)
 
 
-def _slippery(scene: Scene) -> Scene:
-    contact = scene.elements[0].contact
-    less = {name: getattr(contact, name) * 0.9 for name in ("mu_static", "mu_kinetic")}
-    return scene_with(scene, contact=dataclasses.replace(contact, **less))
-
-
 def _same(scene: Scene) -> Scene:
     return scene
 
@@ -59,7 +53,6 @@ BUILT: Mapping[str, Callable[[Scene], Scene]] = {
     "radius": _ball(radius=1.001, inertia_ratio=1.001**-2),  # of the same inertia
     "mass": _ball(mass=1.001),
     "resistance": _resistance,
-    "limit": _slippery,  # it slips too early
     "friction": _same,  # the reported friction has the wrong sign
     "rate": _same,  # the reported velocity is 0.01 % more than the rate of the position
     "period": _same,  # the position has an added oscillation that is zero at every hundredth of a second

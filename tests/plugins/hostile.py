@@ -50,9 +50,7 @@ class Oracle:
     """Well-behaved engine that answers with the closed form."""
 
     name: ClassVar[str] = "oracle"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "only": frozenset({BallCapability.ROLLING, BallCapability.CURVED_SURFACE})
-    }
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"only": frozenset({BallCapability.ROLLING})}
     settings: ClassVar[type[HostileSettings]] = HostileSettings
     presets: ClassVar[Mapping[str, Mapping[str, HostileSettings]]] = {"only": {"matched": HostileSettings()}}
 

@@ -54,7 +54,7 @@ _SCENES: Mapping[str, tuple[Callable[[], Scene], float]] = {
     "gears": (lambda: load_scene("gear_pair"), 0.12),
 }
 UNTIL = {name: until for name, (_, until) in _SCENES.items()}
-BALLS, MECHANISMS = ("rolls", "slips"), ("tree", "loop", "driven", "servo")
+BALLS, MECHANISMS = ("rolls",), ("tree", "loop", "driven", "servo")
 ALL = (*BALLS, *MECHANISMS, "sled")
 
 

@@ -265,16 +265,14 @@ def _more(times: Callable[[float], list[tuple[float, float, float]]]) -> Callabl
 
 
 def _slips() -> Iterator[Lie]:
-    def lie(name: str, events: Any, sample: Any = None, said: tuple[str, ...] = _EVENTS) -> Lie:
-        return Lie(name, ("slips",), said, sample, events=events)
+    def lie(name: str, events: Any, said: tuple[str, ...] = _EVENTS) -> Lie:
+        return Lie(name, ("slips",), said, events=events)
 
-    slips = ("slips",)
-    yield Lie("always sticking", slips, _EVENTS, lambda _: {"sticking": True}, begins=0.0)
-    yield Lie("never sticking", slips, _EVENTS, lambda _: {"sticking": False}, begins=0.0)
-    yield Lie("slipping 30 ms early", slips, _EVENTS, lambda m: {"sticking": m.at(m.t + 0.03).sticking})
-    yield lie("always sticking, without events", lambda *_: [], lambda _: {"sticking": True})
     yield lie("no events", lambda *_: [])
-    yield lie("an event too many", lambda right, _: [*right, Event("stick", 0.35, 0.35, 0.35)])
+    once_more: dict[str, Any] = {"kind": "stick", "time": 0.35, "time_low": 0.35, "time_high": 0.35}
+    yield lie(
+        "an event too many", lambda right, _: [*right, *(dataclasses.replace(e, **once_more) for e in right[-1:])]
+    )
     yield lie("events of the wrong kind", _each(kind=lambda *_: "stick"))
     yield lie("events 30 ms late", _later(0.03))
     yield lie("events 5 ms late", _later(0.005))
@@ -397,7 +395,7 @@ def _further_impacts() -> Iterator[Lie]:
     unbounded: dict[str, Any] = {"time_low": lambda *_: np.nan, "time_high": lambda *_: np.inf}
     yield Lie(
         "v by differences of places over an interval",
-        (*MECHANISMS, "slips", "sled"),
+        (*MECHANISMS, "sled"),
         _V,
         lambda m: {"v_WB": (m.right.p_WB - m.at(m.t - EVERY).p_WB) / EVERY},
         ("late",),
@@ -458,7 +456,7 @@ def _parts_of_motion() -> Iterator[Lie]:
               lambda m: m.at(m.t - 5e-4), ("0.0005 s late",))  # fmt: skip
     yield Lie("the last sample frozen", rest, (*_PLACES, *_W), lambda m: m.at(min(m.t, m.until - EVERY)))
     yield Lie("samples in the middle 3 ms late", rest, (*_PLACES, *_W), at_middle(lambda m: m.at(m.t - 0.003)))
-    yield Lie("v turned by half a degree", ("rolls", "slips", "loop", "sled"), (*_V, "slip is"),
+    yield Lie("v turned by half a degree", ("rolls", "loop", "sled"), (*_V, "slip is"),
               lambda m: {"v_WB": turned.apply(m.right.v_WB)})  # fmt: skip
     yield Lie("v of the last body x 1.01", ("tree", "loop", "driven", "servo"), _V,
               lambda m: {"v_WB": of_last(m, "v_WB", 1.01)}, _FACTOR)  # fmt: skip

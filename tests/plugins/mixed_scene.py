@@ -1,7 +1,7 @@
 """A scene of a ball and a mechanism, as a file has it."""
 
 BALL_AND_PENDULUM = """
-title = "A ball on a plane, and a pendulum"
+title = "A ball in a cylinder, and a pendulum"
 source = "chosen"
 duration = 0.1
 
@@ -15,9 +15,9 @@ radius = 0.025
 mass = 0.5
 
 [[surfaces]]
-kind = "plane"
+kind = "cylinder"
 name = "wall"
-tilt = 0.35
+radius = 0.2
 
 [[contacts]]
 body = "ball"

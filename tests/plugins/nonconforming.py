@@ -148,8 +148,8 @@ class Silent(Breaking, breaks="builds_or_refuses"):
 
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:
-        """Refuses scenes on planes with an empty text."""
-        if BallCapability.CURVED_SURFACE not in scene.requires:
+        """Refuses scenes without resistance to rolling with an empty text."""
+        if BallCapability.ROLLING_RESISTANCE not in scene.requires:
             raise Refused("")
         return super().build(scene, settings)
 

@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.elements.ball_on_surface.surfaces.formula import Jet, sqrt, variables
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.scene.checks import Vector
 from proofroll.truth.bodies.constraint_rows import AXES, NONE, ConstraintRow, ConstraintRows
 from proofroll.truth.bodies.maximal_bodies import BodyInScalars
 from proofroll.truth.bodies.maximal_equations import MaximalEquations
@@ -34,13 +33,11 @@ class RollingContact:
         body: name of the ball's body.
         radius: radius a [m].
         path: surface on which the ball's centre moves.
-        start: initial place of the centre [m], which defines the side of a plane or cylinder.
     """
 
     body: str
     radius: float
-    path: Surface
-    start: Vector
+    path: Cylinder
 
     def normal(self, r: Sequence[Scalar], v: Sequence[Scalar]) -> tuple[Scalar, list[Scalar], list[Scalar]]:
         """Gap [m], normal e1 towards the wall and its rate [1/s], of a centre at r with velocity v; any scalar type."""
@@ -50,11 +47,7 @@ class RollingContact:
         return gap.value, [-1.0 * x for x in gap.first], [-1.0 * dot(row, v) for row in bent]
 
     def _distance(self, *r: Any) -> Any:
-        if isinstance(self.path, Plane):
-            normal = self.path.normal(np.array(self.start))
-            return float(self.path.gap(np.zeros(3))) - sum(x * float(n) for x, n in zip(r, normal, strict=True))
-        assert isinstance(self.path, Cylinder)
-        axis = [float(k) for k in self.path.generators[1].axis]
+        axis = [float(k) for k in self.path.axis]
         along = sum(x * k for x, k in zip(r, axis, strict=True))
         return self.path.radius - sqrt(sum((x - k * along) ** 2 for x, k in zip(r, axis, strict=True)))
 

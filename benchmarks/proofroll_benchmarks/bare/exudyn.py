@@ -30,7 +30,7 @@ Start = tuple[FloatArray, FloatArray]
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
-    """See :mod:`proofroll_benchmarks.bare`; with bounded friction ``generic`` watches for slip, and ends there."""
+    """See :mod:`proofroll_benchmarks.bare`."""
     restarted = "Newton's method is restarted at every sample, and ends within its tolerance"
     if is_mechanism(scene):
         return Bare(_mechanism(scene, settings), 1e-7, restarted)
@@ -105,8 +105,7 @@ def _mechanism(scene: Scene, settings: Any) -> Callable[[FloatArray], FloatArray
 def _generic(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
     """Coordinates q = (distance towards the wall, γ, z, and three coordinates whose rates are ω1, ω2, ω3)."""
     m, J, a, c = body.ball.mass, body.ball.inertia, body.ball.radius, body.surface.length_scales[0]
-    f, g, mu = body.contact.rolling_resistance, -float(body.gravity[2]), body.contact.mu_static
-    beta, mc = 1 / m + a * a / J, m * c
+    f, g, mc = body.contact.rolling_resistance, -float(body.gravity[2]), m * c
     frame = body.surface.frame(body.u0)
     _, system = new_system()
     node = system.AddNode(
@@ -146,25 +145,10 @@ def _generic(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
         [(wall, Output.Force), (rolling, Output.Force)],
         [Output.Coordinates, Output.Coordinates_t],
     )
-    stopped: list[str] = []
-
-    def watch(system: Any, t: float) -> bool:
-        _, turn, rise, w1, _, _ = system.systemData.GetODE2Coordinates_t().tolist()
-        N = mc * turn * turn
-        free2, free3 = 0.0, a * w1 * turn - g
-        if f:
-            scale = f * N / math.hypot(c * turn, rise) * a / J
-            free2, free3 = scale * c * turn, free3 + scale * rise
-        if math.hypot(free2, free3) > mu * N * beta:
-            stopped.append(f"the ball slips at {t:g} s, for which there is no bare loop")
-        return not stopped
-
-    if math.isfinite(mu):
-        system.SetPostStepUserFunction(watch)
     system.Assemble()
 
     def run(times: FloatArray) -> FloatArray:
-        _solve(system, settings, times, stopped=stopped)
+        _solve(system, settings, times)
         out, angle, height = system.systemData.GetODE2Coordinates()[:3].tolist()
         return np.array([(c + out) * math.cos(angle), (c + out) * math.sin(angle), height])
 
@@ -188,7 +172,7 @@ def _rigid(
         [Output.Position, Output.CoordinatesTotal, Output.Velocity, Output.AngularVelocity],
     )
     if isinstance(model, PenaltyContact):
-        system.SetPostStepUserFunction(_watch(model, body, stopped))
+        system.SetPostStepUserFunction(_watch(model, stopped))
     system.Assemble()
 
     def run(times: FloatArray) -> FloatArray:
@@ -248,23 +232,17 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
     return _rigid(model, body, settings, [(model.contact, Output.Force)])
 
 
-def _watch(model: PenaltyContact, body: RollingBall, stopped: list[str]) -> Callable[[Any, float], bool]:
-    """Callback after each step: true if the contact is lost, or changed between holding and slipping."""
+def _watch(model: PenaltyContact, stopped: list[str]) -> Callable[[Any, float], bool]:
+    """Callback after each step: false if the contact is lost, or slips."""
     data, coordinates = model.data, Output.Coordinates
-    zone, bounded = model.zone, math.isfinite(body.contact.mu_static)
-    events: list[tuple[float, bool]] = []
-    sticks = True
+    zone = model.zone
 
     def watch(system: Any, t: float) -> bool:
-        nonlocal sticks
         gap, speed, *_ = system.GetNodeOutput(data, coordinates).tolist()
         if gap > 0:
             stopped.append(f"the ball leaves the wall at {t:g} s")
-        if speed > 2 * zone if sticks else speed < zone:
-            sticks = not sticks
-            events.append((t, sticks))
-            if not bounded:
-                stopped.append(f"the ball slips at {t:g} s")
+        if speed > 2 * zone:
+            stopped.append(f"the ball slips at {t:g} s")
         return not stopped
 
     return watch

@@ -22,7 +22,6 @@ from proofroll.engines.mujoco import Mujoco
 from proofroll.engines.mujoco.reproducer import stepped
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
 
-_ON_CONE = 1 - 1e-9
 _FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
@@ -31,52 +30,14 @@ def prepare(scene: Scene, settings: Any) -> Bare:
     if is_mechanism(scene):
         return Bare(_mechanism(scene, settings), 1e-12, "the same steps; sums are in another order")
     body = in_vertical_cylinder(scene)
-    if settings.curvature or settings.cone_correction:
+    if settings.curvature:
         raise Refused("there is no bare loop with edits of the contact's reference acceleration")
-    if math.isfinite(body.contact.mu_static) and body.contact.mu_static != body.contact.mu_kinetic:
-        raise Refused("there is no bare loop that switches between static and kinetic friction")
     model, data = Mujoco.build(scene, settings).native
     loop = {"chart": _chart, "free": _free, "facets": _facets}[settings.formulation]
     run = loop(model, data, body, settings)
     if settings.formulation == "facets":
         return Bare(run, 1e-5, "the geometry is rounded otherwise, and each kick of an edge magnifies that")
     return Bare(run, 1e-9, "the geometry is rounded otherwise, which a stiff contact magnifies")
-
-
-def _step(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[], None]:
-    """One step; where friction is bounded, with a look at the forces of its start, whether the contact slips.
-
-    RK4's stages replace them, so there the parts of mj_step are called one by one; those that find what is not finite
-    are among them, or the warnings that ``_check`` reads would never be given.
-    """
-    if math.isinf(body.contact.mu_static):
-        return lambda: mujoco.mj_step(model, data)
-    wrench, mu, events, sticks = np.zeros(6), body.contact.mu_static, [], True
-    pyramidal = settings.cone == "pyramidal"
-
-    def look() -> None:
-        nonlocal sticks
-        if data.ncon:
-            mujoco.mj_contactForce(model, data, 0, wrench)
-            N, F1, F2 = wrench[:3].tolist()
-            friction = abs(F1) + abs(F2) if pyramidal else math.hypot(F1, F2)
-            if N > 0 and (friction < _ON_CONE * mu * N) != sticks:
-                sticks = not sticks
-                events.append((data.time, sticks))
-
-    def step() -> None:
-        mujoco.mj_step(model, data)
-        look()
-
-    def step_of_stages() -> None:
-        mujoco.mj_checkPos(model, data)
-        mujoco.mj_checkVel(model, data)
-        mujoco.mj_forward(model, data)
-        mujoco.mj_checkAcc(model, data)
-        look()
-        mujoco.mj_RungeKutta(model, data, 4)
-
-    return step_of_stages if settings.integrator == "RK4" else step
 
 
 def _counted(times: FloatArray, dt: float) -> list[int]:
@@ -136,9 +97,6 @@ def _chart(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[
         e1 = -float(touch_R[2]), -float(touch_R[5])
         resistance.apply(data.time, -float(reaction[depth]), e1, velocity.tolist())
 
-    step = _step(model, data, body, settings)
-    bounded = math.isfinite(body.contact.mu_static)
-
     def run(times: FloatArray) -> FloatArray:
         if f:
             resistance.start(data.userdata)
@@ -146,11 +104,7 @@ def _chart(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[
         mujoco.set_mjcb_passive(resist if f else None)
         try:
             for steps in _counted(times, settings.dt):
-                if bounded:
-                    for _ in range(steps):
-                        step()
-                else:
-                    mujoco.mj_step(model, data, nstep=steps)
+                mujoco.mj_step(model, data, nstep=steps)
                 _check(data)
         finally:
             mujoco.set_mjcb_contactfilter(None)
@@ -167,7 +121,6 @@ def _free(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[
     qpos, qvel, reaction = data.qpos, data.qvel, data.qfrc_constraint
     plane, quaternion, facing, last = data.mocap_pos[0], data.mocap_quat[0], np.zeros(3), data.geom_xmat[wall]
     resistance = _Resistance(f, data.xfrc_applied[ball, 3:])
-    step = _step(model, data, body, settings)
 
     def run(times: FloatArray) -> FloatArray:
         if f:
@@ -183,7 +136,7 @@ def _free(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[
                 if f:
                     N = float(reaction[:3].dot(last[2::3]))  # along the plane of the step before
                     resistance.apply(data.time, N, (ex, ey), qvel[:3].tolist())
-                step()
+                mujoco.mj_step(model, data)
             _check(data)
         return np.array(qpos[:3])
 

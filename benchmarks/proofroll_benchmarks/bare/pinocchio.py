@@ -22,7 +22,6 @@ from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.elements.mechanism.scene.joint_kinds import FACTS
 from proofroll.engines.pinocchio.ball.plane_contact import PlaneContact
-from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION
 from proofroll.engines.pinocchio.smooth.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
@@ -31,7 +30,7 @@ from proofroll_benchmarks.bare.steps import dop853
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
-    """See :mod:`proofroll_benchmarks.bare`; with bounded friction the rows watch for slip, and end there."""
+    """See :mod:`proofroll_benchmarks.bare`."""
     if is_mechanism(scene):
         return _mechanism(scene, settings)
     body = in_vertical_cylinder(scene)
@@ -45,7 +44,7 @@ def prepare(scene: Scene, settings: Any) -> Bare:
         raise Refused("there is no bare loop that follows the ball's orientation")
     rows = (_Composite if settings.formulation == "composite" else _FreeFlyer)(body)
     return Bare(
-        _rows_run(rows, body, settings),
+        _rows_run(rows, settings),
         1e-9,
         "the geometry is rounded otherwise, so the steps differ within their tolerance",
     )
@@ -145,10 +144,6 @@ class _Composite:
         pin.crba(self.model, self.data, q)
         return np.array(pin.impulseDynamics(self.model, self.data, v, self.rows))
 
-    def contact(self, v: FloatArray) -> tuple[float, float]:
-        """Needed friction and normal force of the last response [N]."""
-        return math.hypot(*self.data.lambda_c.tolist()), self.m * self.c * float(v[0]) ** 2
-
     def centre(self, q: FloatArray) -> FloatArray:
         """Centre of the ball [m]."""
         return np.array([self.c * math.cos(q[0]), self.c * math.sin(q[0]), q[1]])
@@ -172,7 +167,6 @@ class _FreeFlyer:
         self.v = np.concatenate([body.v0, body.w0])
         a, speed = self.a, float(np.linalg.norm(body.v0))
         self.sizes = np.array([a, a, a, *[speed] * 3, *[speed / a] * 3])
-        self.multipliers = np.zeros(3)
 
     def aim(self, q: FloatArray) -> tuple[float, float]:
         """The rows where the ball is, and e1; the joint has the velocities of the ball, with no Jacobian between."""
@@ -203,17 +197,16 @@ class _FreeFlyer:
         return D, drift, np.concatenate([self.rest[:3], moment])
 
     def respond(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Acceleration in the world's axes; the multipliers (-N, F2, F3) are kept."""
+        """Acceleration in the world's axes."""
         rows, drift, moment = self.rows(q, v)
         if not self.f:
             acceleration = np.array(pin.forwardDynamics(self.model, self.data, self.rest, rows, drift))
-            self.multipliers = self.data.lambda_c
         else:
             matrix = self.matrix
             matrix[:6, :6], matrix[6:, :6], matrix[:6, 6:] = self.data.M, rows, -rows.T
             matrix[:6, 6] += moment
             solution = np.linalg.solve(matrix, np.concatenate([-self.data.nle, -drift]))
-            acceleration, self.multipliers = solution[:6], solution[6:]
+            acceleration = solution[:6]
         # The joint accelerates in axes that turn with the ball.
         vx, vy, vz, wx, wy, wz = v.tolist()
         acceleration[0] += wy * vz - wz * vy
@@ -229,33 +222,23 @@ class _FreeFlyer:
         self.aim(q)
         return np.array(pin.impulseDynamics(self.model, self.data, v, self.directions))
 
-    def contact(self, v: FloatArray) -> tuple[float, float]:  # noqa: ARG002 -- the other mechanism's signature
-        """Needed friction and normal force of the last response [N]."""
-        minus_N, F2, F3 = self.multipliers.tolist()
-        return math.hypot(F2, F3), -minus_N
-
     def centre(self, q: FloatArray) -> FloatArray:
         """Centre of the ball [m]."""
         return np.array(q[:3])
 
 
-def _rows_run(
-    mechanism: _Composite | _FreeFlyer, body: RollingBall, settings: Any
-) -> Callable[[FloatArray], FloatArray]:
-    q, n, mu = mechanism.q, mechanism.moving, body.contact.mu_static
+def _rows_run(mechanism: _Composite | _FreeFlyer, settings: Any) -> Callable[[FloatArray], FloatArray]:
+    q, n = mechanism.q, mechanism.moving
 
     def rates(_: float, y: FloatArray) -> FloatArray:
         q[:n], v = y[:n], y[n:]
         return np.concatenate([v[:n], mechanism.respond(q, v)])
 
-    def accepted(solver: DOP853, t: float) -> None:
+    def accepted(solver: DOP853, _: float) -> None:
         q[:n] = solver.y[:n]
         v = mechanism.project(q, solver.y[n:])
         solver.y = np.concatenate([q[:n], v])
         solver.f = rates(solver.t, solver.y)
-        friction, press = mechanism.contact(v)
-        if press < 0 or friction > mu * press:
-            raise Diverged(f"the ball slips or leaves the wall at {t:g} s, for which there is no bare loop")
 
     def run(times: FloatArray) -> FloatArray:
         start = np.concatenate([q[:n], mechanism.v])
@@ -271,9 +254,7 @@ def _rows_run(
 def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:  # noqa: PLR0915 -- one loop, as a user writes it down
     """Velocity-level steps, each with the plane tangent to the cylinder at the ball."""
     a, c, dt, f = body.ball.radius, body.surface.length_scales[0], settings.dt, body.contact.rolling_resistance
-    leapfrog, bounded = settings.integrator == "leapfrog", math.isfinite(body.contact.mu_static)
-    mu_s = body.contact.mu_static if bounded else LARGEST_FRICTION["pgs"]
-    mu_k = body.contact.mu_kinetic if bounded else LARGEST_FRICTION["pgs"]
+    leapfrog = settings.integrator == "leapfrog"
     known = PlaneContact(body, "pgs", settings.solver_tolerance)
     model, data, ball, inverse, point, point_data = (
         known.model, known.data, known.ball, known.inverse, known.point, known.point_data
@@ -282,20 +263,21 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
     axes[2, 1] = -1.0
     arm, foot = np.zeros(3), np.zeros(3)
     on_wall, on_ball = point.joint1_placement, point.joint2_placement  # what is written there is in the contact
-    events: list[tuple[float, bool]] = []
 
-    def solve(delassus: Any, free: FloatArray, mu: float) -> tuple[FloatArray, bool]:
-        """Impulse [N s], and whether it is inside the cone."""
-        impulse = known.impulse(delassus, free, mu)
+    def solve(delassus: Any, free: FloatArray) -> FloatArray:
+        """Impulse [N s]."""
+        impulse = known.impulse(delassus, free)
         if impulse is None:
             raise Diverged("Pinocchio's solver did not converge")
         F1, F2, N = impulse.tolist()
         if N <= 0:
             raise Diverged("the ball leaves the wall, for which there is no bare loop")
-        return impulse, math.hypot(F1, F2) < mu * N * (1 - 1e-9)
+        if math.hypot(F1, F2) >= known.friction * N * (1 - 1e-9):
+            raise Diverged("more friction is needed than the cone has")
+        return impulse
 
     def run(times: FloatArray) -> FloatArray:
-        q, v, span, sticks, normal_force = known.q0, known.v0, 0.5 * dt if leapfrog else dt, True, 0.0
+        q, v, span, normal_force = known.q0, known.v0, 0.5 * dt if leapfrog else dt, 0.0
         count = round(float(times[-1]) / dt)
         for number in range(count):
             pin.computeJointJacobians(model, data, q)
@@ -328,9 +310,7 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
                     moment = np.array([scale * ey * uz, -scale * ex * uz, scale * (ex * uy - ey * ux)])
                     torque[3:] = turned.T.dot(moment)
                 free = v + span * pin.aba(model, data, q, v, torque)
-                impulse, holds = solve(delassus, jacobian.dot(free) + shift, mu_s if sticks else mu_k)
-                if not holds and sticks and mu_k != mu_s:
-                    impulse, holds = solve(delassus, jacobian.dot(free) + shift, mu_k)
+                impulse = solve(delassus, jacobian.dot(free) + shift)
                 after = free + to_joints.dot(impulse)
                 normal = float(impulse[2]) / span
                 if not f or abs(normal - normal_force) <= 1e-13 * abs(normal):
@@ -338,11 +318,6 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
                 normal_force = normal
                 along = tuple((0.5 * (v + after)[:3]).tolist()) if leapfrog and number else (vx, vy, vz)
             normal_force = normal
-            if holds != sticks:
-                sticks = holds
-                events.append((number * dt, sticks))
-                if not bounded:
-                    raise Diverged("more friction is needed than the cone has")
             v = after
             q = pin.integrate(model, q, dt * v)
             span = dt

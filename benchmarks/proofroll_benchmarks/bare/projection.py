@@ -1,12 +1,11 @@
 """The projection method without the adapter: the engine's own equations in a plain loop.
 
 The method is proofroll's; a loop with equations of its own would compare two implementations. The ratio is what the
-adapter adds to the equations: the choice of steps, the checks after each of them, and the search for events.
+adapter adds to the equations: the choice of steps, and the checks after each of them.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.sampling import mechanism_of
@@ -27,7 +26,7 @@ from proofroll_benchmarks.bare.steps import dop853, rk4
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
-    """See :mod:`proofroll_benchmarks.bare`; with bounded friction it watches for slip, and ends there."""
+    """See :mod:`proofroll_benchmarks.bare`."""
     if is_mechanism(scene):
         return _bodies(scene, settings)
     return Bare(_ball(in_vertical_cylinder(scene), settings), 1e-9, "angles are not brought back within a turn")
@@ -36,16 +35,10 @@ def prepare(scene: Scene, settings: Any) -> Bare:
 def _ball(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
     orientation: Orientation = EulerAngles() if settings.formulation == "euler" else RotatingFrame()
     ball = ProjectedBall(body, Uniform(body.surface), orientation)
-    mu, (start, scales) = body.contact.mu_static, start_and_scales(body, orientation)
+    start, scales = start_and_scales(body, orientation)
 
     def after(x: FloatArray) -> FloatArray:
-        if settings.eliminates:
-            x = ball.eliminated(x)
-        if mu < math.inf:
-            response = ball.response_at(x)
-            if math.hypot(response.F2, response.F3) > mu * response.N:
-                raise Diverged("the ball slips, for which there is no bare loop")
-        return x
+        return ball.eliminated(x) if settings.eliminates else x
 
     def accepted(solver: DOP853, _: float) -> None:
         solver.y = after(solver.y)

@@ -25,7 +25,7 @@ _EXAMPLES = {
     "ball": (
         "semi_implicit",
         "SemiImplicit",
-        "inclined_plane",
+        "sphere_in_cylinder",
         "semi-implicit Euler on the equations of a rolling ball",
     ),
     "mechanism": (

@@ -15,8 +15,8 @@ from proofroll.core.scene import Scene
 class LocatesEvents(Protocol):
     """Ability of an engine that locates stick-slip events more closely than its samples."""
 
-    def events(self) -> Sequence[Event]:
-        """The events so far, in order, each with its bracket (one step wide for a fixed step)."""
+    def events(self) -> Sequence[Event] | None:
+        """The events so far, in order, each with its bracket (one step wide for a fixed step); None: not located."""
 
 
 @runtime_checkable

@@ -203,6 +203,8 @@ def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:
     if not isinstance(part, LocatesEvents):
         return None
     located = part.events()
+    if located is None:
+        return None
     if not (isinstance(located, Sequence) and all(isinstance(event, Event) for event in located)):
         raise Diverged("the engine's events() gave something else than a sequence of Event")
     return list(located)

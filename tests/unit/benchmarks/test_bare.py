@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
 import pytest
 
 from proofroll.core.engine_abilities import require_provided
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.files.scene_file import load_scene
 from proofroll_benchmarks.adapters import MECHANISMS, VARIANTS
 from proofroll_benchmarks.bare import load_bare_loop
@@ -24,15 +26,6 @@ FORMULATIONS = [
     }.items()
     for formulation in formulations
 ]
-# Rolls without slip, so nothing about friction is to be asked; slips after 0.18 s.
-NO_SLIP = {("exudyn", "carrier"), ("exudyn", "rolling_disc"), ("mujoco", "facets")}
-LOCATES_SLIP = {
-    ("projection", "euler"),
-    ("projection", "rotating_frame"),
-    ("exudyn", "generic"),
-    ("pinocchio", "composite"),
-    ("pinocchio", "free_flyer"),
-}
 TIMES = np.arange(7) * 0.02
 
 
@@ -52,28 +45,12 @@ def centres(
     return adapter.sample().p_WB, bare.run(times), bare.tolerance
 
 
-@pytest.mark.parametrize("variant", [name for name in VARIANTS if "slips" not in name])
+@pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize(("engine", "formulation"), FORMULATIONS)
 def test_the_bare_loop_ends_where_the_adapter_does(engine: str, formulation: str, variant: str) -> None:
     """Each engine's bare loop gives the adapter's centre to its tolerance, wherever there is the variant."""
-    if "bounded" in variant and (engine, formulation) in NO_SLIP:
-        with pytest.raises(Refused):
-            centres(engine, formulation, VARIANTS[variant])
-        return
     adapter, bare, tolerance = centres(engine, formulation, VARIANTS[variant])
     assert tolerance <= 1e-5
-    assert np.linalg.norm(adapter - bare) <= tolerance
-
-
-@pytest.mark.parametrize(("engine", "formulation"), [item for item in FORMULATIONS if item not in NO_SLIP])
-def test_slip(engine: str, formulation: str) -> None:
-    """Where the engine's own contact slips, so does the bare loop; where slip is located, it says that it cannot."""
-    times = np.arange(13) * 0.02
-    if (engine, formulation) in LOCATES_SLIP:
-        with pytest.raises(Diverged, match="slips"):
-            centres(engine, formulation, VARIANTS["bounded, slips"], times)
-        return
-    adapter, bare, tolerance = centres(engine, formulation, VARIANTS["bounded, slips"], times)
     assert np.linalg.norm(adapter - bare) <= tolerance
 
 
@@ -84,12 +61,14 @@ def test_another_model_is_noticed(engine: str, formulation: str) -> None:
     assert np.linalg.norm(adapter - bare) > tolerance
 
 
-@pytest.mark.parametrize("engine", ["projection", "exudyn", "pinocchio", "mujoco"])
-def test_another_scene_is_refused(engine: str) -> None:
-    """Bare loops are written for the vertical cylinder, and say so of a plane."""
-    kind = load_engine(engine)
+@pytest.mark.parametrize(("engine", "formulation"), FORMULATIONS)
+def test_another_start_is_refused(engine: str, formulation: str) -> None:
+    """Bare loops are written for a start at the cylinder's zero of angle and height, and say so of another one."""
+    scene = load_scene("sphere_in_cylinder")
+    start = dataclasses.replace(scene.elements[0].start, coordinates=(0.3, 0.1))
+    settings = resolve_settings(load_engine(engine), {"formulation": formulation})
     with pytest.raises(Refused, match="cylinder"):
-        load_bare_loop(engine)(load_scene("inclined_plane"), resolve_settings(kind, {}))
+        load_bare_loop(engine)(scene_with(scene, start=start), settings)
 
 
 @pytest.mark.parametrize("scene", MECHANISMS)

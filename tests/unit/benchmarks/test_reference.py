@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ball_scenes import rolled
 from rich.console import Console
 
 from proofroll.core import heyoka_library as library
@@ -20,7 +21,6 @@ from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.running.timing import Timing
-from proofroll.truth.ball_on_surface.rolling import unreduced
 from proofroll_benchmarks import reference as bench
 from proofroll_benchmarks import search as searching
 from proofroll_benchmarks.compiled import Onsets, compiled, numeric
@@ -31,7 +31,7 @@ needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not
 SLIPPING = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0.35)
 FREE = load_scene("sphere_in_cylinder", rolling_resistance=5e-4)
 TIMES = np.array([0.2, 0.4])
-TRUE_P = unreduced(rolling_ball(FREE), np.append(0.0, TIMES)).p_WB[1:]
+TRUE_P = rolled(rolling_ball(FREE), np.append(0.0, TIMES)).p_WB[1:]
 
 
 @needs_heyoka

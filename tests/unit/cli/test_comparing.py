@@ -146,7 +146,7 @@ def test_rows_that_exist_are_shown_where_a_comparison_is_interrupted(
     asked = ("--engine", "reduced", "--until", "0.1", "--out", str(tmp_path), "--jobs", "1")
     code, out, err = command_line("compare", "sphere_in_cylinder", *asked)
     assert code == 130, err
-    assert "gamma: error" in out
+    assert "z: error" in out
     assert "it has not been run yet" in " ".join(out.split())
 
 

@@ -34,7 +34,7 @@ def test_a_scene(proofroll: Proofroll) -> None:
     assert '"status": "done"' in out
 
 
-@pytest.mark.parametrize("scene", ["inclined_plane", "./rod"])
+@pytest.mark.parametrize("scene", ["sphere_in_cylinder", "./rod"])
 def test_a_comparison(
     command_line: Proofroll, install_engines: Callable[[Mapping[str, str]], None], scene: str
 ) -> None:
@@ -54,7 +54,7 @@ def test_a_comparison(
     names = {row.engine.partition("[")[0] for row in comparison.rows}
     assert {"projection", "mujoco", "exudyn", "pinocchio"} <= names
     assert "absent" not in names
-    assert ("reduced" in names) == (scene == "inclined_plane")  # it has no equations of a rod
+    assert ("reduced" in names) == (scene == "sphere_in_cylinder")  # it has no equations of a rod
 
 
 @pytest.mark.drill

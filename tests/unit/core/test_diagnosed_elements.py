@@ -21,8 +21,8 @@ TIMES = time_grid(0.2, 5e-3)
 @pytest.mark.parametrize("wrong", [0, None], ids=["ball", "neither"])
 def test_an_element_that_is_right_is_not_accused(wrong: int | None) -> None:
     """What an element tells within all tolerances has no cause, whatever would close it; only a wrong one is asked."""
-    elements = (load_scene("inclined_plane").elements[0], load_scene("pendulum").elements[0])
-    scene = replace(load_scene("inclined_plane"), elements=elements)
+    elements = (load_scene("sphere_in_cylinder").elements[0], load_scene("pendulum").elements[0])
+    scene = replace(load_scene("sphere_in_cylinder"), elements=elements)
     run = record(build(scene, "projection"), scene, TIMES).dataset
     for name in (name for name in run.data_vars if str(name).startswith("w_WB")):
         run[name] = -run[name]

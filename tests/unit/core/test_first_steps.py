@@ -79,16 +79,12 @@ def test_an_honest_engine_that_speaks_is_believed(scene: Scene) -> None:
 
 
 def test_nothing_is_derived_where_nothing_can_be() -> None:
-    """An engine that fails, a ball at rest or soon at rest, and steps too coarse to tell give no line, and no error."""
+    """An engine that fails and steps too coarse to tell give no line, and no error."""
 
     class Fails(Tiny):
         def advance(self, t: float) -> None:
             raise Diverged(f"it fell before {t:g} s")
 
     assert derivable(Fails, SLOW, TinySettings()) == []
-    rest = load_scene("inclined_plane", speed=0.0, cross_speed=0.0, rolling_resistance=5e-4)
-    assert first_steps(Tiny, rest, TinySettings()) == []
-    stops = load_scene("inclined_plane", radius=1.0, speed=3e-3, cross_speed=0.0, rolling_resistance=1.0)  # at 1 ms
-    assert first_steps(Tiny, stops, TinySettings()) == []
     assert derivable(Tiny, load_scene("sphere_in_cylinder", speed=6.0), TinySettings(dt=0.05)) == []
     assert len(derivable(Tiny, SLOW, TinySettings())) == 2

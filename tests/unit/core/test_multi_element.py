@@ -18,8 +18,11 @@ from proofroll.running.simulation import simulate
 
 @pytest.fixture
 def balls() -> Scene:
-    """The paper's ball, and one that rolls down a plane."""
-    scene, other = load_scene("sphere_in_cylinder"), load_scene("inclined_plane")
+    """The paper's ball, and a slower one that is resisted."""
+    scene, other = (
+        load_scene("sphere_in_cylinder"),
+        load_scene("sphere_in_cylinder", speed=2.0, rolling_resistance=5e-4),
+    )
     (one,), (two,) = scene.elements, other.elements
     second = dataclasses.replace(two, ball=dataclasses.replace(two.ball, name="second"))
     return dataclasses.replace(scene, elements=(one, second))

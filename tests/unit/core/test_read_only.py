@@ -53,7 +53,7 @@ def test_arrays_of_scenes_are_read_only(name: str) -> None:
 
 def test_what_a_ball_was_made_of_stays_its_owners() -> None:
     """Whoever gives an array to a ball may write to it later, and the ball stays as it is."""
-    body, mine = rolling_ball(load_scene("inclined_plane")), np.array([1.0, 2.0, 3.0])
+    body, mine = rolling_ball(load_scene("sphere_in_cylinder")), np.array([1.0, 2.0, 3.0])
     other = dataclasses.replace(body, v0=mine)
     mine *= 2
     assert other.v0.tolist() == [1.0, 2.0, 3.0]
@@ -88,7 +88,7 @@ class Bending(Tiny):
 
 def test_an_engine_cannot_bend_the_scene() -> None:
     """An engine that writes to its scene changes neither the caller's nor what it is held against."""
-    scene = load_scene("inclined_plane")
+    scene = load_scene("sphere_in_cylinder")
     before = rolling_ball(scene).gravity.copy()
     with pytest.raises(Refused, match="gravity"):
         simulate(scene, Bending, until=0.1)

@@ -70,11 +70,9 @@ def test_gravity_direction_has_any_length() -> None:
 @pytest.mark.parametrize(
     ("scene_name", "parameters", "needs"),
     [
-        ("inclined_plane", {}, {BallCapability.ROLLING}),
-        ("sphere_in_cylinder", {}, {BallCapability.ROLLING, BallCapability.CURVED_SURFACE}),
-        ("inclined_plane", {"rolling_resistance": 1e-9}, {BallCapability.ROLLING, BallCapability.ROLLING_RESISTANCE}),
-        ("inclined_plane", {"mu_static": 5.0}, {BallCapability.ROLLING, BallCapability.BOUNDED_FRICTION}),
-        ("inclined_plane", {"mu_static": math.inf}, {BallCapability.ROLLING}),
+        ("sphere_in_cylinder", {}, {BallCapability.ROLLING}),
+        ("sphere_in_cylinder", {"mu_static": math.inf}, {BallCapability.ROLLING}),
+        ("sphere_in_cylinder", {"rolling_resistance": 1e-9}, {*BallCapability} - {BallCapability.ORIENTATION}),
     ],
 )
 def test_requires_no_more_than_the_scene_needs(
@@ -116,7 +114,7 @@ def test_two_balls_are_refused_by_name() -> None:
     scene = load_scene("sphere_in_cylinder")
     (one,) = scene.elements
     other = dataclasses.replace(one, ball=dataclasses.replace(one.ball, name="other"))
-    with pytest.raises(Refused, match=rf"one ball on one surface.*{one.name}, other"):
+    with pytest.raises(Refused, match=rf"one ball in an upright cylinder.*{one.name}, other"):
         rolling_ball(dataclasses.replace(scene, elements=(one, other)))
 
 
@@ -196,7 +194,7 @@ def test_code_of_another_package_is_in_the_digest(tmp_path: Path, monkeypatch: p
 def test_what_lies_beside_a_scene_and_is_no_model_is_no_matter(tmp_path: Path) -> None:
     """What lies beside a scene changes no digest and goes to no cluster; a file that the scene names does both."""
     folder = tmp_path / "own"
-    shutil.copytree(data_folder("models") / "inclined_plane", folder)
+    shutil.copytree(data_folder("models") / "sphere_in_cylinder", folder)
     before = load_scene(str(folder)).digest
     (folder / "run.nc").write_bytes(b"x" * 1000)
     (folder / "other.xml").write_text("<mujoco/>")
@@ -205,6 +203,6 @@ def test_what_lies_beside_a_scene_and_is_no_model_is_no_matter(tmp_path: Path) -
     assert scene.digest == before
     engine = EngineFacts("projection", "1", "code", {})
     sent = _files(case_of(str(folder), scene, (), engine, 1.0, 0.1))
-    assert sorted(sent) == ["mujoco_chart.xml", "mujoco_free.xml", "scene.toml"]
+    assert sorted(sent) == ["mujoco_chart.xml", "mujoco_facets.xml", "mujoco_free.xml", "scene.toml"]
     (folder / "mujoco_free.xml").write_text("<mujoco/>")
     assert load_scene(str(folder)).digest != before

@@ -100,11 +100,6 @@ def test_static_friction_holds_what_kinetic_would_not() -> None:
         ("exudyn[formulation=spheres]", {"static_friction": 0.9}, "this formulation gives a contact one coefficient"),
         ("mujoco[formulation=geoms]", {"tangential_restitution": 0.5}, "sets restitution along the normal alone"),
         ("exudyn[formulation=spheres]", {"tangential_restitution": 0.5}, "this formulation has no rebounds"),
-        (
-            "mujoco[formulation=geoms]",
-            {"rolling_resistance": 1e-3},
-            "condim 6. it shares one cone with sliding",
-        ),
         ("mujoco[formulation=geoms]", {"spinning_friction": 1e-3}, "friction = inf is the same in both"),
     ],
 )

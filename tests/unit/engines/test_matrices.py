@@ -67,5 +67,5 @@ def test_a_command_prints_them() -> None:
     assert max(found["differences"].values()) < 1e-14
     said = CliRunner().invoke(app, ["run", "double_pendulum", "--engine", "truth", "--matrices"]).output
     assert "velocity" in said
-    refused = CliRunner().invoke(app, ["run", "inclined_plane", "--engine", "truth", "--matrices"])
+    refused = CliRunner().invoke(app, ["run", "sphere_in_cylinder", "--engine", "truth", "--matrices"])
     assert refused.exit_code != 0

@@ -350,7 +350,8 @@ def test_the_armature_of_damping_needs_euler_and_joints():
     ):
         with pytest.raises(InputError, match=said):
             MUJOCO.build(
-                damped_slider(1.0, 0.0) if settings.formulation == "geoms" else load_scene("inclined_plane"), settings
+                damped_slider(1.0, 0.0) if settings.formulation == "geoms" else load_scene("sphere_in_cylinder"),
+                settings,
             )
 
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from functools import cache
 
 import numpy as np
 import pytest
 import xarray as xr
-from slip_cases import run
 
 from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import events_of
+from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.files.scene_file import load_scene
@@ -25,9 +25,10 @@ SOLVERS = ("pgs", "admm")
 
 
 def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
-    """The cylinder with its axis leaning by ``tilt`` [rad]."""
+    """The cylinder with its axis, and gravity along it, leaning by ``tilt`` [rad]."""
     scene = load_scene("sphere_in_cylinder", **parameters)
-    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt))
+    gravity = Gravity(9.81, (-math.sin(tilt), 0.0, -math.cos(tilt)))
+    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt), gravity=gravity)
 
 
 @cache
@@ -69,23 +70,17 @@ def test_plane_at_the_start_of_the_step() -> None:
 @pytest.mark.parametrize("preset", ["default", "matched"])
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize(
-    ("scene", "parameters"),
-    [
-        ("sphere_in_cylinder", {}),
-        ("sphere_in_cylinder", {"speed": -4, "axial_speed": 0.3, "radial_spin": 5, "rolling_resistance": RESISTANCE}),
-        ("inclined_plane", {"tilt": 0.35, "cross_speed": 0.7, "rolling_resistance": RESISTANCE}),
-        ("sphere_in_cylinder", {"mu_static": 0.01, "rolling_resistance": RESISTANCE}),
-    ],
+    "parameters", [{}, {"speed": -4, "axial_speed": 0.3, "radial_spin": 5, "rolling_resistance": RESISTANCE}]
 )
-def test_certificate(scene: str, parameters: dict[str, float], solver: str, preset: str) -> None:
-    """Each solver builds what the scene says, on both surfaces, sticking and slipping."""
-    built = load_scene(scene, **parameters)
+def test_certificate(parameters: dict[str, float], solver: str, preset: str) -> None:
+    """Each solver builds what the scene says."""
+    built = load_scene("sphere_in_cylinder", **parameters)
     engine = build(built, f"pinocchio[formulation=contact,preset={preset},solver={solver}]")
     lines = certify(engine, built)
     assert [line.quantity for line in lines if not line.holds] == []
     assert len(lines) == 18  # nothing is left out
     softened = [line.quantity for line in lines if line.because]
-    numbers = [] if "mu_static" in parameters else ["1 / static friction", "1 / kinetic friction"]
+    numbers = ["1 / static friction", "1 / kinetic friction"]
     assert softened == [*numbers, "acceleration", "angular acceleration", "N", "F2", "F3"]
     if preset == "matched":  # what it grants itself: a force that is wrong by a hundred-millionth is found
         assert all(line.tolerance < 2e-9 for line in lines if line.quantity not in numbers)
@@ -96,17 +91,17 @@ def test_certificate(scene: str, parameters: dict[str, float], solver: str, pres
 @pytest.mark.parametrize("preset", ["default", "matched"])
 @pytest.mark.parametrize("tilt", [0.3, -0.8])
 def test_certificate_on_a_leaning_cylinder(preset: str, solver: str, dt: float, tilt: float) -> None:
-    """The tolerances are wide enough where the wall presses by its bend and by gravity together, at any step."""
-    scene = leaning_cylinder(tilt, mu_static=0.3, mu_kinetic=0.1, rolling_resistance=RESISTANCE)
+    """The tolerances are wide enough at any step, wherever the axis points."""
+    scene = leaning_cylinder(tilt, rolling_resistance=RESISTANCE)
     engine = build(scene, f"pinocchio[formulation=contact,preset={preset},solver={solver},dt={dt}]")
     assert [line.quantity for line in certify(engine, scene) if not line.holds] == []
 
 
-def test_a_plane_needs_no_bend() -> None:
-    """Only the missing bend is forgiven: on a plane the obvious scheme must give the forces to round-off."""
-    for scene, forgiven in ((load_scene("sphere_in_cylinder"), 1.0), (load_scene("inclined_plane"), 0.0)):
-        built = build(scene, "pinocchio[formulation=contact,preset=default]").built()
-        assert built.regularised["N"].tolerance == pytest.approx(forgiven, abs=1e-2 if forgiven else 1e-10)
+def test_only_the_missing_bend_is_forgiven() -> None:
+    """The obvious scheme does not press at time 0; leapfrog must give the forces to round-off."""
+    for preset, forgiven in (("default", 1.0), ("matched", 0.0)):
+        built = build(load_scene("sphere_in_cylinder"), f"pinocchio[formulation=contact,preset={preset}]").built()
+        assert built.regularised["N"].tolerance == pytest.approx(forgiven, abs=1e-2 if forgiven else 2e-9)
         assert ("plane" in built.regularised["N"].because) == bool(forgiven)
     # In the cylinder F2 is missing only by rolling resistance, which follows N: 5/7 (f/a) N (Blajer 2006).
     scene = load_scene("sphere_in_cylinder", rolling_resistance=RESISTANCE)
@@ -124,18 +119,10 @@ def test_number_for_unbounded_friction() -> None:
 
 def test_solvers_agree() -> None:
     """PGS and ADMM find the same impulses: their paths differ by what the tolerance leaves."""
-    pgs, admm = (run("paper", f"pinocchio[formulation=contact,solver={name}]", 2.1, 1e-2) for name in SOLVERS)
+    pgs, admm = (
+        _moved(f"pinocchio[formulation=contact,solver={name}]", 0.5, rolling_resistance=RESISTANCE) for name in SOLVERS
+    )
     np.testing.assert_allclose(admm.p_WB, pgs.p_WB, rtol=0, atol=1e-6)
-
-
-def test_leaving_the_wall() -> None:
-    """On the inside of a leaning cylinder a slow ball lets go of the wall, and then nothing acts on it."""
-    scene = leaning_cylinder(1.2, mu_static=0.35, speed=2)
-    result = simulate(scene, "pinocchio[formulation=contact]", until=0.4, every=0.01)
-    kinds = [event.kind for event in events_of(result)]
-    assert "lift_off" in kinds
-    flying = (result.N == 0) & (result.gap > 1e-4)
-    assert int(flying.sum()) > 3
 
 
 def test_too_little_friction_for_unbounded() -> None:
@@ -160,5 +147,3 @@ def test_model_is_only_what_the_scene_requires() -> None:
     assert run.contact.model.nv == 6
     assert len(run.contact.models) == 1
     assert run.built().rolling_resistance == 0.0
-    assert run.sample().sticking is None
-    assert run.events() == ()

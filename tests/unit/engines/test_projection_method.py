@@ -10,7 +10,7 @@ import pytest
 import proofroll
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.projection.ball.geometry import GeneralSurface, Uniform, matrix
 from proofroll.engines.projection.ball.method import ProjectedBall
 from proofroll.engines.projection.ball.orientation import EulerAngles, RotatingFrame
@@ -60,19 +60,17 @@ def papers_equations(x, response):
 
 
 @SEEDS
-@pytest.mark.parametrize("active", ["contact", None])
-def test_equations_are_the_papers(seed, active):
-    """M̄ q̈ + d̄ = h̄ + C_nhᵀ F, and C_nh q̈ + Ċ_nh q̇ = 0 while the ball rolls, by differences of the paper's rows."""
-    x, ball = random_state(seed), euler_ball().under(active)
-    response = ball.response_at(x)
+def test_equations_are_the_papers(seed):
+    """M̄ q̈ + d̄ = h̄ + C_nhᵀ F, and C_nh q̈ + Ċ_nh q̇ = 0, by differences of the paper's rows."""
+    x, ball = random_state(seed), euler_ball()
+    response = ball.response(ball.kinematics(x))
     close(papers_equations(x, response), np.zeros(5))
     h = 1e-6  # differences of slips of some 10 m/s lose 1e-16 * 10 / 1e-6 and neglect 160² h² of the rate
     moved = (np.concatenate([x[:5] + step * x[5:], x[5:]]) for step in (h, -h))
     ahead, behind = (papers_rows(y) @ y[5:] for y in moved)
     turned = (ahead - behind) / (2 * h)
     found = papers_rows(x) @ response.acceleration + turned
-    np.testing.assert_allclose(found, response.slip_rate, rtol=1e-6, atol=1e-6 * np.max(np.abs(turned)))
-    assert (np.max(np.abs(response.slip_rate)) == 0) == (active == "contact")
+    np.testing.assert_allclose(found, 0.0, rtol=0, atol=1e-6 * np.max(np.abs(turned)))
 
 
 @SEEDS
@@ -122,22 +120,6 @@ def test_elimination_is_the_mass_orthogonal_projection(seed):
     np.testing.assert_array_equal(result[:5], x[:5])
 
 
-@SEEDS
-def test_rows_can_be_switched_off(seed):
-    """Without rows the ball slides without friction; with those of a resting centre it only spins."""
-    x, ball = random_state(seed), euler_ball(rolling_ball(proofroll.load_scene("sphere_in_cylinder")))
-    response = ball.under(None).response_at(x)
-    close(response.rate[2:], [-9.81, 0, 0, 0])
-    assert response.F2 == response.F3 == 0
-    rests = ball.under("centre")
-    x = rests.eliminated(x)
-    v = rests.kinematics(x).v
-    close([*v[:3], *v[4:]], np.zeros(5))
-    response = rests.response_at(x)
-    close(response.rate, np.zeros(6))
-    close([response.F2, response.F3], [0, M * 9.81])
-
-
 def test_without_resistance_no_moment_is_modelled(monkeypatch):
     """With f = 0 the model does not contain the moment of rolling resistance at all."""
     monkeypatch.delattr(ProjectedBall, "resistance")
@@ -180,7 +162,7 @@ class Torus:
 
 
 @pytest.mark.parametrize("u", [(0.3, 0.4), (-2.0, 2.5)])
-@pytest.mark.parametrize("surface", [Torus(), Cylinder("wall", 0.2, 0.3), Plane("wall", 0.4, 0.025)])
+@pytest.mark.parametrize("surface", [Torus(), Cylinder("wall", 0.2, 0.3)])
 def test_turning_of_the_frame_follows_from_its_definition(surface, u):
     """Fᵀ ∂F/∂u, which is derived from tangents and second derivatives, is what differences of the frame give."""
     u = np.asarray(u)
@@ -194,9 +176,9 @@ def test_turning_of_the_frame_follows_from_its_definition(surface, u):
 
 @SEEDS
 @pytest.mark.parametrize("orientation", [EulerAngles, RotatingFrame])
-@pytest.mark.parametrize("surface", [Cylinder("wall", 0.2, 0.3), Plane("wall", 0.4, 0.025)])
-def test_any_surface_any_orientation(surface, orientation, seed):
-    """On curved, tilted and flat surfaces both formulations give what the reduced equations give."""
+@pytest.mark.parametrize("surface", [Cylinder("wall", 0.2), Cylinder("wall", 0.2, 0.3)])
+def test_any_axis_any_orientation(surface, orientation, seed):
+    """Wherever the axis points both formulations give what the reduced equations give."""
     rng = np.random.default_rng(seed)
     u, udot, spin = rng.uniform(-2, 2, 2), rng.uniform(-5, 5, 2), rng.uniform(-50, 50)
     body = replace(BODY, surface=surface)
@@ -213,9 +195,9 @@ def test_any_surface_any_orientation(surface, orientation, seed):
 
 
 @pytest.mark.parametrize("u", [(0.0, 0.0), (40.0, -3.0)])
-@pytest.mark.parametrize("surface", [Cylinder("wall", 0.2, 0.3), Plane("wall", 0.4, 0.025)])
+@pytest.mark.parametrize("surface", [Cylinder("wall", 0.2), Cylinder("wall", 0.2, 0.3)])
 def test_uniform_geometry_is_the_general_one(surface, u):
-    """On a homogeneous surface the precomputed geometry equals the one evaluated on the spot."""
+    """On a cylinder the precomputed geometry equals the one evaluated on the spot."""
     found, expected = Uniform(surface).at(u), GeneralSurface(surface).at(u)
     close(found[0], expected[0])
     for one, other in zip(found[1], expected[1], strict=True):

@@ -12,7 +12,6 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.engines.projection.ball.ball_modes import Exit
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 
@@ -20,7 +19,6 @@ RESISTANCE = 5e-4
 NEEDS = {
     "nothing": ({}, frozenset()),
     "resistance": ({"rolling_resistance": RESISTANCE}, {BallCapability.ROLLING_RESISTANCE}),
-    "friction": ({"mu_static": 0.35}, {BallCapability.BOUNDED_FRICTION}),
 }
 OURS = ("projection", "reduced", "exudyn", "pinocchio", "mujoco")
 TURNING = frozenset({BallCapability.ORIENTATION})
@@ -63,11 +61,8 @@ def test_projection(f: float) -> None:
     ):
         engine = build(scene(*asks, rolling_resistance=f), "projection", formulation=formulation)
         assert len(engine._motion.x) == length
-        assert engine._ball.active == "contact"
         kin = engine._ball.kinematics(engine._motion.x)
         assert bool(np.any(engine._ball.resistance(kin, 1.0))) == (f > 0)
-        # Nobody looks for a slip; with resistance, only for the place where the centre stands still.
-        assert (engine._motion.mode.exits == (Exit.HALT,)) if f else not hasattr(engine._motion, "mode")
 
 
 def test_the_orientation_in_the_rotating_frame_is_a_quadrature() -> None:
@@ -90,7 +85,6 @@ def test_pinocchio(formulation: str, joints: int, freedoms: int) -> None:
     assert (mechanism.model.njoints, mechanism.model.nv) == (joints, freedoms)
     assert [float(inertia.mass) for inertia in mechanism.model.inertias if inertia.mass > 0] == [0.517]
     assert not mechanism.rows(mechanism.model.createData(), mechanism.q0, mechanism.v0).resistance.any()
-    assert motion.mu_static is None
     engine.advance(0.01)
     np.testing.assert_array_equal(motion.q[-4:], mechanism.q0[-4:])
     asked = build(scene("orientation"), "pinocchio", formulation=formulation)
@@ -115,12 +109,12 @@ def test_exudyn(formulation: str, f: float, torque: set[str]) -> None:
 
 
 def test_exudyn_in_minimal_coordinates() -> None:
-    """With unbounded friction nothing switches generic's constraints, and it has no coordinate of orientation."""
+    """Nothing switches generic's constraints, and it has no coordinate of orientation."""
     model = build(scene(), "exudyn[formulation=generic]")
     system = model.system
     kinds = [system.GetObject(number)["objectType"] for number in range(system.systemData.NumberOfObjects())]
     assert kinds == ["GenericODE2", "ConnectorCoordinate", "ConnectorCoordinateVector"]
-    assert (model.friction, model.integration.events, system.GetPostStepUserFunction()) == (None, [], 0)
+    assert system.GetPostStepUserFunction() == 0
     with pytest.raises(Refused, match="needs the ball's orientation, and the spin of generic is a quasi-velocity"):
         build(scene("orientation"), "exudyn[formulation=generic]")
 
@@ -158,18 +152,16 @@ def test_mujoco_contact_of_more_dimensions(formulation: str, condim: int, coeffi
 
 
 @pytest.mark.parametrize(
-    ("options", "parameters", "advice"),
+    ("options", "advice"),
     [
-        ("condim=4,cone_correction=true", {}, "cone_correction=true is made for sliding alone; set condim=3"),
-        ("formulation=free,preset=tuned,condim=6", {}, "curvature=true is made for sliding alone; set condim=3"),
-        ("condim=6", {"mu_static": 0.35}, "stick and slip could not be distinguished; set condim=3"),
-        ("condim=5", {}, "it must be 3, 4 or 6"),
+        ("formulation=free,preset=tuned,condim=6", "curvature=true is made for sliding alone; set condim=3"),
+        ("condim=5", "it must be 3, 4 or 6"),
     ],
 )
-def test_mujoco_dimensions_that_make_no_sense(options: str, parameters: dict[str, float], advice: str) -> None:
+def test_mujoco_dimensions_that_make_no_sense(options: str, advice: str) -> None:
     """A contact of more dimensions where it has no meaning is refused in one line."""
     with pytest.raises(InputError) as caught:
-        build(scene(**parameters), f"mujoco[{options}]")
+        build(scene(), f"mujoco[{options}]")
     assert advice in str(caught.value)
     assert "condim" in str(caught.value)
     assert "\n" not in str(caught.value)

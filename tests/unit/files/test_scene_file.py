@@ -373,7 +373,7 @@ def test_two_kinds_have_rows_of_one_table(monkeypatch: pytest.MonkeyPatch) -> No
     }
     given = tables, Gravity(9.81, (0.0, 0.0, -1.0)), Parameters({}, {}), "scene.toml"
     rolling, other = cast(Any, scene_file._elements(*given))
-    assert rolling.contact.surface == "wall"
+    assert rolling.mechanism.pairs[0].geometries == ("ball", "wall")
     assert other.tables == {"blocks": [{"name": "crate"}], "contacts": [block]}
     tables["contacts"].append({"of": ["another"]})
     with pytest.raises(InputError, match=r"scene.toml: contacts.2 = .*name a table that only one of them has"):

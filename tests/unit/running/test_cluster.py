@@ -176,7 +176,7 @@ def test_a_worker_with_other_engines(dask: DaskCluster, shared: Cluster, tmp_pat
 @pytest.mark.drill
 def test_results_are_those_of_home(dask: DaskCluster, shared: Cluster, tmp_path: Path, room: Path) -> None:
     """One worker, two, and one that is lost in the middle give what home gives, stored once, but for speeds."""
-    shutil.copytree(data_folder("models") / "inclined_plane", tmp_path / "mine" / "my_plane")
+    shutil.copytree(data_folder("models") / "sphere_in_cylinder", tmp_path / "mine" / "my_plane")
     own = str(tmp_path / "mine" / "my_plane")
     robot = tmp_path / "arm.urdf"
     robot.write_text(urdf(kinds=("revolute", "fixed", "fixed")), encoding="utf-8")
@@ -240,7 +240,7 @@ def test_a_scene_that_cannot_be_read(
     """It is refused with its reason, as at home; the cluster goes on with the others."""
     dask.one_worker()
     folder = tmp_path / "my_plane"
-    shutil.copytree(data_folder("models") / "inclined_plane", folder)
+    shutil.copytree(data_folder("models") / "sphere_in_cylinder", folder)
     lost, sound = case("oracle", 1.5, str(folder)), case("oracle")
     (folder / "scene.toml").unlink()
     (folder / "scene.toml").symlink_to("scene.toml")  # cannot be read, by the superuser either

@@ -55,12 +55,12 @@ def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: 
     (made,) = environments.remembered()
     assert python_at("aged@1.0") == made.python
     assert {"aged==1.0", "proofroll==0.1.0"} <= set(made.packages)
-    code, out, err = proofroll("run", "inclined_plane", "--engine", "aged@1.0", "--until", "0.01")
+    code, out, err = proofroll("run", "sphere_in_cylinder", "--engine", "aged@1.0", "--until", "0.01")
     assert (code, "aged@1.0 (formulation=midpoint" in out) == (0, True), err
     code, _, err = proofroll("engines", "add", "aged", "--requirement", "aged==1.0")
     assert (code, "it is there already" in err) == (2, True)
     made.python.unlink()
-    code, _, err = proofroll("run", "inclined_plane", "--engine", "aged@1.0")
+    code, _, err = proofroll("run", "sphere_in_cylinder", "--engine", "aged@1.0")
     assert (code, "its environment is gone" in err) == (3, True)
     assert proofroll("engines", "remove", "aged@1.0")[0] == 0
     assert not made.folder.exists()

@@ -43,7 +43,7 @@ def new(tmp_path: Path) -> Path:
 
 def case_in(python: Path, workers: Workers | None = None) -> Case:
     """A short run of the engine there."""
-    return single_case("inclined_plane", {}, f"aged@{python}", workers=workers, **SHORT)  # type: ignore[arg-type]
+    return single_case("sphere_in_cylinder", {}, f"aged@{python}", workers=workers, **SHORT)  # type: ignore[arg-type]
 
 
 def test_an_engine_runs_where_its_name_says(
@@ -194,7 +194,7 @@ def test_no_engine_of_another_interpreter_is_loaded_here(old: Path) -> None:
     with pytest.raises(InputError, match="cannot be loaded into this one"):
         load_engine(f"mujoco@{old}")
     with pytest.raises(InputError, match="cannot be loaded into this one"):
-        simulate(load_scene("inclined_plane"), f"mujoco@{old}")
+        simulate(load_scene("sphere_in_cylinder"), f"mujoco@{old}")
     with Workers().lend(f"aged@{old}") as worker, pytest.raises(Missing, match="cannot be loaded"):
         worker.request({"do": "describe", "engine": "aged@elsewhere"}, 60)
 
@@ -219,12 +219,12 @@ def test_releases(text: str, numbers: tuple[int, ...]) -> None:
 @pytest.mark.drill
 def test_the_command_line_takes_a_place(old: Path, proofroll: Callable[..., Any], tmp_path: Path) -> None:
     """Run, and compare with the rows of an engine moved there."""
-    code, out, _ = proofroll("run", "inclined_plane", "--engine", f"aged@{old}", "--until", "0.02", "--json")
+    code, out, _ = proofroll("run", "sphere_in_cylinder", "--engine", f"aged@{old}", "--until", "0.02", "--json")
     assert (code, json.loads(out)["versions"]["aged"]) == (0, "1.0")
     claim = tmp_path / "claim.toml"
     claim.write_text(
-        'title = "t"\nquestion = "q?"\nscene = "inclined_plane"\nuntil = 0.1\nevery = 0.05\ntimed = false\n'
-        '[tolerances.close]\nbecause = "a look"\ndown = "1 %"\n'
+        'title = "t"\nquestion = "q?"\nscene = "sphere_in_cylinder"\nuntil = 0.1\nevery = 0.05\ntimed = false\n'
+        '[tolerances.close]\nbecause = "a look"\nz = "1 %"\n'
         f'[[rows]]\nengine = "aged@{old}"\ntolerance = "close"\n'
         '[[rows]]\nengine = "projection"\ntolerance = "close"\n'
     )

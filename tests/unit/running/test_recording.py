@@ -8,10 +8,8 @@ import pytest
 from hostile import GivesUp, HostileSettings, NotANumber, Oracle
 
 from proofroll.core.errors import Diverged
-from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grid, time_grid
-from proofroll.elements.ball_on_surface.events import lift_off
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
@@ -115,18 +113,6 @@ def test_times_off_the_grid() -> None:
     assert set(off_grid(times, 1e-3)) == set(off_grid(times, 2e-3)) == set(off_grid(times, None))
     assert off_grid(times, 0.02 / 7).size == off_grid(times, 0.02 / 13).size == 8, "also where no tenth is a step"
     assert [off_grid(times[:count], None).size for count in (4, 5, 11)] == [0, 1, 2], "few where there are few"
-
-
-def test_what_counts_as_lift_off() -> None:
-    """A wall that pulls, or does not press for 10 ms, has lost the ball; a hop, time 0 and silence do not count."""
-    times = (0.004 * np.arange(8)).tolist()
-    pulls = lift_off(times, [1, 3, 2, 1, -1, 5, 5, 5], 1e-6)
-    assert pulls == Event("lift_off", pytest.approx(0.014), times[3], times[4])
-    rests = lift_off(times, [1, 3, 2, 0, 0, 0, 0, 5], 1e-6)
-    assert rests == Event("lift_off", pytest.approx(0.01), times[2], times[3])
-    assert lift_off(times, [1, 3, 2, 0, 0, 0, 5, 5], 1e-6) is None
-    assert lift_off(times, [-1, 3, 2, 1, 1, 1, 5, 5], 1e-6) is None
-    assert lift_off(times, [np.nan] * 8, 1e-6) is None
 
 
 def test_where_nothing_can_lift_the_ball_a_pull_is_no_lift_off(sphere: Scene) -> None:

@@ -254,17 +254,17 @@ def test_the_time_of_the_truth_has_an_account(tmp_path: Path, make_case: MakeCas
 
 def test_capabilities_are_checked_before_anything_is_built(tmp_path: Path, make_case: MakeCase) -> None:
     """A scene that needs what the engine does not provide is refused by the words of what is lacking."""
-    case = make_case("oracle", parameters={"rolling_resistance": 1e-4, "mu_static": 0.3})
+    case = make_case("oracle", parameters={"rolling_resistance": 1e-4})
     result = run_one(case, tmp_path / "run.npz")
     assert result.status is Status.REFUSED
-    assert result.message.startswith("needs bounded friction (slip), rolling resistance; no formulation of oracle has")
+    assert result.message.startswith("needs rolling resistance; no formulation of oracle has")
 
 
 def test_describe() -> None:
     """An engine is described by itself, from a process of its own."""
     found = describe("oracle")
     assert found.version == "1"
-    assert found.provides == {"only": ["a curved surface", "rolling without slip"]}
+    assert found.provides == {"only": ["rolling without slip"]}
     assert found.presets == {"only": {"matched": {"formulation": "only", "preset": "matched", "dt": 1e-2}}}
     assert found.summary.startswith("Well-behaved")
 

@@ -18,6 +18,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError, Missing, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
+from proofroll.engines.projection import Projection
 from proofroll.files.data_folders import data_folder
 
 
@@ -38,7 +39,7 @@ def test_three_lines() -> None:
 
 def test_a_step_that_does_not_divide_a_hundredth_of_a_second() -> None:
     """An engine whose usual step is 1/240 s runs as it is: without an interval, samples are where its steps end."""
-    scene, step = proofroll.load_scene("inclined_plane"), 1 / 240
+    scene, step = proofroll.load_scene("sphere_in_cylinder"), 1 / 240
     dataset = proofroll.simulate(scene, "projection[preset=default]", until=0.1, dt=step)
     assert dataset["time"].to_numpy() == pytest.approx(2 * step * np.arange(13))
     with pytest.raises(InputError, match=r"is sampled at 0 s and 0\.01 s"):
@@ -47,9 +48,9 @@ def test_a_step_that_does_not_divide_a_hundredth_of_a_second() -> None:
 
 def test_the_truth_is_an_engine_too() -> None:
     """Without an engine the truth is given, with its error bars."""
-    dataset = proofroll.simulate(proofroll.load_scene("inclined_plane"), until=0.2, every=0.1)
+    dataset = proofroll.simulate(proofroll.load_scene("sphere_in_cylinder"), until=0.2, every=0.1)
     assert dataset.attrs["status"] == "done"
-    assert dataset["down"].attrs["error_bar"] > 0
+    assert dataset["z"].attrs["error_bar"] > 0
 
 
 def test_settings_in_brackets_and_by_name() -> None:
@@ -184,7 +185,7 @@ def test_a_sample_of_a_wrong_shape(wrong: dict[str, Any], words: str) -> None:
             return dataclasses.replace(super().sample(), **wrong)
 
     with pytest.raises(Diverged, match=words):
-        proofroll.simulate("inclined_plane", Misshapen, until=0.05)
+        proofroll.simulate("sphere_in_cylinder", Misshapen, until=0.05)
 
 
 @pytest.mark.parametrize(
@@ -195,12 +196,25 @@ def test_a_sample_of_a_wrong_shape(wrong: dict[str, Any], words: str) -> None:
         ("sample", {"p_WB": np.zeros(3)}, r"sample\(\) gave dict instead of a BallSample"),
         ("built", None, r"built\(\) gave NoneType, which has no "),
         ("built", {"mass": 1.0}, r"built\(\) gave dict, which has no "),
-        ("events", 7, r"events\(\) gave something else than a sequence of Event"),
-        ("events", [("bounce", 0.1)], r"events\(\) gave something else than a sequence of Event"),
     ],
 )
 def test_what_is_no_sample_and_nothing_built(method: str, given: Any, words: str) -> None:
     """Whoever forgets a return, or gives a dictionary, reads which method gave what."""
     engine = type("Forgetful", (Tiny,), {method: lambda _: given})
     with pytest.raises(Diverged, match=words):
-        proofroll.simulate("inclined_plane", engine, until=0.05)
+        proofroll.simulate("sphere_in_cylinder", engine, until=0.05)
+
+
+@pytest.mark.parametrize("given", [7, [("bounce", 0.1)]])
+def test_what_is_no_event(given: Any) -> None:
+    """Whoever tells events in another form reads which one is asked for."""
+
+    class Forgetful(Projection):
+        @classmethod
+        def build(cls, scene: Scene, settings: Any) -> Any:
+            run: Any = super().build(scene, settings)
+            run.events = lambda: given
+            return run
+
+    with pytest.raises(Diverged, match=r"events\(\) gave something else than a sequence of Event"):
+        proofroll.simulate("sled", Forgetful, until=0.05)

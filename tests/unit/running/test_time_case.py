@@ -13,7 +13,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
 from proofroll.running.time_case import CleanRuns, clean_runs, is_put_off
 
-SCENE = load_scene("inclined_plane")
+SCENE = load_scene("sphere_in_cylinder")
 SETTINGS = TinySettings()
 TIMES = time_grid(0.1, 0.01)
 

@@ -14,7 +14,6 @@ import pytest
 from scipy.integrate import quad
 
 from proofroll.core.errors import NotUnique, Refused
-from proofroll.core.events import events_of
 from proofroll.core.observable import Role
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
@@ -187,73 +186,6 @@ def test_two_spheres_hit(case: int, w1: list[float]) -> None:
     times_of(found, *true["events"])
     assert found.record.v_WB[1, 0] == pytest.approx(true["values"]["v_WB"], abs=DIGITS)
     assert found.record.w_WB[1, 0] == pytest.approx(w1, abs=DIGITS)
-
-
-def as_bodies(name: str, friction: float, tilt: float, **parameters: float) -> tuple[Mechanism, float]:
-    """The ball of a scene as a free body, a sphere and a plane, and its height over the plane at the start [m]."""
-    ball = load_scene(name, tilt=tilt, **parameters).elements[0].rolling  # type: ignore[attr-defined]
-    radius, moment = float(ball.ball.radius), float(ball.ball.inertia)
-    normal = (float(np.sin(tilt)), 0.0, float(np.cos(tilt)))
-    gap = float(parameters.get("height", 0.0))
-    under = (np.array(ball.p0) - (radius + gap) * np.array(normal)).tolist()
-    body = Body("ball", float(ball.ball.mass), inertia=(moment, moment, moment))  # type: ignore[arg-type]
-    start = {"q0": (*ball.p0, 1.0, 0.0, 0.0, 0.0), "v0": (*ball.v0, *ball.w0)}
-    joint = Joint("free", "free", "world", "ball", **{key: tuple(map(float, value)) for key, value in start.items()})
-    shapes = (
-        Geometry("sphere", "ball", "sphere", radius=radius),
-        Geometry("floor", "world", "plane", under, normal=normal),
-    )  # type: ignore[arg-type]
-    pair = Pair("contact", ("sphere", "floor"), friction, parameters.get("restitution", 0.0))
-    return Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,)), gap
-
-
-@pytest.mark.drill
-@pytest.mark.parametrize(
-    ("name", "friction", "tilt", "until", "parameters"),
-    [
-        pytest.param("inclined_plane", 10.0, 0.35, 1.0, {}, marks=pytest.mark.drill),
-    ],
-)  # fmt: skip
-def test_a_ball_moves_as_its_own_truth_says(
-    name: str, friction: float, tilt: float, until: float, parameters: dict[str, float]
-) -> None:
-    """A ball on a plane, written as body, sphere and plane, has the motion and the events of the ball's own routes."""
-    mechanism, _ = as_bodies(name, friction, tilt, **parameters)
-    times = np.linspace(0, until, 4)
-    own = truth(load_scene(name, tilt=tilt, **parameters), times)
-    found = truth_of(mechanism, times)
-    for field in ("p_WB", "v_WB", "w_WB"):
-        apart = np.abs(getattr(found.record, field)[:, 0] - own[field].to_numpy()).max()
-        assert apart <= found.bars[field][-1] + own[field].attrs["error_bar"], field
-    words = {"bounce": "impact"}
-    expected = [(words.get(event.kind, event.kind), event) for event in events_of(own) if event.time > 0]
-    assert [kind for kind, _ in expected] == [event.kind for event in found.events]
-    for (_, theirs), event in zip(expected, found.events, strict=True):
-        assert event.time_low - 1e-12 <= theirs.time_high
-        assert theirs.time_low <= event.time_high + 1e-12
-
-
-@pytest.mark.drill
-def test_a_ball_in_a_bore_moves_as_in_its_cylinder() -> None:
-    """Body, sphere and bore have the motion of the ball's own routes, rolling upright."""
-    scene = load_scene("sphere_in_cylinder", mu_static=0.35)
-    wall, ball = scene.elements[0].surface, scene.elements[0].rolling  # type: ignore[attr-defined]
-    moment, tilt = float(ball.ball.inertia), float(wall.tilt)
-    body = Body("ball", float(ball.ball.mass), inertia=(moment, moment, moment))
-    q0, v0 = (*ball.p0, 1.0, 0.0, 0.0, 0.0), (*ball.v0, *ball.w0)
-    joint = Joint("free", "free", "world", "ball", q0=tuple(map(float, q0)), v0=tuple(map(float, v0)))
-    axis = (float(np.sin(tilt)), 0.0, float(np.cos(tilt)))
-    shapes = (
-        Geometry("sphere", "ball", "sphere", radius=float(ball.ball.radius)),
-        Geometry("wall", "world", "bore", radius=float(wall.radius), axis=axis),
-    )
-    pair = Pair("contact", ("sphere", "wall"), float(ball.contact.mu_static), float(ball.contact.restitution or 0.0))
-    times = np.linspace(0, 0.15, 4)
-    own, found = truth(scene, times), truth_of(Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,)), times)
-    for field in ("p_WB", "v_WB", "w_WB"):
-        apart = np.abs(getattr(found.record, field)[:, 0] - own[field].to_numpy()).max()
-        assert apart <= found.bars[field][-1] + own[field].attrs["error_bar"], field
-    assert [event.kind for event in events_of(own)] == [event.kind for event in found.events]
 
 
 @pytest.mark.drill
@@ -772,8 +704,8 @@ def test_residuals_of_the_truth_are_within_their_bars() -> None:
 def test_a_ball_that_just_rolls_is_ill_posed(part: int) -> None:
     """Friction of 2/7 of the slope, to round-off: whether the contact sticks hangs on nothing, on both sides alike."""
     friction = 2 / 7 * np.tan(0.3) * (1 + part * np.finfo(float).eps)
-    mechanism, _ = as_bodies("inclined_plane", float(friction), 0.3, speed=0.0)
-    found = truth_of(mechanism, np.array([0.0, 0.1]))
+    ball = mechanism_of("inclined_plane", tilt=0.3, speed=0.0, mu_static=float(friction))
+    found = truth_of(ball, np.array([0.0, 0.1]))
     assert (found.horizon, tuple(found.events)) == (0.0, ())
 
 

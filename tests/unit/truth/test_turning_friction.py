@@ -140,10 +140,10 @@ def test_a_bounce_has_a_bar_for_its_last_instants() -> None:
     assert np.isfinite(at(found, "w_WB")).all()
 
 
-def test_mujoco_says_why_it_has_no_rolling_resistance() -> None:
+def test_mujoco_says_why_it_has_no_friction_against_spin() -> None:
     """Refused, with the reason."""
-    with pytest.raises(Refused, match=r"in MuJoCo \(condim 6\) it shares one cone with sliding and spin"):
-        proofroll.simulate(ball(law(rolling_resistance=1e-3)), "mujoco[formulation=geoms]", until=0.01)
+    with pytest.raises(Refused, match=r"friction against spin: in MuJoCo \(condim 4\) it shares one cone with sliding"):
+        proofroll.simulate(ball(law(0.3, spinning_friction=1e-3)), "mujoco[formulation=geoms]", until=0.01)
 
 
 def test_a_coefficient_below_zero_is_refused_by_its_name() -> None:

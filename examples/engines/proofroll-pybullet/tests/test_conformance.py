@@ -7,8 +7,6 @@ from proofroll.conformance import checks
 
 DAMPED = "by default the spin of PyBullet's links is damped"
 KNOWN = {
-    "first_steps_fit_the_scene[plane-default-plane]": "contactSlop lets the ball sink by 1e-5 m before it is pressed",
-    "moves_as_the_truth[plane-default-plane]": "by default a body loses 4 % of its speed in a second",
     "moves_as_the_truth[plane-default-slow]": "damped as on the plane, and 1/240 s is long for a path that bends",
     "moves_as_the_truth[plane-default-fast]": "unless maxJointVelocity says more, PyBullet cuts spin to 100 rad/s",
     "moves_as_the_truth[spheres-matched-sled]": "where three feet slide, friction is some ten degrees off the slip",

@@ -23,7 +23,7 @@ def from_samples(body: RollingBall, times: FloatArray, samples: Sequence[BallSam
     if len(forces) > 1 and forces[0] is None:
         forces[0] = np.full(3, np.nan)
     p, v, w = (np.array([np.reshape(getattr(s, key), 3) for s in samples]) for key in ("p_WB", "v_WB", "w_WB"))
-    made = columns(
+    return columns(
         body,
         times,
         p,
@@ -32,11 +32,6 @@ def from_samples(body: RollingBall, times: FloatArray, samples: Sequence[BallSam
         force=stacked(forces),
         q_WB=stacked([s.q_WB for s in samples]),
     )
-    variables = dict(made.variables)
-    if all(s.sticking is not None for s in samples):
-        sticking = np.array([s.sticking for s in samples], dtype=np.int8)
-        variables["sticking"] = Variable(("time",), sticking, {"units": "1", "long_name": "1 sticks, 0 slips"})
-    return Columns(variables, made.attrs)
 
 
 def columns(

@@ -15,22 +15,21 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import DENSEST, LIGHTEST
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
-from proofroll.core.element_abilities import RunWatch
 from proofroll.core.errors import InputError, Refused
-from proofroll.core.events import EventKind
 from proofroll.core.gravity import Gravity
 from proofroll.core.number_format import vector
 from proofroll.core.observable import Observable
 from proofroll.core.program_text import FailedRun
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface import certificate, events, failure, natural_scales
+from proofroll.elements.ball_on_surface import certificate, failure, natural_scales
 from proofroll.elements.ball_on_surface.dataset import from_samples
 from proofroll.elements.ball_on_surface.failure_program import program
 from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, normal_force
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.of_body import ball_of
 from proofroll.elements.ball_on_surface.optional_terms import optional_terms
 from proofroll.elements.ball_on_surface.sampling import BallSample
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.elements.mechanism.run.contacts import local_frame
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 
@@ -39,17 +38,20 @@ if TYPE_CHECKING:
 
     from proofroll.core.certificate import Line
 
+# Relative angle between gravity and the axis of a cylinder that is round-off.
+_ROUND_OFF = 1e-12
+
 
 @dataclass(frozen=True)
 class BallOnSurface:
-    """A ball that rolls on a plane or in a cylinder, and slips where friction gives way. See :class:`.Element`.
+    """A ball that rolls without slip in an upright cylinder (Blajer 2006). See :class:`.Element`.
 
     Attributes:
         ball, surface, contact, start, gravity: data of the scene.
     """
 
     ball: Ball
-    surface: Surface
+    surface: Cylinder
     contact: Contact
     start: InitialMotion
     gravity: Gravity
@@ -60,9 +62,9 @@ class BallOnSurface:
         """Checks that the ball rolls on a wall at rest, where the wall has a normal.
 
         Raises:
-            InputError: the ball flies, slips or bounces, its wall turns, or its start has no normal.
+            InputError: the ball may slip, flies or bounces, or its wall is no cylinder at rest along gravity.
         """
-        if not rolls_evenly(self.surface, self.contact, self.start):
+        if not rolls_evenly(self.surface, self.contact, self.start, self.gravity.vector):
             advice = "its own mechanics follows a ball that rolls; read this one as a body (ball_as_body)"
             raise InputError("start", self.start, advice)
         if not np.all(np.isfinite([self.rolling.p0, self.rolling.v0, self.rolling.w0])):
@@ -82,26 +84,18 @@ class BallOnSurface:
     @cached_property
     def requires(self) -> frozenset[str]:
         """See the protocol."""
-        needs = {BallCapability.ROLLING}
-        if self.contact.rolling_resistance > 0:
-            needs.add(BallCapability.ROLLING_RESISTANCE)
-        if math.isfinite(self.contact.mu_static):
-            needs.add(BallCapability.BOUNDED_FRICTION)
-        if any(generator.kind == "rotation" for generator in self.surface.generators):
-            needs.add(BallCapability.CURVED_SURFACE)
-        return frozenset(needs)
+        resists = {BallCapability.ROLLING_RESISTANCE} if self.contact.rolling_resistance > 0 else set()
+        return frozenset({BallCapability.ROLLING} | resists)
 
-    optional: ClassVar[frozenset[str]] = frozenset(
-        {BallCapability.ROLLING_RESISTANCE, BallCapability.BOUNDED_FRICTION, BallCapability.ORIENTATION}
-    )
+    optional: ClassVar[frozenset[str]] = frozenset({BallCapability.ROLLING_RESISTANCE, BallCapability.ORIENTATION})
     askable: ClassVar[Mapping[str, str]] = {"orientation": BallCapability.ORIENTATION}
     softened: ClassVar[frozenset[str]] = frozenset(name for name in certificate.CAPS if not name.startswith("1 / "))
     failures: ClassVar[Mapping[str, str]] = failure.MEANINGS
-    failing_events: ClassVar[Mapping[str, str]] = {EventKind.LIFT_OFF: failure.LEFT}
+    failing_events: ClassVar[Mapping[str, str]] = {}
 
     @property
     def start_facts(self) -> Sequence[str]:
-        """Sentences on centre, velocity, normal force, and whether the ball rolls, rests or leaves at once."""
+        """Sentences on centre, velocity and normal force."""
         body = self.rolling
         named = zip(body.wall.coordinates, body.u0.tolist(), body.wall.units, strict=True)
         place = ", ".join(f"{name} = {value:.4g}{'' if unit == '1' else f' {unit}'}" for name, value, unit in named)
@@ -109,10 +103,7 @@ class BallOnSurface:
             f"{body.ball.name}: centre at {vector(body.p0)} m in the world ({place}), velocity {vector(body.v0)} m/s, "
             f"spin {vector(body.w0)} rad/s"
         ]
-        _, force = initial_response(body)
-        press = float(normal_force(body, body.p0, force))
-        if not np.any(force):
-            return [*sentences, f"it leaves the {body.wall.kind} at once: nothing presses it on"]
+        press = float(normal_force(body, body.p0, initial_response(body)[1]))
         moves = "it rolls" if np.any(body.v0) else "its centre is at rest"
         return [*sentences, f"{moves}; the {body.wall.kind} presses it with {press:.4g} N"]
 
@@ -173,8 +164,8 @@ class BallOnSurface:
         return natural_scales.step_numbers(self.rolling, h, truth)
 
     @cached_property
-    def first_motion(self) -> FirstMotion | None:
-        """See the protocol; None for a ball at rest under rolling resistance, which has no direction yet."""
+    def first_motion(self) -> FirstMotion:
+        """See the protocol."""
         return natural_scales.first_motion(self.rolling)
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
@@ -186,20 +177,8 @@ class BallOnSurface:
         """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.columns`."""
         return from_samples(self.rolling, times, samples)
 
-    def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's
-        """See :class:`proofroll.core.element_abilities.WatchesRuns`."""
-        return events.Watch(self.rolling)
-
-    def common_span(
-        self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
-    ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
-        """See :class:`proofroll.core.element_abilities.WatchesRuns`."""
-        return events.common_span(truth, runs)
-
     def lacks(self, samples: Sequence[BallSample], asks: Sequence[str]) -> str | None:
         """See the protocol."""
-        if BallCapability.BOUNDED_FRICTION in self.requires and any(sample.sticking is None for sample in samples):
-            return "the engine does not say whether the ball sticks or slips"
         if "orientation" in asks and any(sample.q_WB is None for sample in samples):
             return "the engine does not give the ball's orientation"
         return None
@@ -228,24 +207,29 @@ class BallOnSurface:
         """See :class:`proofroll.core.element_abilities.WritesPrograms`."""
         return program(self.rolling, failed, engine)
 
-    def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
-        """See the protocol: rolling resistance, bounded friction and orientation."""
-        return optional_terms(self, parameters, truth)
+    def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:  # noqa: ARG002 -- the protocol's
+        """See the protocol: rolling resistance and orientation."""
+        return optional_terms(self, parameters)
 
 
-def rolls_evenly(surface: object, contact: Contact, start: InitialMotion) -> bool:
-    """True if a ball rolls on a plane or in a cylinder at rest, and never bounces."""
+def rolls_evenly(surface: object, contact: Contact, start: InitialMotion, gravity: FloatArray) -> bool:
+    """True if a ball rolls in a cylinder at rest whose axis is along gravity, and never slips or bounces."""
     rolls = not start.gap and start.tangential_spin is None and contact.restitution is None
-    return rolls and isinstance(surface, Plane | Cylinder) and not getattr(surface, "turning", 0.0)
+    rolls = rolls and math.isinf(contact.mu_static)
+    if not (rolls and isinstance(surface, Cylinder)):
+        return False
+    axis, pull = np.asarray(surface.generators[1].axis), float(np.linalg.norm(gravity))
+    return bool(np.linalg.norm(np.cross(gravity, axis)) <= _ROUND_OFF * pull)
 
 
 def rolling_ball(scene: Scene) -> RollingBall:
-    """Ball of a scene with one ball on one surface. Raises Refused if the scene has another element."""
+    """Ball of a scene with one ball in an upright cylinder. Raises Refused if the scene has another element."""
     (element,) = scene.elements if len(scene.elements) == 1 else (None,)
-    if not isinstance(element, BallOnSurface):
+    ball = element.rolling if isinstance(element, BallOnSurface) else None if element is None else ball_of(element)
+    if ball is None:
         what = ", ".join(item.name for item in scene.elements)
-        raise Refused(f"represents one ball on one surface, and the scene holds {what}")
-    return element.rolling
+        raise Refused(f"represents one ball in an upright cylinder, and the scene holds {what}")
+    return ball
 
 
 def scene_with(scene: Scene, **parts: Any) -> Scene:

@@ -33,9 +33,7 @@ def signs(stopped, p, v, w):
     energy = 0.5 * MASS * (v**2).sum(1) + 0.5 * INERTIA * (w**2).sum(1) - MASS * p @ np.array(GRAVITY)
     gain = float(np.max(energy - energy[0])) / KINETIC
     slip = np.linalg.norm([b + RADIUS * np.cross(c, frame(a)[0]) for a, b, c in zip(p, v, w)], axis=1)
-    # Where the ball should roll.
-    rolls = np.array(ROLLS or [True] * len(p), dtype=bool)[: len(p)]
-    slipped = float(np.sum((rolls[1:] & rolls[:-1]) * EVERY * (slip[1:] + slip[:-1]) / 2))
+    slipped = float(np.sum(EVERY * (slip[1:] + slip[:-1]) / 2))
     backwards = -float(np.min((v * HEADING[: len(p)]).sum(1))) if HEADING else 0.0
     print(f"off the wall by {gaps.min():.3g} to {gaps.max():.3g} m, allowed: {OFF:.3g} m to either side")
     print(f"energy grew by {100 * gain:.3g} % of the largest kinetic energy, allowed: {100 * GAIN:.3g} %")
@@ -50,7 +48,7 @@ def signs(stopped, p, v, w):
         "left the surface": gaps.max() > OFF or stopped,
         "sank in": gaps.min() < -OFF,
         "energy gain": gain > GAIN,
-        "creep": error > ALLOWED * RANGE and (ROLLS or slipped >= SLIPPED * ALLOWED * RANGE),
+        "creep": error > ALLOWED * RANGE and slipped >= SLIPPED * ALLOWED * RANGE,
         "reversed": backwards > BACKWARDS * np.linalg.norm(VELOCITY),
         "lost phase": error > ALLOWED * RANGE,
     }
@@ -80,7 +78,6 @@ def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
     true: list[float] = []
     if truth is not None:
         true = (truth[body.surface.coordinates[-1]].to_numpy() - body.u0[-1]).tolist()
-    rolls = [] if truth is None or "sticking" not in truth else [int(value) for value in truth["sticking"].to_numpy()]
     resists = truth is not None and body.contact.rolling_resistance > 0
     ways = np.round(heading(truth["v_WB"].to_numpy()), 4).tolist() if resists and truth is not None else []
     numbers = {
@@ -91,7 +88,6 @@ def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
         "BACKWARDS": BACKWARDS,
         "ALONG": list(generator.axis),
         "TRUE": true,
-        "ROLLS": rolls,
         "HEADING": ways,
     }
     return program_text.program(failed, "A ball rolls on a wall", part, numbers, _SIGNS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
 
 from pydantic import Field
 
@@ -16,21 +16,14 @@ from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, units_of, validated
 from proofroll.elements.ball_on_surface.element import BallOnSurface, rolls_evenly, scene_with
-from proofroll.elements.ball_on_surface.surfaces import (
-    Bowl,
-    Cone,
-    Declared,
-    Surface,
-    Torus,
-    surface_kinds,
-)
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, surface_kinds
 from proofroll.elements.mechanism.run.balls import BallTables, PlacedBall, ball_as_body, placed_balls
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 
 if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis
 
-    AnySurface = Surface
+    AnySurface = Any
 else:
     AnySurface = Union[surface_kinds()]  # noqa: UP007 -- of a tuple
 
@@ -58,15 +51,12 @@ class BallOnSurfaceKind:
         elements = list[Element]()
         for placed in _placed(tables, numbers, where):
             ball, surface, contact, start, _ = placed
-            if not rolls_evenly(surface, contact, start):
-                elements.append(ball_as_body(placed, gravity, where))
-                continue
-            try:
+            if rolls_evenly(surface, contact, start, gravity.vector):
                 elements.append(
                     BallOnSurface(ball=ball, surface=surface, contact=contact, start=start, gravity=gravity)
                 )
-            except InputError as error:
-                raise error.within(f"{where}: initial", ball.name) from None
+            else:
+                elements.append(ball_as_body(placed, gravity, where))
         return elements
 
     @staticmethod
@@ -75,24 +65,19 @@ class BallOnSurfaceKind:
         from proofroll.files.scene_file import load_scene
 
         cylinder = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
-        plane = {"tilt": 0.35, "speed": 0.8, "cross_speed": 0.5, "normal_spin": 12.0}
         return {
             "cylinder-resisting": load_scene("sphere_in_cylinder", **cylinder, rolling_resistance=5e-4),
             "cylinder": load_scene("sphere_in_cylinder", **cylinder),
-            "plane-resisting": load_scene("inclined_plane", **plane, rolling_resistance=5e-4),
-            "plane": load_scene("inclined_plane", **plane),
-            "cylinder-slipping": load_scene("sphere_in_cylinder", **cylinder, mu_static=0.35),
             "cylinder-oriented": load_scene("sphere_in_cylinder", **cylinder, asks=("orientation",)),
         }
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Scenes turned about the axis, tilted, spinning; slow, fast."""
+        """Scenes turned about the axis, spinning; slow, fast."""
         scenes = BallOnSurfaceKind.conformance_scenes()
         return {
-            "plane": scenes["plane"],
-            "slow": _with_tilt(scenes["cylinder-resisting"], -1.0, 0.05, velocity=(1.2, 0.2), spin=5.0),
-            "fast": _with_tilt(scenes["cylinder"], 2.0, -0.2, velocity=(4.5, -0.7)),
+            "slow": _moving(scenes["cylinder-resisting"], -1.0, velocity=(1.2, 0.2), spin=5.0),
+            "fast": _moving(scenes["cylinder"], 2.0, velocity=(4.5, -0.7)),
         }
 
     @staticmethod
@@ -103,12 +88,11 @@ class BallOnSurfaceKind:
         return HYPOTHESES
 
 
-def _with_tilt(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
-    """Copy of a scene that starts at the angle ``gamma``, with its cylinder's axis tilted by ``tilt``, both in rad."""
+def _moving(scene: Scene, gamma: float, **motion: Any) -> Scene:
+    """Copy of a scene that starts with this motion at the angle ``gamma`` [rad]."""
     (element,) = scene.elements
     assert isinstance(element, BallOnSurface)
-    start = dataclasses.replace(element.start, coordinates=(gamma, 0.1), **motion)
-    return scene_with(scene, start=start, surface=dataclasses.replace(cast(Any, element.surface), tilt=tilt))
+    return scene_with(scene, start=dataclasses.replace(element.start, coordinates=(gamma, 0.1), **motion))
 
 
 class BallsAsBodies(BallOnSurfaceKind):
@@ -128,7 +112,7 @@ def _placed(tables: Mapping[str, Any], numbers: Parameters, where: str) -> list[
     placed = list(placed_balls(contents, contents.surfaces, tables.get("initial", []), numbers, where))
     for ball, wall, contact, _, index in placed:
         try:
-            if not isinstance(wall, Bowl | Cone | Torus):  # whose room the pair of the body checks
+            if isinstance(wall, Cylinder):
                 wall.offset(ball.radius)
         except InputError as error:
             raise error.within(f"{where}: contacts.{index}", contact.body) from None

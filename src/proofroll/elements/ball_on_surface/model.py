@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, read_only
-from proofroll.elements.ball_on_surface.surfaces import Surface
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment
 from proofroll.elements.mechanism.scene.balls import Ball, Contact
 
@@ -19,15 +19,11 @@ class BallCapability(StrEnum):
     """Capability that a ball on a surface may need of a formulation; the value is a text for a person."""
 
     ROLLING = "rolling without slip"
-    CURVED_SURFACE = "a curved surface"
     ROLLING_RESISTANCE = "rolling resistance"
-    BOUNDED_FRICTION = "bounded friction (slip)"
     ORIENTATION = "the ball's orientation"
 
 
-ROLLS: frozenset[str] = frozenset(
-    {BallCapability.ROLLING, BallCapability.CURVED_SURFACE, BallCapability.ROLLING_RESISTANCE}
-)
+ROLLS: frozenset[str] = frozenset({BallCapability.ROLLING, BallCapability.ROLLING_RESISTANCE})
 ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability)
 
 
@@ -49,8 +45,8 @@ class RollingBall:
 
     ball: Ball
     contact: Contact
-    surface: Surface
-    wall: Surface
+    surface: Cylinder
+    wall: Cylinder
     gravity: FloatArray
     u0: FloatArray
     p0: FloatArray

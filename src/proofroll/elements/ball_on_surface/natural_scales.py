@@ -15,7 +15,6 @@ from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
     natural_acceleration,
-    resistance_undirected,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
 
@@ -77,10 +76,8 @@ def step_numbers(body: RollingBall, h: float, truth: xr.Dataset | None) -> tuple
     )
 
 
-def first_motion(body: RollingBall) -> FirstMotion | None:
-    """See :class:`proofroll.core.element.Element`; None for a ball at rest under rolling resistance."""
-    if resistance_undirected(body, body.v0):
-        return None
+def first_motion(body: RollingBall) -> FirstMotion:
+    """See :class:`proofroll.core.element.Element`."""
     speed = float(np.linalg.norm(body.v0)) or float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
     acceleration, turning = initial_response(body)[0], initial_angular_acceleration(body)
     lasts = _stops(body.v0, acceleration)

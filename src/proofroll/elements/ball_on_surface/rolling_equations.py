@@ -11,7 +11,6 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 
 
 def start(body: RollingBall) -> FloatArray:
@@ -64,36 +63,21 @@ def placed(body: RollingBall, states: FloatArray, v_WB: FloatArray) -> tuple[Flo
 
 
 def closed_form(body: RollingBall, times: FloatArray) -> BallMotion | None:
-    """Closed form of the motion; None with rolling resistance, or off a plane or vertical cylinder."""
+    """Closed form of the motion; None with rolling resistance."""
     if body.contact.rolling_resistance > 0:
         return None
-    if isinstance(body.surface, Plane):
-        return _plane(body, times)
-    if isinstance(body.surface, Cylinder) and not np.any(np.cross(body.gravity, body.surface.generators[1].axis)):
-        return _vertical_cylinder(body, body.surface, times)
-    return None
+    return _vertical_cylinder(body, times)
 
 
-def _plane(body: RollingBall, t: FloatArray) -> BallMotion:
-    """Uniform acceleration g_t / (1 + κ), κ = J/ma²: (5/7) g sin α for a homogeneous ball."""
-    frame = body.surface.frame(body.u0)
-    e1, tangents = frame[:, 0], frame[:, 1:]
-    acceleration = tangents @ (tangents.T @ body.gravity) / (1 + body.ball.inertia_ratio)
-    v = body.v0 + t[:, None] * acceleration
-    p = body.p0 + t[:, None] * body.v0 + 0.5 * t[:, None] ** 2 * acceleration
-    w = (body.w0 @ e1) * e1 - np.cross(e1, v) / body.ball.radius
-    force = np.broadcast_to(body.ball.mass * (acceleration - body.gravity), p.shape)
-    return BallMotion(p_WB=p, v_WB=v, w_WB=w, force=force, route="closed form (uniform acceleration)")
-
-
-def _vertical_cylinder(body: RollingBall, surface: Cylinder, t: FloatArray) -> BallMotion:
+def _vertical_cylinder(body: RollingBall, t: FloatArray) -> BallMotion:
     """γ̇ = Ω; z oscillates with ν = √(κ/(1+κ)) Ω, κ = J/ma² (Blajer 2006; ν = √(2/7) Ω for a homogeneous ball).
 
     Its only error is round-off of the phases, 4 ε νt of the amplitude of z and 4 ε Ωt of the radius of the path: 1e-8
     after a million oscillations.
     """
+    surface = body.surface
     a, m, c, kappa = body.ball.radius, body.ball.mass, surface.radius, body.ball.inertia_ratio
-    axis = np.asarray(surface.generators[1].axis)
+    axis = np.asarray(surface.axis)
     gravity = float(body.gravity @ axis)
     gamma0, z0 = body.u0
     omega, z_rate0 = body.udot0

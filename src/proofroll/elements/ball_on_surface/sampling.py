@@ -16,13 +16,11 @@ class BallSample(Sample):
     Attributes:
         force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,). None only at time 0,
             from engines that define reactions only after a first step.
-        sticking: True if static friction holds the contact; given only where friction is bounded.
     """
 
     widths: ClassVar[Mapping[str, int]] = {**Sample.widths, "force": 3}
 
     force: FloatArray | None = None
-    sticking: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -35,12 +33,11 @@ class BallBuilt:
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
         ball_radius: [m].
         rolling_resistance: f [m]; 0 if none was built. None counts as missing where the scene's f > 0.
-        mu_static, mu_kinetic: coefficients of friction [1]; inf where friction has no bound. None counts as missing
-            where friction is bounded.
+        mu_static, mu_kinetic: coefficients of friction that stand for unbounded friction [1]; None: none does.
         gap: distance of the ball from the engine's own wall at time 0 [m].
         acceleration: of the ball's centre at time 0 [m/s²], shape (3,).
         angular_acceleration: of the ball at time 0 in the world [rad/s²], shape (3,).
-        terms: optional terms in the built model: rolling resistance, bounded friction, orientation.
+        terms: optional terms in the built model: rolling resistance, orientation.
         regularised: names of certificate quantities (``gap``, ``slip``, ``spin``, ``acceleration``, ``N``, ``F2``, …)
             that the model softens, with tolerance and reason, up to the caps of :data:`certificate.CAPS`: mass,
             inertia, gravity, radius and position along the wall are never soft. Tolerances of acceleration, N, F2 and
@@ -62,10 +59,10 @@ class BallBuilt:
     regularised: Mapping[str, Regularised] = field(default_factory=dict)
 
 
-def terms_held(*, resists: object, slips: object = False, turns: object = False) -> frozenset[str]:
+def terms_held(*, resists: object, turns: object = False) -> frozenset[str]:
     """Optional terms of a model, for :attr:`BallBuilt.terms`: truth values of the arguments as capabilities.
 
-    ``resists``: rolling resistance; ``slips``: bounded friction; ``turns``: orientation of the ball.
+    ``resists``: rolling resistance; ``turns``: orientation of the ball.
     """
-    required = {"ROLLING_RESISTANCE": resists, "BOUNDED_FRICTION": slips, "ORIENTATION": turns}
+    required = {"ROLLING_RESISTANCE": resists, "ORIENTATION": turns}
     return frozenset(BallCapability[name] for name, is_there in required.items() if is_there)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
 from proofroll.engines.exudyn.native import ExudynError, exu, new_settings
 from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
@@ -26,7 +25,7 @@ def new_system() -> tuple[Any, Any]:
 class ExudynModel:
     """Run of a formulation in its own Exudyn system; see :class:`proofroll.core.engine.Engine` for the methods."""
 
-    integration: Any  # an Integration or a SwitchedIntegration
+    integration: Integration
 
     def __init__(self) -> None:
         self.container, self.system = new_system()
@@ -34,14 +33,6 @@ class ExudynModel:
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
         self.integration.advance(t)
-
-
-class BallRun(ExudynModel):
-    """Run of a ball, whose integration locates stick, slip and lift-off."""
-
-    def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return list(self.integration.events)
 
 
 def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, mass: float = 1.0) -> Any:
@@ -82,7 +73,6 @@ class Integration:
     Attributes:
         t: present time [s].
         complaint: reason for which a user function of the system ended the run.
-        events: stick, slip and lift-off found so far by the system's user functions.
     """
 
     def __init__(
@@ -109,7 +99,6 @@ class Integration:
             system, settings, at=t, dependent=dependent, mass=mass, moved=moved
         )
         self.complaint: str | None = None
-        self.events: list[Event] = []
         self.dt = settings.dt
         self.system = system
         self.options = simulation_settings(settings, dependent=dependent, mass=mass)

@@ -37,7 +37,6 @@ class Mujoco:
     }
     made_for: ClassVar[Mapping[str, frozenset[str]]] = {"geoms": frozenset({MechanismCapability.CONTACT})}
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        **ball.LACKING,
         "joints": mechanism.LACKING,
         "geoms": mechanism_geoms.LACKING,
     }

@@ -38,15 +38,14 @@ POSITIONS_TIME_CONSTANT = 2.25
 UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
 # Settings of a contact; the formulation ``joints`` has none of them.
-_OF_CONTACT = ("cone", "friction", "friction_damping", "start", "curvature", "cone_correction", "condim")
-# Settings of joints; formulations of mechanisms, and those of the settings above that each has.
+_OF_CONTACT = ("cone", "friction", "friction_damping", "start", "curvature", "condim")
+# Settings of mechanisms alone; formulations of mechanisms, and those of the settings above that each has.
 _OF_JOINTS = ("damping_armature",)
+_OF_GEOMS = ("cone_correction",)
 OF_MECHANISMS: Mapping[str, tuple[str, ...]] = {
     "joints": _OF_JOINTS,
-    "geoms": (*_OF_JOINTS, "cone", "cone_correction", "curvature"),
+    "geoms": (*_OF_JOINTS, *_OF_GEOMS, "cone", "curvature"),
 }
-# Preload of a corrected contact as a part of the normal force, so that the next slip does not end the contact.
-PRELOAD = 0.01
 
 
 def _digits_as_number(value: object) -> object:
@@ -73,7 +72,6 @@ class MujocoSettings:
         impedance: constant constraint impedance (``solimp``); 1 would be a rigid contact; None: MuJoCo's default,
             0.9 to 0.95 growing with depth.
         friction: coefficient that stands for unbounded friction [1]; with less than the scene needs, the ball slips.
-            Where the scene bounds friction, its coefficients are taken instead.
         friction_damping: of the slip, in units of 1/dt (``solreffriction`` of a contact pair in its direct format);
             None: as in the normal direction. An Euler step moves the ball with the velocity at its end, along the wall
             at its beginning, which makes it creep; at a damping of 2/dt, the limit of stability, that creep cancels the
@@ -82,8 +80,8 @@ class MujocoSettings:
             the contact already bends the path as the wall does.
         curvature: True if the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
             out (``free``, and ``geoms`` on curved walls).
-        cone_correction: True if the adapter takes from the contact's reference acceleration, while the ball slips,
-            the lift that MuJoCo's convex cone gives it; in ``geoms`` the lift by the missing J̇v too.
+        cone_correction: True if the adapter takes from the contacts' reference accelerations the lift that MuJoCo's
+            convex cone gives to what slips, and the lift by the missing J̇v (``geoms``).
         condim: dimensions of the contact's friction: 3 slides; 4 also resists turning about the normal, 6 also rolling,
             with MuJoCo's documented coefficients. No scene asks for either; they are there to be compared.
         damping_armature: True if each joint has the armature h (c + kd) of its damper and servos in place of MuJoCo's
@@ -114,7 +112,7 @@ class MujocoSettings:
     def unused(self) -> tuple[str, ...]:
         """See :class:`proofroll.core.engine.Settings`."""
         fields_of = OF_MECHANISMS.get(self.formulation, _OF_CONTACT)
-        return tuple(name for name in (*_OF_CONTACT, *_OF_JOINTS) if name not in fields_of)
+        return tuple(name for name in (*_OF_CONTACT, *_OF_JOINTS, *_OF_GEOMS) if name not in fields_of)
 
     @property
     def order(self) -> int | None:
@@ -199,28 +197,23 @@ _FIRST_ORDER = tuple(
 def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     """See :class:`proofroll.core.engine_abilities.LowersOrder`; measured.
 
-    Soft constraints (every loop, dry friction) leave velocities of first order. So does a switch between sticking and
-    slipping, which may happen anywhere in a step. The torque of rolling resistance uses a normal force that is
-    extrapolated linearly in time.
+    Soft constraints (every loop, dry friction) leave velocities of first order. The torque of rolling resistance uses a
+    normal force that is extrapolated linearly in time.
     """
     if settings.formulation not in OF_MECHANISMS:
-        return {BallCapability.ROLLING_RESISTANCE: 2, BallCapability.BOUNDED_FRICTION: 1}
+        return {BallCapability.ROLLING_RESISTANCE: 2}
     turning: dict[str, int] = dict.fromkeys((MechanismCapability.SPHERICAL, MechanismCapability.FREE), ORDER_OF_TURNING)
     return turning | dict.fromkeys((*ALL_LOOPS, *_FIRST_ORDER), 1)
 
 
-def check(settings: MujocoSettings, *, bounded: bool) -> None:
+def check(settings: MujocoSettings) -> None:
     """Rejects combinations that MuJoCo would silently ignore or misread.
-
-    Args:
-        settings: to check.
-        bounded: True if the scene gives the coefficients of friction.
 
     Raises:
         InputError: the first such combination.
     """
     of_mechanism = settings.formulation in OF_MECHANISMS
-    rules = _rules_of_mechanism(settings) if of_mechanism else _rules_of_contact(settings, bounded)
+    rules = _rules_of_mechanism(settings) if of_mechanism else _rules_of_contact(settings)
     refuse_first("mujoco", settings, rules)
     if settings.own_share >= 1:
         # MuJoCo's damping would supply all of J̇v or more of it: nothing is left to add.
@@ -243,17 +236,14 @@ def _rules_of_mechanism(settings: MujocoSettings) -> Iterator[tuple[bool, str, s
     yield from _rules_of_curvature(settings)
 
 
-def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple[bool, str, str]]:
-    formulation, curvature, corrects = settings.formulation, settings.curvature, settings.cone_correction
-    is_free, is_euler = formulation == "free", settings.integrator == "Euler"
+def _rules_of_contact(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
+    formulation, curvature, is_free = settings.formulation, settings.curvature, settings.formulation == "free"
     pyramidal, unused = settings.cone == "pyramidal", f"{formulation} does not use it; set formulation=free"
-    soft = pyramidal and not bounded and settings.friction > LARGEST_PYRAMIDAL_FRICTION
+    soft = pyramidal and settings.friction > LARGEST_PYRAMIDAL_FRICTION
     advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
     yield soft, "friction", advice
-    yield corrects and formulation == "facets", "cone_correction", f"{unused} or chart"
+    yield settings.cone_correction, "cone_correction", "a ball that rolls does not slip; leave it out"
     yield settings.damping_armature, "damping_armature", "a ball has no joints with dampers; leave it out"
-    # mj_step1 and mj_step2, between which the contact is edited, always make an Euler step.
-    yield corrects and is_free and not is_euler, "integrator", "cone_correction=true needs integrator=Euler"
     if settings.friction_damping is not None:
         # MuJoCo asks no contact filter about a pair, so the chart's plane would stay; facets has a pair for each box.
         yield not is_free, "friction_damping", unused
@@ -262,10 +252,7 @@ def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple
         # The part of J̇v that the adapter adds is computed with the damping of the normal direction.
         yield curvature, "friction_damping", "curvature=true sets this for the slip; leave it out"
     if settings.condim > SLIDES:
-        # Sliding, turning and rolling share one cone: the bound of sliding depends on how the ball turns and rolls.
-        yield bounded, "condim", "with bounded friction stick and slip could not be distinguished; set condim=3"
         yield curvature, "condim", "curvature=true is made for sliding alone; set condim=3"
-        yield corrects, "condim", "cone_correction=true is made for sliding alone; set condim=3"
     yield curvature and not is_free, "curvature", unused
     yield from _rules_of_curvature(settings)
 
@@ -305,10 +292,8 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
     "chart": {
         # Coordinates and integrator belong to the formulation; only the contact has MuJoCo's defaults.
         "default": replace(_obvious("chart"), integrator="RK4"),
-        # In these coordinates J̇v vanishes, so documented options are also the best known ones while the ball rolls.
+        # In these coordinates J̇v vanishes, so documented options are also the best known ones.
         "matched": MujocoSettings("chart", "matched"),
-        # Only slip needs a correction.
-        "tuned": MujocoSettings("chart", "tuned", cone_correction=True),
     },
     "free": {
         "default": _obvious("free"),
@@ -318,7 +303,7 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
         # too but for contact pairs alone, reduces the creep; it is an option, not part of this preset.
         "matched": MujocoSettings("free", "matched", integrator="Euler"),
         # J̇v is put where MuJoCo would have computed it: an edit of mjData.efc_aref that its manual does not describe.
-        "tuned": MujocoSettings("free", "tuned", integrator="Euler", curvature=True, cone_correction=True),
+        "tuned": MujocoSettings("free", "tuned", integrator="Euler", curvature=True),
     },
     # Better options do not rescue it, since each edge between two boxes is a kick: 0.3 m off instead of 1.2 m in 2 s,
     # whatever the step. It shows what the obvious wall costs.
@@ -393,12 +378,5 @@ TERMS = (
         on={"friction_damping": 1.9},
         off={"friction_damping": None},
         because="lets the creep of the step cancel that of the missing J̇v",
-    ),
-    Term(
-        name="correction of the cone",
-        formulations=("chart", "free"),
-        on={"cone_correction": True},
-        off={"cone_correction": False},
-        because="takes away the lift that MuJoCo's convex cone gives a slipping ball",
     ),
 )

@@ -33,9 +33,9 @@ class PinocchioSettings:
     """Settings of the Pinocchio adapter.
 
     Attributes:
-        formulation: ``composite`` (joints along the surface's generators, so the ball cannot leave it, and two rows
-            of rolling), ``free_flyer`` (six freedoms, one row for the surface and two of rolling) or ``contact`` (a
-            free ball against a plane posed anew in each step, by Pinocchio's solver of contact with friction); of
+        formulation: ``composite`` (joints about and along the cylinder's axis, so the ball cannot leave it, and two
+            rows of rolling), ``free_flyer`` (six freedoms, one row for the surface and two of rolling) or ``contact``
+            (a free ball against a plane posed anew in each step, by Pinocchio's solver of contact with friction); of
             mechanisms: ``null_space`` (joint tree, loops by projection on the null space of their rows),
             ``constraint_dynamics`` (loops as Pinocchio's own rigid constraints) or ``impulses`` (a tree whose bodies
             touch, by Pinocchio's solver of contact with friction).

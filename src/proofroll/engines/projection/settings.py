@@ -26,7 +26,7 @@ class ProjectionSettings:
             ``dependent``, the coordinates of the bodies, cut apart.
         preset: source of the other values.
         integrator: ``rk4`` with the fixed step ``dt``, ``dop853`` with the tolerance ``rtol``, or ``taylor`` with it:
-            the same equations in compiled Taylor series (heyoka), on a cylinder or plane, without bounded friction.
+            the same equations in compiled Taylor series (heyoka), of a ball.
         dt: step of rk4 [s].
         rtol: relative tolerance of dop853 and of taylor [1].
         elimination: remove the violation of the rolling constraints after each step (taylor: after every few); None

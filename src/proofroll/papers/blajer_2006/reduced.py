@@ -16,7 +16,7 @@ from proofroll.core.errors import Diverged, Refused, refuse_first
 from proofroll.core.heyoka_library import TIGHTEST, require_heyoka, with_heyoka
 from proofroll.core.integrators import DormandPrince853
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.compiled.rolling import parameters, reduced, supports
+from proofroll.elements.ball_on_surface.compiled.rolling import parameters, reduced
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -92,18 +92,12 @@ class ClosedFormModel(ReducedModel):
         if body.contact.rolling_resistance > 0:
             raise Refused("there is no closed form with rolling resistance; take formulation=equations")
         super().__init__(body)
-        motion = closed_form(body, np.zeros(1))
-        if motion is None:
-            raise Refused(
-                "closed forms are known on a plane and in a cylinder along whose axis gravity points, not here; "
-                "take formulation=equations"
-            )
-        self._motion = motion
+        self.advance(0.0)
 
     @override
     def advance(self, t: float) -> None:
         motion = closed_form(self._body, np.array([t]))
-        assert motion is not None  # whether there is one does not depend on time
+        assert motion is not None  # without resistance
         self._motion = motion
 
     @override
@@ -157,11 +151,9 @@ class Integrated(ReducedModel):
 
 
 class Compiled(ReducedModel):
-    """Reduced equations on a cylinder or plane, by compiled Taylor series. Raises Refused on other surfaces."""
+    """Reduced equations by compiled Taylor series."""
 
     def __init__(self, body: RollingBall, rtol: float) -> None:
-        if not supports(body):
-            raise Refused("integrator=taylor has equations of cylinders and planes only; take integrator=dop853")
         require_heyoka("integrator=taylor")
         super().__init__(body)
         self._pars = parameters(body)
@@ -283,11 +275,7 @@ class Reduced:
     presets: ClassVar[Mapping[str, Mapping[str, ReducedSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {"equations": Level.REDUCED, "closed_form": Level.CLOSED_FORM}
     shares: ClassVar[Mapping[str, Sequence[str]]] = {
-        "equations": (
-            "reduced equations",
-            "surface coordinates with direction of slip",
-            "local frame with direction of slip",
-        ),
+        "equations": ("reduced equations",),
         "closed_form": ("closed form",),
     }
     terms: ClassVar[Sequence[Term]] = ()  # a minimal model has no optional terms

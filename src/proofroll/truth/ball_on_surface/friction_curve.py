@@ -14,7 +14,7 @@ from numpy.polynomial import chebyshev
 from proofroll.core.arrays import FloatArray
 from proofroll.core.event_location import first_rise
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.truth.ball_on_surface.stick_slip import first_route
+from proofroll.truth.ball_on_surface.polar import first_route
 
 _UNREACHABLE = 1e6  # a static friction that stands for rolling without slip; its square is still finite
 _POINTS = 12

@@ -6,8 +6,6 @@ from typing import Literal
 import numpy as np
 
 from proofroll.core.errors import InputError
-from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth.ball_on_surface.friction_curve import FrictionCurve, friction_curve
 
@@ -42,13 +40,12 @@ class Onset:
     latest: float | None
 
 
-def first_slip(scene: Scene, until: float) -> float | None:
+def first_slip(body: RollingBall, until: float) -> float | None:
     """Time of the ball's first slip [s]; None: not until ``until`` [s]."""
-    body = rolling_ball(scene)
     return friction_curve(body, until).onset(body.contact.mu_static)
 
 
-def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
+def onset(body: RollingBall, until: float, uncertainty: float = 1e-3) -> Onset:
     """First slip until ``until`` [s], and its conditioning for this relative uncertainty of μ and f [1].
 
     Raises:
@@ -56,7 +53,6 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
     """
     if not 0 <= uncertainty < 1:
         raise InputError("uncertainty", uncertainty, "give a relative uncertainty of mu and f between 0 and 1")
-    body = rolling_ball(scene)
     mu = body.contact.mu_static
     curve = friction_curve(body, until)
     time = curve.onset(mu)
@@ -87,7 +83,7 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
     )
 
 
-def edge_between(scene: Scene, low: float, high: float, until: float, digits: int = 6) -> float | None:
+def edge_between(body: RollingBall, low: float, high: float, until: float, digits: int = 6) -> float | None:
     """Value of μ between ``low`` and ``high`` at which the time of the first slip jumps, by bisection [1].
 
     Bisection asks on which rise of the needed friction the slip starts, so the answer does not depend on the size of
@@ -96,7 +92,7 @@ def edge_between(scene: Scene, low: float, high: float, until: float, digits: in
     Returns:
         None where both ends slip on the same rise.
     """
-    curve = friction_curve(rolling_ball(scene), until)
+    curve = friction_curve(body, until)
     lower, upper = _stair(curve, low)[1], _stair(curve, high)[1]
     if lower == upper:
         return None

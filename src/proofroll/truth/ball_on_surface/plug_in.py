@@ -1,116 +1,117 @@
-"""Truth of a ball on a surface: choice of its two routes, and its error bars."""
+"""Truth of a ball that rolls in an upright cylinder, by two routes of its own or as the body that stands for it."""
 
 from __future__ import annotations
 
-import dataclasses
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import ENDS
 from proofroll.core.element import Element
-from proofroll.core.errors import Diverged, InputError
-from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import always_pressed
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.core.errors import Diverged
+from proofroll.elements.ball_on_surface.dataset import columns
+from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
-from proofroll.truth.ball_on_surface import rolling, unreduced_taylor
-from proofroll.truth.ball_on_surface.error_bars import ROUND_OFF, dataset_of, put_error_bars
-from proofroll.truth.ball_on_surface.onset import edge_between, onset
-from proofroll.truth.ball_on_surface.orientation import MATRICES, QUATERNIONS
-from proofroll.truth.ball_on_surface.stick_slip import stays_on, stick_slip
+from proofroll.elements.mechanism.run.balls import PlacedBall, ball_as_body
+from proofroll.truth import SAFETY
+from proofroll.truth.ball_on_surface.rolling import reduced, unreduced
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_ILL_POSED = "a change of the parameters within their accuracy changes the time of the first slip"
+_AS_BODY: tuple[str, ...] = (
+    "p_WB",
+    "v_WB",
+    "w_WB",
+    "q_WB",
+    "attitude",
+    "omega1",
+    "omega2",
+    "omega3",
+    "slip2",
+    "slip3",
+    "slip",
+    "gap",
+)
+_AS_BODY += ("energy", "N", "F2", "F3", "needed_friction")
+# Relative round-off of a route: values may be wrong by a few machine epsilons even where the routes agree; and the
+# error that two integrations may share, which stop refining at 1e-13 a step.
+_ROUND_OFF, _SHARED = 4 * float(np.finfo(float).eps), 1e-12
+# Variables that are small differences of large variables, with the large one.
+_DIFFERENCE_OF = {"gap": "p_WB", "slip": "v_WB", "slip2": "v_WB", "slip3": "v_WB"}
+# Below this many of its own error bars the normal force is zero, and the needed friction 0/0.
+_NOTHING = 10.0
 
 
 class BallOnSurfaceTruth:
-    """See :class:`proofroll.core.truth.ElementTruth`, :class:`proofroll.core.truth.FindsEdges`."""
+    """See :class:`proofroll.core.truth.ElementTruth`."""
 
     @staticmethod
     def covers(element: Element) -> bool:
-        """True for every ball on a surface."""
+        """True for every ball in an upright cylinder."""
         return isinstance(element, BallOnSurface)
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
-        """Dataset of :func:`truth`; with bounded friction also the conditioning of the first slip."""
-        scene = Scene(element.name, "", (element,), asks=tuple(asks))
-        try:
-            # Non-finite values are refused by name below; a warning would add nothing.
-            with np.errstate(invalid="ignore", divide="ignore"):
-                result = truth(scene, times)
-        except ZeroDivisionError:
-            message = "the ball comes to a point where its wall has no curvature, as at the apex of a cone"
-            raise Diverged(f"{message}; start further off") from None
-        if "sticking" in result:
-            first = onset(scene, min(float(times[-1]), float(result.attrs.get(ENDS, np.inf))))
-            result.attrs["onset"] = json.dumps(dataclasses.asdict(first))
-            if first.verdict == "ill-posed":
-                # A disagreement of the routes is recorded there already, with its time.
-                result.attrs.setdefault("ill_posed", _ILL_POSED)
-        return result
+        """Motion of the ball and force of the wall on it, with error bars; as a body if the orientation is asked for.
 
-    @staticmethod
-    def edge_between(element: Element, parameter: str, low: float, high: float, until: float) -> float | None:
-        """Value of static friction at which the time of the first slip jumps, see :func:`.onset`; None: there is none.
+        Without the orientation the motion does not turn with the ball, however small and fast that is. The first
+        route is the closed form, or with rolling resistance the reduced equations; the second is Newton-Euler in the
+        world, derived and integrated independently.
 
         Raises:
-            InputError: ``parameter`` is not ``mu_static``.
+            Diverged: a route could not be integrated, or a value is not finite.
         """
-        if parameter != "mu_static":
-            raise InputError(parameter, "edge_between", "an edge can be found only for mu_static")
-        return edge_between(Scene(element.name, "", (element,)), low, high, until)
+        assert isinstance(element, BallOnSurface)  # by ``covers``
+        if "orientation" in asks:
+            return _as_body(element, times, asks)
+        body, instants = element.rolling, np.asarray(times, dtype=np.float64)
+        with np.errstate(invalid="ignore", divide="ignore"):  # values that are not finite are refused by name below
+            exact = closed_form(body, instants)
+            first, second = exact or reduced(body, instants), unreduced(body, instants)
+            result, check = (_dataset(body, instants, route) for route in (first, second))
+        _put_error_bars(result, check, _ROUND_OFF if exact else _SHARED)
+        return result.assign_attrs(route=first.route, second_route=second.route)
 
 
-def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
-    """True trajectory at rising times [s]; each variable has the attribute ``error_bar`` in its own unit.
+def _dataset(body: RollingBall, times: FloatArray, solved: BallMotion) -> xr.Dataset:
+    return columns(body, times, solved.p_WB, solved.v_WB, solved.w_WB, force=solved.force).dataset()
 
-    The first route is the closed form if one is known, else the reduced equations. The second is the unreduced
-    Newton-Euler system, derived and integrated independently (by Taylor series if heyoka is installed: ten thousand
-    oscillations in a second). The error bar of a variable is the largest difference between the routes plus round-off,
-    times a factor of safety. If the scene asks for the orientation, each route gives it by a quadrature of its own.
 
-    With bounded friction or rolling resistance, or if the ball leaves the wall, the routes are those of
-    :mod:`truth.stick_slip`. The dataset then has the events (:func:`events.events_of`), and with bounded friction
-    ``sticking``.
+def _put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
+    """Gives each variable of ``result`` the attribute ``error_bar`` in its own unit.
+
+    It is ``SAFETY`` times the sum of the largest difference to ``check``, the second route, and ``floor`` times the
+    size of the variable: the relative error that both routes may share [1].
 
     Raises:
-        Diverged: a route could not be integrated, or a value is not finite.
-        Refused: no motion is known from time 0 on.
+        Diverged: a value is not finite, except needed friction at zero normal force.
     """
-    body, bounded = rolling_ball(scene), BallCapability.BOUNDED_FRICTION in scene.requires
-    times = np.asarray(times, dtype=np.float64)
-    by_series = unreduced_taylor.available(body)
-    # Within a step DOP853 is less accurate than at its ends, and an orientation needs the spin within steps. It also
-    # takes some ten times as long as the series.
-    stepped = not by_series or BallCapability.ORIENTATION in scene.requires
-    stepped = stepped and closed_form(body, times[:1]) is None
-    if bounded or stepped or not (always_pressed(body) or stays_on(body, float(times[-1]))):
-        result, _ = stick_slip(scene, times)
-        return result if bounded else result.drop_vars("sticking")
+    for name, values in result.data_vars.items():
+        mine, second = values.to_numpy(), check[name].to_numpy()
+        if name == "needed_friction":  # N is earlier in data_vars, so it has its error bar
+            pressed = np.minimum(*(np.abs(x["N"].to_numpy()) for x in (result, check)))
+            on_wall = pressed > _NOTHING * result["N"].attrs["error_bar"]
+            mine, second = mine[on_wall], second[on_wall]
+        if not (np.all(np.isfinite(mine)) and np.all(np.isfinite(second))):
+            raise Diverged(f"the truth is not finite (NaN or overflow) in {name}; take less extreme parameters")
+        difference = np.max(np.abs(mine - second), initial=0.0)
+        if name in _DIFFERENCE_OF:  # plus the round-off of the large variable
+            difference += _ROUND_OFF * np.max(np.abs(result[_DIFFERENCE_OF[name]].to_numpy()), initial=0.0)
+        values.attrs["error_bar"] = float(SAFETY * (difference + floor * np.max(np.abs(mine), initial=0.0)))
 
-    def first(instants: FloatArray) -> BallMotion:
-        return closed_form(body, instants) or rolling.reduced(body, instants)
 
-    def second(instants: FloatArray) -> BallMotion:
-        return unreduced_taylor.unreduced(body, instants) if by_series else rolling.unreduced(body, instants)
+def _as_body(element: BallOnSurface, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
+    """Motion of the body that stands for the ball, under the ball's names."""
+    from proofroll.truth.plug_in import MechanismTruth
 
-    def second_spin(instants: FloatArray) -> FloatArray:  # computing forces would take longer than the whole series
-        return unreduced_taylor.states(body, instants)[:, 6:] if by_series else second(instants).w_WB
-
-    def from_start(spin: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
-        return lambda instants: spin(instants) if instants[0] == 0 else spin(np.append(0.0, instants))[1:]
-
-    result = dataset_of(scene, times, first(times), from_start(lambda instants: first(instants).w_WB), (), QUATERNIONS)
-    check = dataset_of(scene, times, second(times), from_start(second_spin), (), MATRICES)
-    put_error_bars(result, check, ROUND_OFF)
-    result.attrs["second_route"] = check.attrs["route"]
-    return result
+    placed = PlacedBall(
+        ball=element.ball, surface=element.surface, contact=element.contact, start=element.start, number=0
+    )
+    motion = MechanismTruth.truth(ball_as_body(placed, element.gravity, "scene"), times, asks)
+    coordinates = element.surface.coordinates
+    names = [*coordinates, *(f"{name}_rate" for name in coordinates), *_AS_BODY]
+    return motion[[name for name in names if name in motion]].isel(body=0, drop=True)

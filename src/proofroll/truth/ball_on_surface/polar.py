@@ -1,4 +1,4 @@
-"""Stick and slip in surface coordinates, with magnitude and direction of the slip: first route on any surface.
+"""Stick and slip in surface coordinates, with magnitude and direction of the slip: the route without heyoka.
 
 With A = (1 + κ)/(κ m) and the friction F* that sticking would need, the slip velocity u obeys u̇ = A (F - F*) for any
 friction F. In polar form u = |u| (cos φ e2 + sin φ e3), F = -μk N (cos φ, sin φ) and b = -A F*,
@@ -13,17 +13,24 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
+from proofroll.core import heyoka_library as library
 from proofroll.core.arrays import FloatArray
 from proofroll.core.event_location import locate_rise
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
 from proofroll.truth.ball_on_surface.explicit import ExplicitRun, Rates
-from proofroll.truth.ball_on_surface.route import End, about_to_stop
+from proofroll.truth.ball_on_surface.route import End, Route
 from proofroll.truth.ball_on_surface.sliding import Sliding
+from proofroll.truth.ball_on_surface.taylor import SlidingTaylor
+from proofroll.truth.ball_on_surface.taylor_model import HALT
 
 _Stop = tuple[End, Callable[[FloatArray], float]]
-_APPROACH = 0.6  # fraction of the time left until the centre stops that one step may take
+
+
+def first_route(body: RollingBall) -> Route:
+    """Route of the article's figures: Taylor series if heyoka is installed, else DOP853."""
+    return SlidingTaylor(body) if library.available() else Polar(body)
 
 
 class Polar(Sliding):
@@ -65,25 +72,11 @@ class Polar(Sliding):
     def rates(self, state: FloatArray) -> FloatArray:
         return reduced_rates(self._body, state)[0]
 
-    @override
-    def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
-        udot = np.linalg.pinv(self._body.surface.tangents(state[:2])) @ v_WB
-        return np.concatenate([state[:2], udot, state[4:]])
-
     def _stick(self, time: float, state: FloatArray, until: float) -> ExplicitRun:
-        resisted = self._body.contact.rolling_resistance > 0
-
         def ended(solver: Any) -> tuple[float, FloatArray, End] | None:
-            if stopped := self._ended(solver):
-                return stopped
-            left = self._until_halt(solver.y) if resisted else np.inf
-            if not (about_to_stop(left, self._pace, solver.t) and solver.t < until):
-                return None
-            halted = solver.y + left * self.rates(solver.y)
-            return solver.t + left, self.nudged(halted, np.zeros(3)), End.HALT
+            return _first(solver, [(End.CONE, self._missing)])
 
-        cap = (lambda y: _APPROACH * self._until_halt(y)) if resisted else None
-        return ExplicitRun(self.rates, time, state, until, atol=self._atol[:5], ended=ended, cap=cap)
+        return ExplicitRun(self.rates, time, state, until, atol=self._atol[:5], ended=ended)
 
     def _grown(self, time: float, state: FloatArray, until: float) -> float:
         strength, change = self._pull(state)
@@ -104,9 +97,9 @@ class Polar(Sliding):
 
     def _slide(self, start_state: FloatArray, floor: float, until: float) -> ExplicitRun:
         stops: tuple[_Stop, ...] = (
-            (End.LIFTOFF, lambda y: -self._drive(y)[1]),
             (End.TIME, lambda y: y[7] - until),
             (End.STILL, lambda y: floor - y[5]),
+            *([(End.HALT, self._halting)] if self._body.contact.rolling_resistance else []),
         )
 
         def ended(solver: Any) -> tuple[float, FloatArray, End] | None:
@@ -114,6 +107,12 @@ class Polar(Sliding):
             return _first(solver, [(end, g) for end, g in stops if g(solver.y) > 0])
 
         return ExplicitRun(self._slipping, 0.0, start_state, np.inf, atol=self._atol, ended=ended)
+
+    def _halting(self, y: FloatArray) -> float:
+        """Rises through zero where a ball that slips all but stops rolling [m²/s²]."""
+        v = self._body.surface.frame(y[:2]).T[1:] @ (self._body.surface.tangents(y[:2]) @ y[2:4])
+        rolling = v - np.exp(y[5]) * np.array([np.cos(y[6]), np.sin(y[6])])
+        return float(HALT**2 * (v @ v) - rolling @ rolling)
 
     def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
         """Drive b along e2, e3 [m/s²], shape (2,), and normal force N [N]."""
@@ -155,10 +154,13 @@ class Polar(Sliding):
         turn2, turn3 = (-(frame[:, 0] @ bending) @ inverse).tolist()  # ė1 along e2, e3
         g1, g2, g3 = (frame.T @ body.gravity).tolist()
         N = m * (turn2 * v2 + turn3 * v3 + g1)
-        spin, speed, grip = a * float(y[4]), math.hypot(v2, v3), self._mu_k * N / m
-        ahead = f * N / (kappa * m * a * speed) if f and speed > 0 else 0.0
-        b = np.array([g2 - spin * turn3 + ahead * v2, g3 + spin * turn2 + ahead * v3])  # e1 × (x, y) = (-y, x)
+        spin = a * float(y[4])
         c, s = math.cos(phi), math.sin(phi)
+        rolling2, rolling3 = v2 - size * c, v3 - size * s
+        speed, grip = math.hypot(rolling2, rolling3), self._mu_k * N / m
+        ahead = f * N / (kappa * m * a * speed) if f and speed > 0 else 0.0
+        # e1 × (x, y) = (-y, x)
+        b = np.array([g2 - spin * turn3 + ahead * rolling2, g3 + spin * turn2 + ahead * rolling3])
         u_second = inverse @ (np.array([g2 - grip * c, g3 - grip * s]) - across @ (bending @ y[2:4]))
         w2, w3 = (v3 - size * s) / a, (size * c - v2) / a  # e1 × (u - v) / a
         rates = np.array([du2, du3, *u_second.tolist(), w2 * turn2 + w3 * turn3])
@@ -178,35 +180,25 @@ class Polar(Sliding):
         return np.array([self._following(y)[1] for y in states])
 
     def _following(self, y: FloatArray) -> tuple[FloatArray, float]:
-        """Rates of (u, u̇, ω1, |u|) and φ of the slaved slip, where φ - φ_b = -|u| φ̇_b / (|b| + d|u|/dt)."""
+        """Rates of (u, u̇, ω1, |u|) and φ of the slaved slip, where φ - φ_b = -(|u| φ̇_b - b'·n) / (|b| + d|u|/dt).
+
+        b': the drive of that slip, whose resistance is against the rolling alone; n: across b.
+        """
         b, N = self._drive(y)
         grip = self._A * self._body.contact.mu_kinetic * N
         phi, size, strength = float(np.arctan2(b[1], b[0])), float(y[5]), float(np.linalg.norm(b))
-        leading, _, _, turning = self._with_slip(y, size, phi)
+        leading, slipping, _, turning = self._with_slip(y, size, phi)
+        across = float(slipping[1] * np.cos(phi) - slipping[0] * np.sin(phi))
         span = self._span(y)
         change = (self._drive(y[:5] + span * leading)[0] - self._drive(y[:5] - span * leading)[0]) / (2 * span)
         rotation = float(b[0] * change[1] - b[1] * change[0]) / strength**2 + turning
-        delta = -size * rotation / (2 * strength - grip)
-        rates = self._with_slip(y, size, phi + delta)[0]
-        return np.append(rates, strength * np.cos(delta) - grip), phi + delta
+        phi -= (size * rotation - across) / (2 * strength - grip)
+        rates, slipping, _, _ = self._with_slip(y, size, phi)
+        return np.append(rates, slipping @ (np.cos(phi), np.sin(phi)) - grip), phi
 
     def _stood_still(self, last: FloatArray) -> FloatArray:
         rates = self._slipping(last)
         return np.asarray(last + rates / -rates[5])
-
-    def _until_halt(self, y: FloatArray) -> float:
-        _, v, force = reduced_rates(self._body, y[:5])
-        v_rate = force / self._body.ball.mass + self._body.gravity
-        speed = float(np.linalg.norm(v))
-        slowing = -float(v @ v_rate) / speed if speed > 0 else 0.0
-        return speed / slowing if slowing > 0 else np.inf
-
-    def _ended(self, solver: Any) -> tuple[float, FloatArray, End] | None:
-        """First end of rolling without slip within a step: time [s], state and reason; None: it goes on."""
-        ends: list[_Stop] = [(End.LIFTOFF, lambda y: -self._drive(y)[1])]
-        if np.isfinite(self._body.contact.mu_static):
-            ends.append((End.CONE, self._missing))
-        return _first(solver, ends)
 
     def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
         frame = self._body.surface.frame(y[:, :2])

@@ -4,8 +4,6 @@
   (:mod:`proofroll.elements.ball_on_surface.rolling_equations`).
 * :func:`unreduced`: nine states (p, v, ω) in the world, reactions from a linear system, and the surface only through
   its signed distance.
-
-Neither stops where rolling resistance brings a ball to rest; that case belongs to :mod:`truth.stick_slip`.
 """
 
 import math

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,7 +11,6 @@ from typing import ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.events import EventKind
 from proofroll.elements.ball_on_surface.motion import BallMotion
 
 # Position [m], velocity [m/s] and spin [rad/s] of a ball in the world, each shape (3,).
@@ -21,24 +19,13 @@ World = tuple[FloatArray, FloatArray, FloatArray]
 Motion = Callable[[FloatArray], BallMotion]
 
 
-# Time left until standstill, relative to the pace, below which the state is extrapolated; and in spacings of the time.
-_STILL, _SPACINGS = 1e-11, 1000.0
-
-
-def about_to_stop(left: float, pace: float, time: float) -> bool:
-    """True if the ``left`` time until standstill is so short that the state there is extrapolated; all in s."""
-    return bool(left < max(_STILL * pace, _SPACINGS * np.spacing(time)))
-
-
 class End(Enum):
     """Reason that a stretch ended."""
 
     TIME = auto()  # the time limit was reached
     CONE = auto()  # sticking: the needed friction left the static cone
     STILL = auto()  # slipping: the contact point stopped
-    HALT = auto()  # sticking with rolling resistance: the centre stopped
-    LIFTOFF = auto()  # the normal force reached zero
-    LANDED = auto()  # flying: the ball is on the wall again
+    HALT = auto()  # slipping with rolling resistance: the rolling all but stopped
     GROWN = auto()  # of the start of a slip, never of a stretch: its direction can be integrated from here on
 
 
@@ -48,7 +35,7 @@ class BallStretch:
 
     Attributes:
         start, end: [s].
-        sticking: True: the ball rolls without slip or rests; False: it slips or flies.
+        sticking: True: the ball rolls without slip; False: it slips.
         state: at the end, in the route's variables; its slip velocity is zero unless the ball slips there.
         why: reason for its end.
         motion: motion at rising times [s] within the stretch.
@@ -65,11 +52,6 @@ class BallStretch:
     def guard(self) -> End | None:
         """Reason for its end; None: it reached its time limit."""
         return None if self.why is End.TIME else self.why
-
-    def at_end(self) -> World:
-        """Position, velocity and spin at the end, before any transition."""
-        last = self.motion(np.array([self.end]))
-        return last.p_WB[0], last.v_WB[0], last.w_WB[0]
 
 
 class Route(ABC):
@@ -105,10 +87,6 @@ class Route(ABC):
     def world(self, state: FloatArray) -> World:
         """Position, velocity and spin of a state in the world."""
 
-    @abstractmethod
-    def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
-        """State with the centre's velocity replaced by ``v_WB`` [m/s], shape (3,), rolling without slip."""
-
     def excess(self, state: FloatArray) -> float:
         """Relative excess of the friction needed to stick: (needed - available) / (needed + available) [1]."""
         needed, available = self.friction(state)
@@ -133,29 +111,3 @@ def join_motions(times: FloatArray, parts: Sequence[tuple[float, Motion]], route
         for key, column in columns.items():
             column[inside] = getattr(part, key)
     return BallMotion(**columns, route=route)
-
-
-@dataclass(frozen=True)
-class Path:
-    """Stretches and events of a whole motion.
-
-    Attributes:
-        stretches: in order, from time 0.
-        events: kind and time [s] of each change.
-        end: time from which the motion is not known [s]; inf: it reaches all times asked for.
-        ended: reason why it ends there, as a clause; empty: a landing, whose outcome the contact does not say.
-    """
-
-    stretches: list[BallStretch]
-    events: list[tuple[EventKind, float]]
-    end: float = math.inf
-    ended: str = ""
-
-    def motion(self, times: FloatArray, route: str) -> BallMotion:
-        """Motion at rising ``times`` [s]; the time of an event belongs to the later stretch."""
-        return join_motions(times, [(stretch.start, stretch.motion) for stretch in self.stretches], route)
-
-    def sticking(self, times: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Mask of the ``times`` [s] at which the ball sticks, shape (n,)."""
-        index = np.searchsorted([stretch.start for stretch in self.stretches], times, side="right") - 1
-        return np.array([stretch.sticking for stretch in self.stretches])[index]

@@ -1,4 +1,4 @@
-"""Stick and slip by compiled Taylor series (heyoka): the fast first route, for cylinders and planes."""
+"""Stick and slip by compiled Taylor series (heyoka): the fast first route."""
 
 from __future__ import annotations
 
@@ -7,40 +7,21 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from proofroll.core import heyoka_library as library
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.compiled.rolling import parameters, start
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.truth.ball_on_surface.route import End
 from proofroll.truth.ball_on_surface.sliding import Sliding
 from proofroll.truth.ball_on_surface.taylor_model import TaylorModel, model
 
 # Reasons for an end, in the order of the integrators' events.
-_STICK_ENDS = (End.LIFTOFF, End.CONE)
+_STICK_ENDS = (End.CONE,)
 _CREEP_ENDS = (End.GROWN, End.STILL)
-_SLIP_ENDS = (End.STILL, End.TIME, End.LIFTOFF)
-_LARGEST = 1e100  # largest friction coefficient; its square is still finite
+_SLIP_ENDS = (End.STILL, End.TIME, End.HALT)
+_LARGEST = 1e6  # largest friction coefficient: more than any motion needs, and its square still counts
 _TIME_LIMIT = -(2**32) - 3  # heyoka's taylor_outcome.time_limit
-
-
-def supports(body: RollingBall) -> bool:
-    """True if heyoka is installed and the compiled equations hold for this scene.
-
-    The rolling resistance changes direction where the centre stops, which a Taylor series misses. So with resistance
-    only the vertical cylinder is supported, where the centre of a pressed ball always moves.
-    """
-    surface = body.surface
-    if not library.available():
-        return False
-    if isinstance(surface, Plane):
-        return body.contact.rolling_resistance == 0
-    if not isinstance(surface, Cylinder):
-        return False
-    vertical = not np.any(np.cross(body.gravity, surface.generators[1].axis))
-    return body.contact.rolling_resistance == 0 or vertical
 
 
 class SlidingTaylor(Sliding):
@@ -54,8 +35,7 @@ class SlidingTaylor(Sliding):
         self._scales = np.array(body.surface.length_scales)
         self._A = (1 + body.ball.inertia_ratio) / body.ball.inertia_ratio
         self._pars = [*parameters(body), *(min(mu, _LARGEST) for mu in (contact.mu_kinetic, contact.mu_static))]
-        bounded = bool(np.isfinite(contact.mu_static))
-        self._model: TaylorModel = model(contact.rolling_resistance > 0, bounded)
+        self._model: TaylorModel = model(contact.rolling_resistance > 0)
 
     @override
     def start(self) -> FloatArray:
@@ -69,10 +49,6 @@ class SlidingTaylor(Sliding):
     @override
     def rates(self, state: FloatArray) -> FloatArray:
         return self._model.rates(state, self._pars)
-
-    @override
-    def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
-        return np.concatenate([state[:2], self._axes(state)[:, 1:].T @ v_WB, state[4:]])
 
     def _stick(self, time: float, state: FloatArray, until: float) -> _Run:
         return _Run(self._model.stick, self._pars, _STICK_ENDS, time, state, until)
@@ -143,7 +119,7 @@ class _Run:
             code = self._again(dense=False)
             event = -code - 1 if -(2**31) < code < 0 else None  # terminal events are numbered -1, -2, …
             if (event is None and code != _TIME_LIMIT) or not np.all(np.isfinite(integrator.state)):
-                raise Diverged(f"the truth (Taylor series) could not be integrated past {integrator.time:g}")
+                raise Diverged("the Taylor series of stick and slip could not be continued")
             self.end, self.last = float(integrator.time), integrator.state.copy()
             self.why = End.TIME if event is None else ends[event]
 

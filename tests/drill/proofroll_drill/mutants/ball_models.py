@@ -1,4 +1,4 @@
-"""Balls of another inertia, mass, gravity, resistance or friction than the scene's."""
+"""Balls of another inertia, mass, gravity or resistance than the scene's."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallSample
-from proofroll.elements.mechanism.run.contacts.on_wall import slip_velocity
 from proofroll_drill.mutants.base import STEP, Honest, Mutant
 
 RESISTED = ("sphere_in_cylinder", {"rolling_resistance": 5e-4})
-SLIPPING = ("sphere_in_cylinder", {"mu_static": 0.2, "mu_kinetic": 0.15})
 
 
 def _ball(scene: Scene, **numbers: float) -> Scene:
@@ -28,11 +26,8 @@ def _contact(scene: Scene, **numbers: float) -> Scene:
     return scene_with(scene, contact=dataclasses.replace(scene.elements[0].contact, **numbers))  # type: ignore[attr-defined]
 
 
-def _gravity(scene: Scene, factor: float, direction: tuple[float, float, float] = (0, 0, -1)) -> Scene:
-    gravity = scene.elements[0].gravity  # type: ignore[attr-defined]
-    return scene_with(
-        scene, gravity=dataclasses.replace(gravity, magnitude=factor * gravity.magnitude, direction=direction)
-    )
+def _gravity(scene: Scene, **numbers: Any) -> Scene:
+    return scene_with(scene, gravity=dataclasses.replace(scene.elements[0].gravity, **numbers))  # type: ignore[attr-defined]
 
 
 class ThinShell(Mutant):
@@ -76,7 +71,7 @@ class GravityHalved(Mutant):
 
     def misread(self, scene: Scene) -> Scene:
         """Half."""
-        return _gravity(scene, 0.5)
+        return _gravity(scene, magnitude=0.5 * scene.elements[0].gravity.magnitude)  # type: ignore[attr-defined]
 
 
 class GravityUp(Mutant):
@@ -87,18 +82,7 @@ class GravityUp(Mutant):
 
     def misread(self, scene: Scene) -> Scene:
         """Up."""
-        return _gravity(scene, 1.0, (0, 0, 1))
-
-
-class GravityAlongY(Mutant):
-    """The engine's up is y."""
-
-    fault = "gravity along y"
-    named = ("gravity is",)
-
-    def misread(self, scene: Scene) -> Scene:
-        """Along -y."""
-        return _gravity(scene, 1.0, (0, -1, 0))
+        return _gravity(scene, direction=(0, 0, 1))
 
 
 class MassTwice(Mutant):
@@ -134,32 +118,6 @@ class ResistanceInMillimetres(Mutant):
     def misread(self, scene: Scene) -> Scene:
         """A thousandth."""
         return _contact(scene, rolling_resistance=5e-7)
-
-
-class KineticForStatic(Mutant):
-    """One coefficient for both."""
-
-    fault = "kinetic friction taken for the static one"
-    scene = SLIPPING
-    until, every = 0.45, 0.006
-    named = ("kinetic friction",)
-
-    def misread(self, scene: Scene) -> Scene:
-        """0.15 for 0.2."""
-        return _contact(scene, mu_static=0.15)
-
-
-class StaticForKinetic(Mutant):
-    """The other way round."""
-
-    fault = "static friction taken for the kinetic one"
-    scene = SLIPPING
-    until, every = 0.45, 0.006
-    named = ("kinetic friction",)
-
-    def misread(self, scene: Scene) -> Scene:
-        """0.2 for 0.15."""
-        return _contact(scene, mu_kinetic=0.2)
 
 
 class NewtonMutant(Mutant):
@@ -215,6 +173,18 @@ class NewtonMutant(Mutant):
         return dataclasses.replace(self.claimed.built(), acceleration=a, angular_acceleration=alpha)
 
 
+class GravityAlongY(NewtonMutant):
+    """The engine's up is y."""
+
+    fault = "gravity along y"
+    named = ("gravity is",)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        g = float(np.linalg.norm(self.body.gravity))
+        self.body = dataclasses.replace(self.body, gravity=np.array([0.0, -g, 0.0]))
+
+
 class Damped(NewtonMutant):
     """Velocity and spin shrink at each step, as engines for games have it by default."""
 
@@ -245,73 +215,3 @@ class AgainstSpin(NewtonMutant):
 
 def _of(body: RollingBall, f: float) -> RollingBall:
     return dataclasses.replace(body, contact=dataclasses.replace(body.contact, rolling_resistance=f))
-
-
-class Pyramid(Mutant):
-    """Once it slips the friction is that of a pyramid whose axes lie 30 degrees off e2 and e3."""
-
-    fault = "pyramidal friction cone"
-    scene: ClassVar[Any] = SLIPPING
-    until, every = 0.45, 0.006
-    named = ("pyramid",)
-
-    def __init__(self, scene: Scene, settings: Any) -> None:
-        super().__init__(scene, settings)
-        self.body = rolling_ball(scene)
-        self.x: FloatArray | None = None
-
-    def friction(self, x: FloatArray, N: float, slip: FloatArray, tangents: FloatArray) -> FloatArray:  # noqa: ARG002 -- of the next
-        """Friction on the ball."""
-        c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
-        turn = np.array([[c, -s], [s, c]])
-        along = turn.T @ (tangents.T @ slip)
-        return np.asarray(
-            -self.body.contact.mu_kinetic * N * tangents @ turn @ (np.sign(along) * (abs(along) == max(abs(along))))
-        )
-
-    def slipping(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Rates of the state, and the force."""
-        p, v, w = x
-        body, m = self.body, self.body.ball.mass
-        frame = body.surface.frame(body.surface.locate(p[None]))[0]
-        e1 = frame[:, 0]
-        N = m * float(body.gravity @ e1 + body.surface.normal_gradient(p) @ v @ v)
-        slip = slip_velocity(body.ball.radius, e1, v, w)
-        force = self.friction(x, N, slip, frame[:, 1:]) - N * e1
-        alpha = body.ball.radius * np.cross(e1, force) / body.ball.inertia
-        return np.stack([v, force / m + body.gravity, alpha]), force
-
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        if self.x is None:
-            self.inner.advance(t)
-            seen = self.inner.sample()
-            if not seen.sticking:
-                self.x = np.stack([seen.p_WB, seen.v_WB, seen.w_WB])
-        else:
-            for _ in range(round((t - self.t) / STEP)):
-                k1 = self.slipping(self.x)[0]
-                k2 = self.slipping(self.x + STEP / 2 * k1)[0]
-                k3 = self.slipping(self.x + STEP / 2 * k2)[0]
-                k4 = self.slipping(self.x + STEP * k3)[0]
-                self.x = self.x + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        self.t = t
-
-    def sample(self) -> BallSample:
-        """See :class:`proofroll.core.engine.Engine`."""
-        if self.x is None:
-            seen: BallSample = self.inner.sample()
-            return dataclasses.replace(seen, q_WB=None)
-        p, v, w = self.x
-        return BallSample(p.copy(), v.copy(), w.copy(), force=self.slipping(self.x)[1], sticking=False)
-
-
-class AgainstVelocity(Pyramid):
-    """The friction opposes the centre's velocity."""
-
-    fault = "friction against the velocity of the centre"
-    named = ("velocity of the centre",)
-
-    def friction(self, x: FloatArray, N: float, slip: FloatArray, tangents: FloatArray) -> FloatArray:  # noqa: ARG002 -- as above
-        """Along -v."""
-        return np.asarray(-self.body.contact.mu_kinetic * N * x[1] / np.linalg.norm(x[1]))

@@ -12,7 +12,7 @@ from proofroll.core.engine import Regularised
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.certificate import CAPS, another_scene
-from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
@@ -197,59 +197,46 @@ def test_a_number_in_single_precision_is_told_apart_from_the_one_it_was() -> Non
     assert "in single precision (float32)" in sentence
 
 
-SLIPPING = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0.35, mu_kinetic=0.25)
-FRICTION: dict[str, Any] = {
-    "mu_static": 0.35,
-    "mu_kinetic": 0.25,
-    "angular_acceleration": initial_angular_acceleration(rolling_ball(SLIPPING)),
-}
+RESISTED = load_scene("sphere_in_cylinder", rolling_resistance=5e-4)
+TURNING = initial_angular_acceleration(rolling_ball(RESISTED))
+ANGULAR = natural_acceleration(rolling_ball(RESISTED)) / 0.025
 
 
 def test_a_velocity_is_measured_by_all_that_makes_it() -> None:
     """A ball that spins fast and goes slowly has its velocity from contact and spin: their roundings are no lie."""
-    scene = load_scene("inclined_plane", speed=1e-4, normal_spin=213.7)
+    scene = load_scene("sphere_in_cylinder", speed=1e-4, radial_spin=213.7)
     body = rolling_ball(scene)
-    rounded = body.v0 + np.array([1e-6, 0, 0])  # two roundings of the 5 m/s with which the ball's sides move
+    rounded = body.v0 + np.array([0, 1e-6, 0])  # two roundings of the 5 m/s with which the ball's sides move
     single = SimpleNamespace(precision="single")
-    friction = {"mu_static": body.contact.mu_static, "mu_kinetic": body.contact.mu_kinetic}
-    lines = certify(Stub(scene, {"v_WB": rounded}, **friction), scene, single)
+    lines = certify(Stub(scene, {"v_WB": rounded}), scene, single)
     assert [line.quantity for line in lines if not line.holds] == []
-    wrong = body.v0 + np.array([1e-3, 0, 0])
-    assert "velocity is" in str(first_difference(certify(Stub(scene, {"v_WB": wrong}, **friction), scene, single)))
-    assert "velocity is" in str(first_difference(certify(Stub(scene, {"v_WB": rounded}, **friction), scene)))
+    wrong = body.v0 + np.array([0, 1e-3, 0])
+    assert "velocity is" in str(first_difference(certify(Stub(scene, {"v_WB": wrong}), scene, single)))
+    assert "velocity is" in str(first_difference(certify(Stub(scene, {"v_WB": rounded}), scene)))
 
 
-def test_friction_and_angular_acceleration_are_certified() -> None:
-    """An engine that built the scene's friction and resistance passes, and each has its line."""
-    lines = certify(Stub(SLIPPING, **FRICTION), SLIPPING)
+def test_resistance_and_angular_acceleration_are_certified() -> None:
+    """An engine that built the scene's resistance passes, and both have their line."""
+    lines = certify(Stub(RESISTED, angular_acceleration=TURNING), RESISTED)
     assert first_difference(lines) is None
-    named = {line.quantity for line in lines}
-    assert {"rolling resistance", "static friction", "kinetic friction", "angular acceleration"} <= named
+    assert {"rolling resistance", "angular acceleration"} <= {line.quantity for line in lines}
 
 
 @pytest.mark.parametrize(
     ("quantity", "built"),
     [
-        ("static friction", {"mu_static": None}),
-        ("kinetic friction", {"mu_kinetic": None}),
         ("rolling resistance", {"rolling_resistance": None}),
-        ("static friction", {"mu_static": 0.35 * (1 + PART)}),
-        ("static friction", {"mu_static": np.inf}),
-        ("kinetic friction", {"mu_kinetic": 0.35}),
         ("rolling resistance", {"rolling_resistance": 0.0}),
         (
             "angular acceleration",
-            {
-                "angular_acceleration": FRICTION["angular_acceleration"]
-                + [0, 0, PART * natural_acceleration(rolling_ball(SLIPPING)) / 0.025]
-            },
+            {"angular_acceleration": TURNING + np.array([0, 0, PART * ANGULAR])},
         ),
-        ("angular acceleration", {"angular_acceleration": -FRICTION["angular_acceleration"]}),
+        ("angular acceleration", {"angular_acceleration": -TURNING}),
     ],
 )
-def test_friction_and_resistance_are_watched(quantity: str, built: dict[str, Any]) -> None:
+def test_resistance_is_watched(quantity: str, built: dict[str, Any]) -> None:
     """What the scene requires and the engine does not read back, or reads back otherwise, fails in one sentence."""
-    lines = certify(Stub(SLIPPING, **(FRICTION | built)), SLIPPING)
+    lines = certify(Stub(RESISTED, **({"angular_acceleration": TURNING} | built)), RESISTED)
     assert [line.quantity for line in lines if not line.holds] == [quantity]
     sentence = first_difference(lines)
     assert sentence is not None
@@ -269,22 +256,12 @@ def test_friction_that_the_scene_does_not_bound() -> None:
         assert "1 / static friction" in sentence
 
 
-def test_a_ball_that_only_a_pull_would_hold_falls() -> None:
-    """Under a ceiling at rest, nothing presses: the scene's own first motion is a fall, without a force."""
-    plane = load_scene("inclined_plane", speed=0.0)
-    gravity = dataclasses.replace(plane.elements[0].gravity, direction=(0.0, 0.0, 1.0))  # type: ignore[attr-defined]
-    body = rolling_ball(scene_with(plane, gravity=gravity))
-    acceleration, force = initial_response(body)
-    assert acceleration == pytest.approx(body.gravity)
-    assert not np.any(force)
-
-
 @pytest.mark.parametrize("wrong", [np.zeros((2, 3)), "heavy", [1.0, [2.0]]], ids=["shape", "text", "ragged"])
 @pytest.mark.parametrize(
     "name", [item.name for item in dataclasses.fields(BallBuilt) if item.name not in {"terms", "regularised"}]
 )
 def test_what_is_built_of_another_shape_is_named(name: str, wrong: Any) -> None:
     """Whatever an engine says that it built is of the shape that the protocol says, or the field is named."""
-    scene = load_scene("inclined_plane")
+    scene = load_scene("sphere_in_cylinder")
     with pytest.raises(Diverged, match=rf"^the engine's built\(\) gave {name}( with shape|, which is no array)"):
         certify(Stub(scene, **{name: wrong}), scene)

@@ -37,7 +37,7 @@ def lines(
 
 def test_a_number_that_was_built_otherwise_is_the_only_cause() -> None:
     """A ball whose certificate names twice the inertia is told so, and its accelerations accuse nothing else."""
-    (element,) = load_scene("inclined_plane").elements
+    (element,) = load_scene("sphere_in_cylinder").elements
     body = element.rolling  # type: ignore[attr-defined]  # a ball
     stiffer = replace(body, ball=replace(body.ball, inertia_ratio=0.8))
     evidence = Evidence(element, lines(body, stiffer, ("inertia", *DYNAMICS)))
@@ -49,7 +49,7 @@ def test_a_number_that_was_built_otherwise_is_the_only_cause() -> None:
 @cache
 def shell() -> tuple[Any, RollingBall, Any, Any]:
     """A ball, the thin shell of its mass, the shell's run, and the ball's truth."""
-    scene, times = load_scene("inclined_plane"), np.linspace(0.0, 0.4, 21)
+    scene, times = load_scene("sphere_in_cylinder"), np.linspace(0.0, 0.4, 21)
     (element,) = scene.elements
     hollow = scene_with(scene, ball=replace(rolling_ball(scene).ball, inertia_ratio=2 / 3))
     return element, rolling_ball(hollow), truth(hollow, times), truth(scene, times)
@@ -72,19 +72,17 @@ def test_a_law_that_the_first_steps_contradict_is_no_cause(what: str) -> None:
         assert shows_inertia(evidence) is named
 
 
-def test_a_run_proves_no_law_by_its_steps_or_in_flight() -> None:
-    """Another inertia is proven neither where the limit of small steps is the scene's nor where the ball leaves it."""
+def test_a_run_proves_no_law_by_its_steps() -> None:
+    """Another inertia is not proven where the limit of small steps is the scene's."""
     element, _, run, true = shell()
-    flies = run.assign(N=run["N"].copy(data=[1.0, 0.0, *np.ones(19)] * run["N"]))
     assert shows_inertia(Evidence(element, [], run, true))
     assert not shows_inertia(Evidence(element, [], run, true, by_step=True))
-    assert not shows_inertia(Evidence(element, [], flies, true))
 
 
 @pytest.mark.parametrize(("factor", "named"), [(-1.0, True), (-0.3, False)])
 def test_a_resistance_that_drives_is_a_cause_by_its_sign_alone(factor: float, named: bool) -> None:
     """Rolling resistance may have the wrong sign, and no other negative factor on it is anybody's mistake."""
-    (element,) = load_scene("inclined_plane", rolling_resistance=5e-4).elements
+    (element,) = load_scene("sphere_in_cylinder", rolling_resistance=5e-4).elements
     body = element.rolling  # type: ignore[attr-defined]  # a ball
     driven = _resisting(body, factor * body.contact.rolling_resistance)
     evidence = Evidence(element, lines(body, driven, DYNAMICS))

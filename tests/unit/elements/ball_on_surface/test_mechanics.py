@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response, newton_euler
+from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates
 from proofroll.elements.mechanism.run.contacts.on_wall import energy, resistance_moment, slip_velocity
 from proofroll.files.scene_file import load_scene
 
@@ -88,3 +91,22 @@ def test_newton_euler_obeys_its_equations(scene: Scene) -> None:
     ]
     before, after = (slip_velocity(a, body.surface.normal(p), v, w) for p, v, w in states)
     assert (after - before) / (2 * h) == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("ratio", [0.4, 2 / 3])
+@pytest.mark.parametrize("f", [0.0, 5e-4])
+def test_reduced_equations_are_those_of_newton_and_euler(f: float, ratio: float) -> None:
+    """At random states, force and accelerations with the reactions eliminated are those of the nine equations."""
+    rng = np.random.default_rng(5)
+    paper = rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=f))
+    body = replace(paper, ball=replace(paper.ball, inertia_ratio=ratio))
+    for state in rng.uniform(-1, 1, (10, 5)) * [3.0, 1.0, 20.0, 3.0, 40.0]:
+        rates, v, reduced_force = reduced_rates(body, state)
+        p, _, w = (values[0] for values in placed(body, state[None], v[None]))
+        acceleration, w_rate, force = newton_euler(body, p, v, w)
+        assert reduced_force == pytest.approx(force, abs=1e-12)
+        bent = body.surface.second(state[:2]) @ state[2:4] @ state[2:4]
+        assert body.surface.tangents(state[:2]) @ rates[2:4] + bent == pytest.approx(acceleration, abs=1e-11)
+        e1 = body.surface.normal(p)
+        spin_rate = w_rate @ e1 + w @ (body.surface.normal_gradient(p) @ v)
+        assert rates[4] == pytest.approx(spin_rate, abs=1e-9)

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Generator, Plane
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Generator
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
 
@@ -18,14 +18,12 @@ CLOSE = 1e-8
 SURFACES = [
     Cylinder("wall", 0.2),
     Cylinder("wall", 0.225, tilt=0.4).offset(0.025),
-    Plane("wall"),
-    Plane("wall", tilt=0.35).offset(0.025),
 ]
 
 
-@pytest.fixture(params=SURFACES, ids=["cylinder", "cylinder-tilted", "plane", "plane-tilted"])
+@pytest.fixture(params=SURFACES, ids=["upright", "tilted"])
 def surface(request: pytest.FixtureRequest) -> Any:
-    """Surfaces of all kinds, upright and tilted."""
+    """Cylinders, upright and tilted."""
     return request.param
 
 
@@ -129,8 +127,8 @@ def test_both_descriptions_have_one_curvature(surface: Any, u: np.ndarray) -> No
 
 def test_offset(u: np.ndarray) -> None:
     """The surface of the centre lies one ball's radius from the wall, towards the inside."""
-    for wall in (Cylinder("wall", 0.225, tilt=0.1), Plane("wall", tilt=0.1)):
-        assert wall.gap(wall.offset(0.025).position(u)) == pytest.approx(0.025, abs=1e-14)
+    wall = Cylinder("wall", 0.225, tilt=0.1)
+    assert wall.gap(wall.offset(0.025).position(u)) == pytest.approx(0.025, abs=1e-14)
 
 
 def test_leading_dimensions(surface: Any) -> None:
@@ -147,27 +145,11 @@ def test_leading_dimensions(surface: Any) -> None:
         assert together[1, 2] == pytest.approx(alone, abs=1e-14), method
 
 
-def test_tilted_plane_descends_along_x() -> None:
-    """A positive tilt makes the first coordinate go down along the world's x."""
-    x, _, z = Plane("wall", tilt=0.35).position([1.0, 0.0])
-    assert x == pytest.approx(np.cos(0.35))
-    assert z == pytest.approx(-np.sin(0.35))
-
-
 def test_cylinder_coordinates() -> None:
     """γ grows from x to y and z is the height."""
     assert Cylinder("wall", 0.2).position([np.pi / 2, 0.3]) == pytest.approx([0.0, 0.2, 0.3], abs=1e-15)
 
 
-@pytest.mark.parametrize(
-    "surface",
-    [
-        Cylinder("wall", 0.2),
-        Cylinder("wall", 0.2, 0.4),
-        Plane("wall", 0.35, 0.025),
-    ],
-    ids=["cylinder", "tilted", "plane"],
-)
 def test_one_point_is_as_many(surface: Any) -> None:
     """Geometry at a single point, which takes another way for speed, is that of arrays of points."""
     rng = np.random.default_rng(0)

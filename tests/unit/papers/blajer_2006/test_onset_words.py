@@ -66,5 +66,5 @@ def test_a_slip_from_the_start_is_said_in_words(table: list[list[str]]) -> None:
 
 def test_a_ball_in_the_air_is_refused(tmp_path: Path) -> None:
     """The friction that rolling needs says nothing of a ball that begins above its wall."""
-    with pytest.raises(InputError, match="begins to roll on a plane or in a cylinder"):
+    with pytest.raises(InputError, match="begins to roll in an upright cylinder"):
         onset_study("bouncing_ball", {"mu_static": 0.3}, Runner(Store(tmp_path), jobs=1))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -21,7 +20,6 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, LimitResult, Verdict
-from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
 from proofroll.report.comparison.summary import outcome_content
@@ -34,7 +32,6 @@ from proofroll.studies.comparison.compare import affordable, compare, evaluate
 from proofroll.studies.comparison.expectations import contradictions_of
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import Plan, Planned, point_name
-from proofroll.truth.ball_on_surface.onset import onset
 
 FACTS = EngineFacts("alpha", "1", "code", {"dt": 1e-3}, "dt", 2)
 TRUTH = EngineFacts("truth", "1", "code", {})
@@ -90,8 +87,6 @@ def judged(
             scene = scenes[point_name(point)] = load_scene(comparison.scene, **point)
             sampled = comparison.until, comparison.every, tuple(between)
             dataset = true_motion(comparison.scene, tuple(point.items()), *sampled).copy()
-            if BallCapability.BOUNDED_FRICTION in scene.requires:
-                dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, comparison.until)))
             facts = dataclasses.replace(FACTS, name=row.engine)
             given = (comparison.scene, point, scene.digest)
             truths[point_name(point)] = put(
@@ -133,22 +128,6 @@ def test_the_orientation_of_a_ball_is_judged(tmp_path: Path, angle: float, agree
         "z": True,
         "attitude": agrees,
     }
-
-
-@pytest.mark.parametrize("events", [True, False])
-def test_what_says_that_it_sticks_while_it_slips_does_not_agree(tmp_path: Path, events: bool) -> None:
-    """A row that judges the path alone differs where the run sticks in every sample and slips, events told or not."""
-
-    def sticks(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
-        said = dataset.assign(sticking=dataset["sticking"] * 0 + 1)
-        return said if events else said.isel(event=slice(0))
-
-    slips = dataclasses.replace(claim([ROW], [4.0]), vary={"speed": [4.0], "mu_static": [0.2], "mu_kinetic": [0.1]})
-    (run,) = judged(tmp_path / "sticks", slips, sticks).runs
-    found = {j.observable for j in run.judgements if j.verdict is Verdict.DIFFERS}
-    assert found == {"creep"} | (set() if events else {"first_slip"})
-    (run,) = judged(tmp_path / "right", slips, the_truth).runs
-    assert {j.observable: j.verdict for j in run.judgements} == dict.fromkeys(TIGHT, Verdict.AGREES)
 
 
 def test_a_claim_that_holds(tmp_path: Path) -> None:
@@ -272,9 +251,9 @@ def test_who_shares_a_route_with_the_truth_is_marked(tmp_path: Path, monkeypatch
     """A run of an engine that declares the truth's own equations is marked; one of an engine that does not is not."""
     (run,) = judged(tmp_path / "other", claim([ROW], [4.0]), the_truth).runs
     assert run.shared == ""
-    monkeypatch.setattr(f"{__name__}.FACTS", dataclasses.replace(FACTS, shares=["closed form"]))
+    monkeypatch.setattr(f"{__name__}.FACTS", dataclasses.replace(FACTS, shares=["joint coordinates"]))
     (run,) = judged(tmp_path / "same", claim([ROW], [4.0]), the_truth).runs
-    assert run.shared.startswith("rests on the same equations as the truth itself (closed form (Blajer 2006))")
+    assert run.shared.startswith("rests on the same equations as the truth itself (joint coordinates")
 
 
 @pytest.mark.parametrize("expect", [Verdict.AGREES, Verdict.CONVERGES, Verdict.DIFFERS])
@@ -429,11 +408,11 @@ def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) ->
         "event_times": Tolerance(5e-3, False, "s"),
         "event_order": Tolerance(0.5, False, "events"),
         "energy_balance": Tolerance(0.01, True),
-        "gap": Tolerance(1e-6, False, "m"),
+        "gap": Tolerance(1e-5, False, "m"),
     }
     edge = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.391459}
-    engine = "projection[formulation=rotating_frame]"
-    base = claim([dataclasses.replace(ROW, engine="projection")], [], bounds)
+    engine = "pinocchio[formulation=impulses,preset=tuned]"
+    base = claim([dataclasses.replace(ROW, engine="pinocchio")], [], bounds)
     comparison = dataclasses.replace(base, vary={}, points=[edge], until=2.0)
 
     def projection(scene: Scene, _: xr.Dataset) -> xr.Dataset:

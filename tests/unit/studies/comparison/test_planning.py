@@ -32,7 +32,7 @@ def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.Monke
 
 def test_a_ladder_asks_for_no_tolerance_of_1_or_more() -> None:
     """Of a tolerance of a tenth no decades up are asked for, where nothing would be computed."""
-    comparison = load_comparison("inclined_plane")
+    comparison = load_comparison("accuracy")
     row = Row("projection[formulation=euler,rtol=0.1]", comparison.rows[0].tolerance, ladder=[4.0, 2.0, 1.0, 0.5])
     found = planning.plan(dataclasses.replace(comparison, rows=[row]), ["projection"])
     asked = {case.engine.settings["rtol"] for run in found.runs for case in run.ladder.values()}
@@ -41,7 +41,7 @@ def test_a_ladder_asks_for_no_tolerance_of_1_or_more() -> None:
 
 def test_the_truth_gives_all_that_can_be_asked_for() -> None:
     """Of the truth everything is asked, so that a replay need invent nothing; of engines only what the scene asks."""
-    found = planning.plan(load_comparison("inclined_plane"), ["projection"])
+    found = planning.plan(load_comparison("accuracy"), ["projection"])
     assert {case.asks for case in found.truths.values()} == {("orientation",)}
     assert {case.asks for run in found.runs for case in run.ladder.values()} == {()}
 
@@ -51,7 +51,7 @@ def test_the_truth_gives_all_that_can_be_asked_for() -> None:
 )
 def test_a_ladder_fits_between_the_samples(step: float, factors: list[float]) -> None:
     """Steps of the usual ladder that do not divide the interval between samples, 0.01 s, are finer ones instead."""
-    comparison = dataclasses.replace(load_comparison("inclined_plane"), until=0.1, every=0.01)
+    comparison = dataclasses.replace(load_comparison("accuracy"), until=0.1, every=0.01)
     row = Row(f"mujoco[formulation=chart,dt={step}]", comparison.rows[0].tolerance)
     found = planning.plan(dataclasses.replace(comparison, rows=[row]), ["mujoco"])
     assert {tuple(run.row.ladder) for run in found.runs} == {tuple(factors)}

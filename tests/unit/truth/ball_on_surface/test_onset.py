@@ -5,11 +5,12 @@ import pytest
 
 from proofroll import load_scene
 from proofroll.core.errors import InputError
+from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.truth.ball_on_surface.friction_curve import friction_curve
-from proofroll.truth.ball_on_surface.onset import edge_between, first_slip, onset
-from proofroll.truth.ball_on_surface.stick_slip import stick_slip
+from proofroll.truth.ball_on_surface.onset import Onset, edge_between, first_slip, onset
 
 FIFTIETH = 5e-4  # 0.02 a
 
@@ -17,6 +18,16 @@ FIFTIETH = 5e-4  # 0.02 a
 def cylinder(**parameters: float) -> Scene:
     """The paper's case with other parameters."""
     return load_scene("sphere_in_cylinder", **{"rolling_resistance": FIFTIETH, "mu_static": 0.35, **parameters})
+
+
+def slip_of(scene: Scene, until: float) -> float | None:
+    """First slip of the ball of a scene [s]."""
+    return first_slip(rolling_ball(scene), until)
+
+
+def onset_of(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
+    """First slip of the ball of a scene, and its conditioning."""
+    return onset(rolling_ball(scene), until, uncertainty)
 
 
 @pytest.mark.parametrize(
@@ -36,33 +47,33 @@ def cylinder(**parameters: float) -> Scene:
 )
 def test_stairs(parameters: dict[str, float], expected: float) -> None:
     """On both sides of each known jump the first slip has the known time."""
-    assert first_slip(cylinder(**parameters), 4.0) == pytest.approx(expected, abs=1e-5)
+    assert slip_of(cylinder(**parameters), 4.0) == pytest.approx(expected, abs=1e-5)
 
 
 def test_onset_is_the_first_event_of_the_truth() -> None:
-    """The onset read off the curve of needed friction is where the two routes of the truth begin to slip."""
-    _, events = stick_slip(cylinder(), np.array([0.0, 1.8]))
-    assert first_slip(cylinder(), 4.0) == pytest.approx(events[0].time, abs=1e-10)
+    """The onset read off the curve of needed friction is where the truth begins to slip."""
+    events = events_of(truth(cylinder(), np.array([0.0, 1.8])))
+    assert slip_of(cylinder(), 4.0) == pytest.approx(events[0].time, abs=1e-10)
 
 
 def test_edge_separates_two_rises() -> None:
     """The edge between μ = 0.39 and 0.40, found to six digits (the bounds), is where the first slip jumps."""
-    edge = edge_between(cylinder(), 0.39, 0.40, 4.0)
+    edge = edge_between(rolling_ball(cylinder()), 0.39, 0.40, 4.0)
     assert edge is not None
-    before, after = (first_slip(cylinder(mu_static=edge + side), 4.0) for side in (-1e-6, 1e-6))
+    before, after = (slip_of(cylinder(mu_static=edge + side), 4.0) for side in (-1e-6, 1e-6))
     assert before is not None
     assert after is not None
     assert after - before > 0.7
-    assert onset(cylinder(), 4.0).edge_above == pytest.approx(edge, abs=1e-6)
-    assert edge_between(cylinder(), 0.35, 0.36, 4.0) is None
+    assert onset_of(cylinder(), 4.0).edge_above == pytest.approx(edge, abs=1e-6)
+    assert edge_between(rolling_ball(cylinder()), 0.35, 0.36, 4.0) is None
 
 
 def test_sensitivities_are_derivatives() -> None:
     """The logarithmic sensitivities are those of nearby scenes."""
-    base = onset(cylinder(speed=6.0), 4.0)
+    base = onset_of(cylinder(speed=6.0), 4.0)
     step = 1e-4
     for name, value, found in (("mu_static", 0.35, base.by_mu), ("rolling_resistance", FIFTIETH, base.by_f)):
-        high, low = (first_slip(cylinder(speed=6.0, **{name: value * np.exp(s)}), 4.0) for s in (step, -step))
+        high, low = (slip_of(cylinder(speed=6.0, **{name: value * np.exp(s)}), 4.0) for s in (step, -step))
         assert high is not None
         assert low is not None
         assert found == pytest.approx(np.log(high / low) / (2 * step), rel=1e-5)
@@ -70,15 +81,15 @@ def test_sensitivities_are_derivatives() -> None:
 
 def test_verdicts() -> None:
     """The paper's case stands in the middle of a stair; at an edge, or with a wide range, the onset is ill-posed."""
-    middle = onset(cylinder(), 4.0, uncertainty=0.02)
+    middle = onset_of(cylinder(), 4.0, uncertainty=0.02)
     assert middle.verdict == "well-posed"
     assert middle.earliest is not None
     assert middle.latest is not None
     assert middle.earliest < 1.720183 < middle.latest
-    assert onset(cylinder(), 4.0, uncertainty=0.15).verdict == "ill-posed"
+    assert onset_of(cylinder(), 4.0, uncertainty=0.15).verdict == "ill-posed"
     edge = middle.edge_above
     assert edge is not None
-    at_edge = onset(cylinder(mu_static=round(edge, 6)), 4.0, uncertainty=1e-5)
+    at_edge = onset_of(cylinder(mu_static=round(edge, 6)), 4.0, uncertainty=1e-5)
     assert at_edge.verdict == "ill-posed"
     assert at_edge.distance < 2e-6
     assert at_edge.by_mu is None or at_edge.by_mu > 50
@@ -86,10 +97,10 @@ def test_verdicts() -> None:
 
 def test_no_slip_and_slip_at_once() -> None:
     """Above every crest there is no onset, below the first value it comes at time 0; both without sensitivities."""
-    never = onset(cylinder(rolling_resistance=0.0), 4.0)
+    never = onset_of(cylinder(rolling_resistance=0.0), 4.0)
     assert (never.time, never.by_mu, never.verdict) == (None, None, "well-posed")
     assert never.edge_below == pytest.approx(12 / 7 * 9.81 * 0.2 / 16, rel=1e-9)
-    assert onset(cylinder(mu_static=0.01), 4.0).time == 0.0
+    assert onset_of(cylinder(mu_static=0.01), 4.0).time == 0.0
 
 
 def test_curve_against_closed_form() -> None:
@@ -107,4 +118,4 @@ def test_curve_against_closed_form() -> None:
 def test_uncertainty_is_checked(uncertainty: float) -> None:
     """An uncertainty that is no fraction is refused with a sentence."""
     with pytest.raises(InputError, match="relative uncertainty"):
-        onset(cylinder(), 4.0, uncertainty=uncertainty)
+        onset_of(cylinder(), 4.0, uncertainty=uncertainty)

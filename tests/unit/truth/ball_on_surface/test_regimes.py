@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene
+from proofroll.core import heyoka_library as library
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.truth.ball_on_surface import taylor
 from proofroll.truth.ball_on_surface.regimes import Regime, classify
 
-pytestmark = pytest.mark.skipif(not taylor.library.available(), reason="a map takes minutes without heyoka")
+pytestmark = pytest.mark.skipif(not library.available(), reason="a map takes minutes without heyoka")
 
 
 def test_the_paper_falls_after_its_second_slip() -> None:

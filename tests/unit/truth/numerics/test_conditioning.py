@@ -10,9 +10,7 @@ import pytest
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import events_of
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.ball_on_surface.stick_slip import with_changes
 from proofroll.truth.numerics.conditioning import Events, Story, in_common, well_posed_events
 
 PACE, UNTIL = 1.0, 10.0
@@ -61,22 +59,6 @@ def test_an_event_at_the_very_end_may_lie_beyond_it() -> None:
     late: Events = [*OWN, ("stick", UNTIL - 1e-6)]
     assert well_posed_events(story(OWN), [story(late), story(OWN)], PACE, UNTIL) == (3, True)
     assert in_common(OWN, late, PACE, UNTIL) == in_common(late, OWN, PACE, UNTIL) == (3, True)
-
-
-def test_a_moved_ball_keeps_what_is_exact() -> None:
-    """Zeros and unbounded friction stay; all else moves, by parts that do not make up for it."""
-    kept = with_changes(rolling_ball(load_scene("inclined_plane")), 1e-3).contact
-    assert kept.mu_static == math.inf
-    assert kept.rolling_resistance == 0
-    body = rolling_ball(load_scene("inclined_plane", rolling_resistance=5e-4, mu_static=0.4))
-    other = with_changes(body, 1e-3)
-    parts = {
-        round(other.contact.rolling_resistance / 5e-4 - 1, 9),
-        round(other.contact.mu_static / 0.4 - 1, 9),
-        round(float(other.gravity[2] / body.gravity[2]) - 1, 9),
-    }
-    assert len(parts) == 3
-    assert 0 not in parts
 
 
 def test_friction_that_an_impact_just_uses_up_is_ill_posed() -> None:

@@ -32,7 +32,7 @@ GENTLE = (0.17666799150977489, 0.41209057382659164, 0.6281167309534607, 0.710311
 
 def ball_in_a_bore(speed: float, friction: float = 0.35) -> Mechanism:
     """The ball of the founding scene as body, sphere and bore."""
-    scene = load_scene("sphere_in_cylinder", mu_static=friction, speed=speed)
+    scene = load_scene("sphere_in_cylinder", speed=speed)
     found, wall = rolling_ball(scene), scene.elements[0].surface  # type: ignore[attr-defined]
     moment, radius = float(found.ball.inertia), float(found.ball.radius)
     free = Joint(

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.engine import Regularised, whole_steps
-from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
+from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
@@ -27,8 +26,6 @@ PROVIDES: frozenset[str] = ALL_OF_A_BALL
 INHERENT = {BallCapability.ORIENTATION: "every rigid body of PyBullet has one"}
 # Coefficient that stands for unbounded friction; larger ones would cost the solver digits in double precision.
 UNBOUNDED = 1e6
-# Part of the cone from which on a force counts as on it, given the errors of the iterative solver.
-_ON_CONE = 1 - 1e-6
 _FLAT = "for the length of a step the wall is a plane, and the first step does not yet know that it bends"
 _NUMBER = f"PyBullet's cone needs a number, here {UNBOUNDED:g}"
 
@@ -37,15 +34,9 @@ class PybulletBall:
     """Run of a ball; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall, settings: PybulletSettings) -> None:
-        if body.contact.mu_static != body.contact.mu_kinetic:
-            raise Refused("PyBullet has one coefficient of friction, for sticking and for slipping")
         self._body, self._settings, self._steps = body, settings, 0
-        self._bounded = math.isfinite(body.contact.mu_static)
-        self._events: list[Event] = []
-        self._status = "stick"
         self._world = World(body.gravity.tolist(), settings)
-        mu = body.contact.mu_static if self._bounded else UNBOUNDED
-        self._ball = self._sphere(mu)
+        self._ball = self._sphere(UNBOUNDED)
         shape = self._world.createCollisionShape(self._world.GEOM_PLANE, planeNormal=[0, 0, 1])
         self._plane = self._world.createMultiBody(0, shape)
         self._world.changeDynamics(self._plane, -1, lateralFriction=1)
@@ -78,8 +69,6 @@ class PybulletBall:
         for _ in range(whole_steps(self._steps * dt, t, dt)):
             self._step()
             self._steps += 1
-            if self._bounded and self._steps > 1:  # in the first step a curved wall does not press yet
-                self._follow((self._steps - 1) * dt, self._steps * dt)
 
     def _step(self) -> None:
         """Makes one step: poses the plane at the wall, and applies the moment of rolling resistance."""
@@ -116,20 +105,6 @@ class PybulletBall:
         self._world.removeState(state)
         return self._normal_force
 
-    def _follow(self, start: float, end: float) -> None:
-        """Records an event if the contact changed between stick and slip in the step from ``start`` to ``end`` [s]."""
-        status = self._sticks()
-        if status != self._status:
-            self._events.append(Event(status, 0.5 * (start + end), start, end))
-            self._status = status
-
-    def _sticks(self) -> str:
-        N, friction = self._contact()
-        if not N > 0:
-            return self._status
-        reached = float(np.linalg.norm(friction)) >= _ON_CONE * self._body.contact.mu_static * N
-        return "slip" if reached else "stick"
-
     def _contact(self) -> tuple[float, Any]:
         """Normal force and friction on the ball in the last step [N]."""
         points = self._world.getContactPoints(self._ball, self._plane)
@@ -156,8 +131,7 @@ class PybulletBall:
             plane = self._world.getBasePositionAndOrientation(self._plane)[1]
             normal = np.array(self._world.getMatrixFromQuaternion(plane)).reshape(3, 3)[:, 2]
             force = N * normal + friction
-        sticking = self._status == "stick" if self._bounded else None
-        return BallSample(np.array(p), np.array(v), np.array(w), np.roll(q, 1), force, sticking)
+        return BallSample(np.array(p), np.array(v), np.array(w), np.roll(q, 1), force)
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -165,9 +139,8 @@ class PybulletBall:
         mu = float(told[1]) * float(self._world.getDynamicsInfo(self._plane, -1)[1])
         shape = self._world.getCollisionShapeData(self._ball, -1)[0]
         f = self._body.contact.rolling_resistance
-        soft = {"acceleration": Regularised(min(1.0, self._bend()), _FLAT)}
-        if not self._bounded:
-            soft |= {f"1 / {kind} friction": Regularised(1 / UNBOUNDED, _NUMBER) for kind in ("static", "kinetic")}
+        soft = {f"1 / {kind} friction": Regularised(1 / UNBOUNDED, _NUMBER) for kind in ("static", "kinetic")}
+        soft["acceleration"] = Regularised(min(1.0, self._bend()), _FLAT)
         return BallBuilt(
             mass=float(told[0]),
             inertia=np.array(told[2], dtype=np.float64),
@@ -176,7 +149,7 @@ class PybulletBall:
             rolling_resistance=f,
             mu_static=mu,
             mu_kinetic=mu,
-            terms=terms_held(resists=f, slips=self._bounded, turns=True),
+            terms=terms_held(resists=f, turns=True),
             regularised=soft,
         )
 
@@ -186,10 +159,6 @@ class PybulletBall:
         turning = float(np.linalg.norm(body.surface.normal_gradient(body.p0) @ body.v0))
         fastest = float(np.linalg.norm(body.v0)) + body.ball.radius * float(np.linalg.norm(body.w0))
         return turning * fastest / natural_acceleration(body)
-
-    def events(self) -> tuple[Event, ...]:
-        """See :class:`proofroll.core.engine_abilities.LocatesEvents`; none with unbounded friction."""
-        return tuple(self._events)
 
 
 def _upright(x: float, y: float, z: float) -> list[float]:

@@ -1,10 +1,10 @@
-"""Rolling without slip of a ball on a cylinder or plane in five states, as symbolic expressions and compiled series.
+"""Rolling of a ball inside an upright cylinder in five states, as symbolic expressions and compiled series.
 
-The surface bends along the arc length q only, along which gravity's direction turns in the local frame: curvature
-k = 1/c on a cylinder, 0 on a plane. State: arc length q and height h [m], velocities v2, v3 of the centre [m/s], ω1
-[rad/s]; all forces are divided by the mass. With κ = J/(m a²), A = (1 + κ)/κ and the drive
+The surface bends along the arc length q only, with the curvature k = 1/c, and gravity is along e3. State: arc length q
+and height h [m], velocities v2, v3 of the centre [m/s], ω1 [rad/s]; all forces are divided by the mass. With κ =
+J/(m a²), A = (1 + κ)/κ and the drive
 
-    b = g_t + a ω1 e1 × ė1 + (f N / (κ a)) v/V
+    b = g + a ω1 e1 × ė1 + (f N / (κ a)) (v - u)/|v - u|
 
 the slip velocity u obeys u̇ = A F + b, whether the ball slips (F = -μk N u/|u|) or sticks (F = -b/A).
 
@@ -20,11 +20,10 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 
 # Order of the run-time parameters that every expression shares. A product of parameters is a parameter itself, for a
 # series would compute it anew in every step.
-PARAMETERS = ("k", "g_x", "g_y", "g_z", "k/a", "k a", "A", "1/A", "f/(kappa a)")
+PARAMETERS = ("k", "g", "k/a", "k a", "A", "1/A", "f/(kappa a)")
 STATES = ("q", "h", "v2", "v3", "w1")
 
 
@@ -36,8 +35,9 @@ class Expressions:
         state: q, h, v2, v3, ω1.
         swing: k/a [1/m²].
         A, per_A: (1 + κ)/κ [1] and its inverse.
-        g2, g3: gravity along the surface [m/s²].
-        b2, b3: drive [m/s²].
+        g: gravity along the axis [m/s²].
+        b2, b3: drive without slip [m/s²].
+        lever: f N/(κ a) [m/s²]; None without rolling resistance.
         N: normal force over mass [m/s²].
     """
 
@@ -45,17 +45,28 @@ class Expressions:
     swing: Any
     A: Any
     per_A: Any
-    g2: Any
-    g3: Any
+    g: Any
     b2: Any
     b3: Any
+    lever: Any
     N: Any
 
     def rates(self, F2: Any, F3: Any, u3: Any = 0.0) -> list[tuple[Any, Any]]:
         """(variable, rate) pairs under the friction F [m/s²], with the slip ``u3`` of the contact along e3 [m/s]."""
         q, h, v2, v3, w1 = self.state
         turning = self.swing * (v3 - u3) * v2
-        return [(q, v2), (h, v3), (v2, self.g2 + F2), (v3, self.g3 + F3), (w1, turning)]
+        return [(q, v2), (h, v3), (v2, F2), (v3, self.g + F3), (w1, turning)]
+
+    def slipping(self, u2: Any, u3: Any) -> tuple[Any, Any]:
+        """Drive b of a contact point that slips with the velocity u [m/s]: resistance is against the rolling alone."""
+        import heyoka as hy
+
+        if self.lever is None:
+            return self.b2, self.b3
+        _, _, v2, v3, _ = self.state
+        r2, r3 = v2 - u2, v3 - u3
+        speed, rolling = hy.sqrt(v2**2 + v3**2), hy.sqrt(r2**2 + r3**2)
+        return self.b2 + self.lever * (r2 / rolling - v2 / speed), self.b3 + self.lever * (r3 / rolling - v3 / speed)
 
     def rolling(self) -> list[tuple[Any, Any]]:
         """(variable, rate) pairs of rolling without slip."""
@@ -78,20 +89,18 @@ def expressions(resistance: bool) -> Expressions:
     import heyoka as hy
 
     q, h, v2, v3, w1 = hy.make_vars(*STATES)
-    k, gx, gy, gz, swing, back, A, per_A, lever = (hy.par[i] for i in range(len(PARAMETERS)))
-    angle = k * q
-    g1, g2 = gx * hy.cos(angle) + gy * hy.sin(angle), gy * hy.cos(angle) - gx * hy.sin(angle)
-    N = g1 + k * v2**2
+    k, g, swing, back, A, per_A, lever = (hy.par[i] for i in range(len(PARAMETERS)))
+    N = k * v2**2
     per_speed = lever * N / hy.sqrt(v2**2 + v3**2) if resistance else hy.expression(0.0)
     return Expressions(
         state=(q, h, v2, v3, w1),
         swing=swing,
         A=A,
         per_A=per_A,
-        g2=g2,
-        g3=gz,
-        b2=g2 + per_speed * v2,
-        b3=gz + back * w1 * v2 + per_speed * v3,
+        g=g,
+        b2=per_speed * v2,
+        b3=g + back * w1 * v2 + per_speed * v3,
+        lever=lever * N if resistance else None,
         N=N,
     )
 
@@ -144,17 +153,11 @@ def reduced(resistance: bool, tolerance: float) -> CompiledEquations:
     )
 
 
-def supports(body: RollingBall) -> bool:
-    """True if the expressions hold on the scene's surface."""
-    return isinstance(body.surface, (Cylinder, Plane))
-
-
 def parameters(body: RollingBall) -> list[float]:
     """Values of :data:`PARAMETERS`."""
     a, kappa, f = body.ball.radius, body.ball.inertia_ratio, body.contact.rolling_resistance
-    k = 1 / body.surface.radius if isinstance(body.surface, Cylinder) else 0.0
-    A = (1 + kappa) / kappa
-    return [float(value) for value in (k, *local_gravity(body), k / a, k * a, A, 1 / A, f / (kappa * a))]
+    k, A, g = 1 / body.surface.radius, (1 + kappa) / kappa, float(np.asarray(body.surface.axis) @ body.gravity)
+    return [float(value) for value in (k, g, k / a, k * a, A, 1 / A, f / (kappa * a))]
 
 
 def start(body: RollingBall) -> FloatArray:
@@ -162,8 +165,3 @@ def start(body: RollingBall) -> FloatArray:
     frame = body.surface.frame(body.u0)
     scales = np.array(body.surface.length_scales)
     return np.concatenate([body.u0 * scales, frame[:, 1:].T @ body.v0, [body.w0 @ frame[:, 0]]])
-
-
-def local_gravity(body: RollingBall) -> FloatArray:
-    """Gravity along the local axes at the coordinates (0, 0) [m/s²], shape (3,)."""
-    return np.asarray(body.surface.frame(np.zeros(2)).T @ body.gravity)

@@ -14,21 +14,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
 from proofroll.core.diagnosis.fitting import ABOVE, Residuals, cached_on_evidence
 from proofroll.core.diagnosis.lines import differing, relative_differences
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment, slip_velocity
 from proofroll.elements.mechanism.run.contacts.stretches import DEGREE, ENDS, accelerations, stretches
 
 if TYPE_CHECKING:
     import xarray as xr
 
 # Numbers that an engine is given; it may report them correctly and yet move with others.
-GIVEN = ("mass", "inertia", "gravity", "ball radius", "rolling resistance", "static friction", "kinetic friction")
+GIVEN = ("mass", "inertia", "gravity", "ball radius", "rolling resistance")
 # Quantities that follow from the law of motion.
 COVERED = ("force", "p_WB", "v_WB", "w_WB", "velocity", "spin", "acceleration", "angular acceleration")
 _SAMPLES = 24
@@ -44,7 +43,6 @@ class BallStates:
         p, v, w: centre, velocity and angular velocity in the world, shape (samples, 3).
         a, alpha: rates of v and w, from the run itself.
         force: force of the wall that the engine reports [N], shape (samples, 3); None if it does not.
-        sticks: nonzero where the ball sticks, shape (samples,).
     """
 
     p: FloatArray
@@ -53,7 +51,6 @@ class BallStates:
     a: FloatArray
     alpha: FloatArray
     force: FloatArray | None
-    sticks: FloatArray
 
 
 @dataclass(frozen=True)
@@ -65,14 +62,12 @@ class Law:
         force: additional force [N] as a function of the velocity.
         moment: additional moment [N m] as a function of e1, the velocity and the angular velocity.
         resisting: moment of rolling resistance [N m] as a function of ball, N and spin; None: the scene's law.
-        slipping: friction [N] during slip as a function of ball, N and the centre's velocity; None: Coulomb's.
     """
 
     body: RollingBall
     force: Callable[[FloatArray], FloatArray] | None = None
     moment: Callable[[FloatArray, FloatArray, FloatArray], FloatArray] | None = None
     resisting: Callable[[RollingBall, float, FloatArray], FloatArray] | None = None
-    slipping: Callable[[RollingBall, float, FloatArray], FloatArray] | None = None
 
 
 def states(body: RollingBall, dataset: xr.Dataset) -> BallStates | None:
@@ -96,48 +91,28 @@ def _states(body: RollingBall, part: xr.Dataset) -> BallStates:
         local = np.stack([-part["N"].to_numpy(), part["F2"].to_numpy(), part["F3"].to_numpy()], axis=-1)
         force = np.einsum("tij,tj->ti", body.surface.frame(u), local)
         force = force[inner] if np.all(np.isfinite(force[inner])) else None
-    sticks = part["sticking"].to_numpy() if "sticking" in part else np.ones(len(t))
     p, v = part["p_WB"].to_numpy(), part["v_WB"].to_numpy()
-    return BallStates(
-        p=p[inner], v=v[inner], w=w[inner], a=a[inner], alpha=alpha[inner], force=force, sticks=sticks[inner]
-    )
+    return BallStates(p=p[inner], v=v[inner], w=w[inner], a=a[inner], alpha=alpha[inner], force=force)
 
 
 def residuals(body: RollingBall, seen: BallStates, law: Law) -> FloatArray:
     """Residuals of a law: accelerations, angular ones times the radius, and forces over mass, in one vector [m/s²]."""
     left = []
     for i in range(len(seen.p)):
-        a, alpha, force = response(law, seen.p[i], seen.v[i], seen.w[i], bool(seen.sticks[i]))
+        a, alpha, force = response(law, seen.p[i], seen.v[i], seen.w[i])
         left += [seen.a[i] - a, body.ball.radius * (seen.alpha[i] - alpha)]
         if seen.force is not None:
             left.append((seen.force[i] - force) / body.ball.mass)
     return np.concatenate(left)
 
 
-def response(
-    law: Law, p: FloatArray, v: FloatArray, w: FloatArray, sticks: bool
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def response(law: Law, p: FloatArray, v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Acceleration, angular acceleration and wall's force at a state: Newton-Euler with the loads of the law."""
     body = law.body
-    a, m, J = body.ball.radius, body.ball.mass, body.ball.inertia
-    e1 = body.surface.normal(p)
     loads = law.force(v) if law.force else np.zeros(3)
-    turning = law.moment(e1, v, w) if law.moment else np.zeros(3)
-    if sticks:
-        held = law.resisting(body, 1.0, w) if law.resisting else None
-        return newton_euler(body, p, v, w, force=loads, moment=turning, resistance=held)
-    applied = m * body.gravity + loads
-    N = float(m * (body.surface.normal_gradient(p) @ v) @ v + applied @ e1)
-    slip = slip_velocity(a, e1, v, w)
-    slip = slip - (slip @ e1) * e1
-    size = float(np.linalg.norm(slip))
-    if law.slipping is not None:
-        friction = law.slipping(body, N, v)
-    else:
-        friction = -body.contact.mu_kinetic * N * slip / size if size else np.zeros(3)
-    force, f = friction - N * e1, body.contact.rolling_resistance
-    resisting = law.resisting(body, N, w) if law.resisting else resistance_moment(f, N, e1, v)
-    return (force + applied) / m, (a * cross(e1, force) + resisting + turning) / J, force
+    turning = law.moment(body.surface.normal(p), v, w) if law.moment else np.zeros(3)
+    held = law.resisting(body, 1.0, w) if law.resisting else None
+    return newton_euler(body, p, v, w, force=loads, moment=turning, resistance=held)
 
 
 @cached_on_evidence
@@ -154,8 +129,6 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
         yield held_at_start(evidence, body, wrong)
     if evidence.run is None or evidence.truth is None or evidence.by_step:
         return
-    if _leaves(evidence.run) and not _leaves(evidence.truth):
-        return  # in flight another law holds, and an impact has no derivative
     seen, true = states(body, evidence.run), states(body, evidence.truth)
     if seen is None or true is None:
         return
@@ -224,13 +197,9 @@ def _contradicted(lines: Sequence[Mapping[str, Any]], body: RollingBall, law: La
     return False
 
 
-def _leaves(data: xr.Dataset) -> bool:
-    return "N" in data and bool(np.any(data["N"].to_numpy()[1:] == 0))
-
-
 def at_start(body: RollingBall, law: Law) -> dict[str, Any]:
     """Expected lines of a certificate for a ball that moves by a law."""
-    acceleration, turning, force = response(law, body.p0, body.v0, body.w0, True)
+    acceleration, turning, force = response(law, body.p0, body.v0, body.w0)
     local = body.surface.frame(body.u0).T @ force
     ball, contact = law.body.ball, law.body.contact
     return {
@@ -238,8 +207,6 @@ def at_start(body: RollingBall, law: Law) -> dict[str, Any]:
         "inertia": [ball.inertia] * 3,
         "gravity": law.body.gravity,
         "rolling resistance": [contact.rolling_resistance],
-        "static friction": [contact.mu_static],
-        "kinetic friction": [contact.mu_kinetic],
         "acceleration": acceleration,
         "angular acceleration": turning,
         "N": [-local[0]],
@@ -251,11 +218,6 @@ def at_start(body: RollingBall, law: Law) -> dict[str, Any]:
 def falling(element: Any, gravity: FloatArray) -> Law:
     """Law with another gravity [m/s²]."""
     return Law(dataclasses.replace(element.rolling, gravity=gravity))
-
-
-def is_bounded(body: RollingBall) -> bool:
-    """True if friction is bounded, so that the scene's ball may slip."""
-    return bool(np.isfinite(body.contact.mu_static))
 
 
 def has_resistance(body: RollingBall) -> bool:

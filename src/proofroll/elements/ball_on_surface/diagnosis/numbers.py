@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import change_by, factor_text, known_factor, possible
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, is_bounded, residuals_of
+from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, residuals_of
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 
@@ -22,11 +22,6 @@ def _resisting(body: RollingBall, f: float) -> RollingBall:
     """Ball with any rolling resistance f [m], even a negative one, with which an engine may drive the ball."""
     contact = copy.copy(body.contact)
     object.__setattr__(contact, "rolling_resistance", f)
-    return dataclasses.replace(body, contact=contact)
-
-
-def _friction(body: RollingBall, mu: float) -> RollingBall:
-    contact = dataclasses.replace(body.contact, mu_kinetic=mu, mu_static=max(mu, body.contact.mu_static))
     return dataclasses.replace(body, contact=contact)
 
 
@@ -132,14 +127,6 @@ NUMBERS: tuple[Any, ...] = (
         "the moment is f N against the rolling, f a length in metres",
         only=has_resistance,
         signed=True,
-    ),
-    number(
-        "kinetic friction",
-        "a kinetic friction",
-        lambda body: body.contact.mu_kinetic,
-        _friction,
-        "while it slips the friction is the kinetic coefficient times N",
-        only=is_bounded,
     ),
     damping("the velocity is", 1.0, 0.0),
     damping("the spin is", 0.0, 1.0),

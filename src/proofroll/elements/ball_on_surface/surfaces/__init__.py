@@ -1,18 +1,16 @@
-"""Tables of surfaces that a ball touches, and the planes and cylinders that its own mechanics knows."""
+"""Tables of surfaces that a ball touches, and the cylinder that its own mechanics knows."""
 
 from dataclasses import is_dataclass
 from functools import cache
 from typing import Any
 
 from proofroll.core.entry_points import leave_out, loaded
-from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
-from proofroll.elements.ball_on_surface.surfaces.of_revolution import Bowl, Cone, Torus
-from proofroll.elements.ball_on_surface.surfaces.plane import Plane
-from proofroll.elements.ball_on_surface.surfaces.surface import Generator, Surface
+from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder, Generator
+from proofroll.elements.ball_on_surface.surfaces.tables import Bowl, Cone, Plane, Torus
 from proofroll.elements.mechanism.scene.shapes.walls.declared import Declared
 from proofroll.elements.mechanism.scene.shapes.walls.revolved import Revolved
 
-__all__ = ["Bowl", "Cone", "Cylinder", "Declared", "Generator", "Plane", "Revolved", "Surface", "Torus"]
+__all__ = ["Bowl", "Cone", "Cylinder", "Declared", "Generator", "Plane", "Revolved", "Torus"]
 
 
 @cache

@@ -1,23 +1,42 @@
-"""The inside of a circular cylinder."""
+"""The inside of a circular cylinder, for the centre of a ball.
+
+It describes itself twice, independently: by a parametrisation (position, tangents, second derivatives; what constraint
+models need) and by a signed distance with its derivatives (what contact models need). ``u`` are its two coordinates,
+shape (..., 2); array arguments may carry leading dimensions (``...``), e.g. time. Local frame at a point, columns of
+:meth:`Cylinder.frame`: ``e1`` unit normal, from the ball's centre towards the wall; ``e2`` along the first coordinate,
+``e3 = e1 × e2``.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.bounds import require_bounds
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.surfaces.surface import Generator, components, tilted
 
 # Matrices on places [m] as rows: projection across the axis, and that projection turned about the axis by 90°.
 _ACROSS = np.array([1.0, 1.0, 0.0])
 _AROUND = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+@dataclass(frozen=True)
+class Generator:
+    """One of the two rigid motions that slide a homogeneous surface along itself.
+
+    Attributes:
+        kind: ``rotation`` about, or ``translation`` along, a line through the world origin.
+        axis: unit direction of that line in the world, shape (3,).
+    """
+
+    kind: Literal["rotation", "translation"]
+    axis: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -46,41 +65,45 @@ class Cylinder:
 
     @property
     def length_scales(self) -> tuple[float, float]:
-        """See :class:`Surface`."""
+        """Largest distance travelled per unit of each coordinate [m/unit]."""
         return (self.radius, 1.0)
 
     @property
+    def axis(self) -> tuple[float, float, float]:
+        """Direction of its axis, which runs through the world's origin."""
+        return components(tilted(self.tilt)[:, 2])
+
+    @property
     def generators(self) -> tuple[Generator, Generator]:
-        """See :class:`Surface`."""
-        axis = components(tilted(self.tilt)[:, 2])
-        return (Generator("rotation", axis), Generator("translation", axis))
+        """Motions G1, G2 with p(u) = G1(u1) G2(u2) p(0), likewise frame(u)."""
+        return (Generator("rotation", self.axis), Generator("translation", self.axis))
 
     def offset(self, ball_radius: float) -> Cylinder:
-        """See :class:`Surface`."""
+        """Surface on which the centre of a touching ball of this radius [m] moves."""
         if not ball_radius < self.radius:
             raise InputError("radius", ball_radius, f"the ball must be smaller than {self.name} with {self.radius:g} m")
         return Cylinder(self.name, self.radius - ball_radius, self.tilt)
 
     def position(self, u: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """p_WB: centre of the ball in the world [m], shape (..., 3)."""
         gamma, z = np.moveaxis(np.asarray(u, dtype=np.float64), -1, 0)
         c = self.radius
         return np.stack([c * np.cos(gamma), c * np.sin(gamma), z], axis=-1) @ tilted(self.tilt).T
 
     def tangents(self, u: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """∂p/∂u [m/unit], shape (..., 3, 2)."""
         frame = self.frame(u)
         return np.stack([self.radius * frame[..., 1], frame[..., 2]], axis=-1)
 
     def second(self, u: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """∂²p/∂u∂u [m/unit²], shape (..., 3, 2, 2)."""
         frame = self.frame(u)
         result = np.zeros((*frame.shape[:-2], 3, 2, 2))
         result[..., 0, 0] = -self.radius * frame[..., 0]
         return result
 
     def frame(self, u: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """Local frame with columns e1, e2, e3, shape (..., 3, 3)."""
         gamma = np.asarray(u, dtype=np.float64)[..., 0]
         if gamma.ndim == 0 and math.isfinite(gamma):
             return self._frame(math.cos(gamma), math.sin(gamma))
@@ -104,7 +127,7 @@ class Cylinder:
         return np.array([[across * cos, -across * sin, down], [sin, cos, 0.0], [-down * cos, down * sin, across]])
 
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-        """See :class:`Surface`."""
+        """Gap [m] and the components of e1 at one point, as floats for loops that call it at every step."""
         if not self.tilt:  # upright: fewer products
             distance = math.sqrt(x * x + y * y)
             size = distance or math.nan
@@ -116,7 +139,7 @@ class Cylinder:
         return self.radius - distance, across * cos, y / (distance or math.nan), -down * cos
 
     def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
-        """See :class:`Surface`."""
+        """Components of e1, e2, e3 at one point, nine floats in this order, for loops that call it at every step."""
         if not self.tilt:  # upright: a third fewer products
             distance = math.sqrt(x * x + y * y) or math.nan
             cos, sin = x / distance, y / distance
@@ -128,7 +151,7 @@ class Cylinder:
         return across * cos, sin, -down * cos, -across * sin, cos, down * sin, down, 0.0, across
 
     def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
-        """See :class:`Surface`."""
+        """Gap [m], :meth:`triad` and (∂e1/∂p) v [1/s] for a velocity v [m/s]: 13 floats in this order."""
         across, down = self._tilted
         x = across * x - down * z
         distance = math.sqrt(x * x + y * y) or math.nan
@@ -142,7 +165,7 @@ class Cylinder:
         return np.asarray(np.asarray(p_WB, dtype=np.float64) @ tilted(self.tilt), dtype=np.float64)
 
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """Coordinates u of the nearest point, shape (..., 2); a periodic coordinate is in (-period/2, period/2]."""
         if np.ndim(p_WB) == 1:
             x, y, z = np.asarray(p_WB, dtype=np.float64).tolist()
             across, down = self._tilted
@@ -151,21 +174,21 @@ class Cylinder:
         return np.stack([np.arctan2(p[..., 1], p[..., 0]), p[..., 2]], axis=-1)
 
     def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """Distance of the ball from the wall [m], shape (...); negative where it has sunk in."""
         if np.ndim(p_WB) == 1:
             return np.asarray(self.nearby(*np.asarray(p_WB).tolist())[0])
         p = self._local(p_WB)
         return np.asarray(self.radius - np.hypot(p[..., 0], p[..., 1]), dtype=np.float64)
 
     def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """e1 = -∇gap at any point near the surface, shape (..., 3)."""
         if np.ndim(p_WB) == 1:
             return np.array(self.nearby(*np.asarray(p_WB).tolist())[1:])
         p = self._local(p_WB)
         return np.asarray(p * _ACROSS / np.hypot(p[..., 0], p[..., 1])[..., None] @ tilted(self.tilt).T)
 
     def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
+        """∂e1/∂p = -∇∇gap [1/m], shape (..., 3, 3)."""
         if np.ndim(p_WB) == 1:
             x, y, z = np.asarray(p_WB).tolist()
             across, down = self._tilted
@@ -179,3 +202,15 @@ class Cylinder:
         radial = np.hypot(p[..., 0], p[..., 1])[..., None]
         e2 = p @ _AROUND / radial @ tilted(self.tilt).T  # along which alone the normal turns
         return np.asarray(e2[..., :, None] * (e2 / radial)[..., None, :])
+
+
+@lru_cache
+def tilted(angle: float) -> FloatArray:
+    """Rotation by ``angle`` [rad] about the world's y axis, read-only, shape (3, 3)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return read_only(np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))  # every caller shares it
+
+
+def components(column: FloatArray) -> tuple[float, float, float]:
+    """A vector of shape (3,) as plain floats."""
+    return (float(column[0]), float(column[1]), float(column[2]))

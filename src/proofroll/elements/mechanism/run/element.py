@@ -224,9 +224,10 @@ class MechanismElement:
 
     @cached_property
     def turn_interval(self) -> float | None:
-        """See :class:`proofroll.core.element_abilities.CountsTurns`; None without a revolute or universal joint."""
+        """See :class:`proofroll.core.element_abilities.CountsTurns`; None without a joint or wall to turn about."""
         if not any(joint.kind in TURNING for joint in self.mechanism.joints):
-            return None
+            rounds = self.on_wall is not None and any(self.on_wall.surface.periods)
+            return max(EVERY, PART * self.natural_time) if rounds else None
         spin = longest(self.start.w_WB)
         # A body that turns freely does so evenly, however fast; samples at the usual rate then show its turns.
         fast = max(EVERY, PART * 2 * np.pi / spin) if spin else np.inf

@@ -9,8 +9,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
-from proofroll.engines.exudyn.ball.friction import slow
-from proofroll.engines.exudyn.ball.local_frame import curvature
+from proofroll.engines.exudyn.ball.local_frame import curvature, slow
 from proofroll.engines.exudyn.native import Output, add_rigid_body, items, loads, rigid_body
 
 

@@ -1,8 +1,9 @@
 """A rigid ball held by a massless carrier whose only motions slide the wall along itself.
 
-The carrier's joint with the ground frees exactly the wall's two generators, and the ball turns about a point of the
-carrier. Rolling is two constraints between rates of relative coordinates. Everything is a built-in item of Exudyn;
-without rolling resistance no Python runs while it integrates. The carrier has no mass and no inertia at all.
+The carrier's joint with the ground frees turning about the cylinder's axis and sliding along it, and the ball turns
+about a point of the carrier. Rolling is two constraints between rates of relative coordinates. Everything is a built-in
+item of Exudyn; without rolling resistance no Python runs while it integrates. The carrier has no mass and no inertia at
+all.
 """
 
 from typing import Any, NamedTuple
@@ -10,13 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
-from proofroll.elements.ball_on_surface.surfaces import Generator
 from proofroll.engines.exudyn.ball.ball import add_ball, add_body
-from proofroll.engines.exudyn.ball.local_frame import LocalGeometry, local_geometry
-from proofroll.engines.exudyn.integration import BallRun, Integration
+from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
@@ -35,62 +33,48 @@ class RollingRow(NamedTuple):
     axis: FloatArray
 
 
-class Carrier(BallRun):
+class Carrier(ExudynModel):
     """Ball, carrier, two ``GenericJoint`` and two ``CoordinateConstraint`` at velocity level."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
-        """Builds and initialises; raises Refused if the generators do not fit one joint."""
-        local = local_geometry(body.surface, body.u0)
+        """Builds and initialises."""
         super().__init__()
         add_marker, add_object = self.system.AddMarker, self.system.AddObject
         self.ground = add_object(items.ObjectGround())
         self.ball = add_ball(self.system, body)
-        rates = {kind: np.zeros(3) for kind in ("rotation", "translation")}
-        for generator, rate in zip(local.generators, body.udot0, strict=True):
-            rates[generator.kind] += rate * np.asarray(generator.axis)
-        self.velocity, self.spin = rates["translation"], rates["rotation"]
+        frame, (turning, rise) = body.surface.frame(body.u0), body.udot0
+        axis = frame[:, 2]
+        self.velocity, self.spin = rise * axis, turning * axis
         self.node, self.carrier = add_body(self.system, 0.0, 0.0, np.zeros(3), self.velocity, self.spin)
-        self.axes, self.constrained = _joint_axes(local.generators)
+        self.axes, self.constrained = frame, [1, 1, 0, 1, 1, 0]
         ends, transform = (self.ground, self.carrier), exu.HT(rotation=self.axes)
         guide = [add_marker(items.MarkerBodyRigid(bodyNumber=end, localHT=transform)) for end in ends]
         add_object(items.GenericJoint(markerNumbers=guide, constrainedAxes=self.constrained))
         # The carrier is not turned at time 0, so the ball's centre in it is its place in the world.
-        self.centre, self.normal = body.p0, body.surface.frame(body.u0)[:, 0]
+        self.centre, self.normal = body.p0, frame[:, 0]
         pivot = add_marker(items.MarkerBodyRigid(bodyNumber=self.carrier, localPosition=self.centre))
         self.joint = add_object(
             items.GenericJoint(markerNumbers=[pivot, self.ball.marker], constrainedAxes=[1, 1, 1, 0, 0, 0])
         )
-        self.rolling = self._constrain(body, local)
+        self.rolling = self._constrain(body, frame)
         self.system.Assemble()
         self.integration = Integration(self.system, settings, self._turning(body))
 
-    def _constrain(self, body: RollingBall, local: LocalGeometry) -> list[RollingRow]:
-        """Adds rolling along e2 and e3: K u̇ ± a (spin of the ball relative to the carrier) = 0.
-
-        Raises:
-            Refused: rolling along one direction involves both coordinates of the carrier.
-        """
-        frame, a = body.surface.frame(body.u0), body.ball.radius
-        result = []
-        for direction, about, sign in ((1, 2, 1.0), (2, 1, -1.0)):
-            row = local.tangents[direction] + sign * a * local.turn[about]
-            (columns,) = np.nonzero(np.abs(row) > 1e-12 * np.max(np.abs(row)))
-            if len(columns) != 1:
-                raise Refused("rolling along one direction needs both of the carrier's coordinates at once")
-            k = int(columns[0])
-            generator, axis = local.generators[k], frame[:, about]
-            coordinate = getattr(items, f"MarkerBodiesRelative{generator.kind.capitalize()}Coordinate")
-            rate = coordinate(bodyNumbers=[self.ground, self.carrier], axis0=generator.axis)
-            spin = items.MarkerBodiesRelativeRotationCoordinate(
-                bodyNumbers=[self.carrier, self.ball.body], axis0=axis, localPosition0=self.centre
-            )
+    def _constrain(self, body: RollingBall, frame: FloatArray) -> list[RollingRow]:
+        """Adds rolling along e2 and e3: K u̇ ± a (spin of the ball relative to the carrier) = 0."""
+        a, result = body.ball.radius, []
+        around, along = items.MarkerBodiesRelativeRotationCoordinate, items.MarkerBodiesRelativeTranslationCoordinate
+        # The ball is carried round on a radius longer by its own: the carrier turns it, too.
+        for coordinate, way, about, sign in ((around, body.surface.radius + a, 2, 1.0), (along, 1.0, 1, -1.0)):
+            rate = coordinate(bodyNumbers=[self.ground, self.carrier], axis0=frame[:, 2])
+            spin = around(bodyNumbers=[self.carrier, self.ball.body], axis0=frame[:, about], localPosition0=self.centre)
             # Exudyn's constraint is factor1 value1 - value0 = 0.
             item = items.CoordinateConstraint(
                 markerNumbers=[self.system.AddMarker(marker) for marker in (rate, spin)],
-                factor1=-sign * a / row[k],
+                factor1=-sign * a / way,
                 velocityLevel=True,
             )
-            result.append(RollingRow(self.system.AddObject(item), float(row[k]), axis))
+            result.append(RollingRow(self.system.AddObject(item), way, frame[:, about]))
         return result
 
     def _factor(self, row: RollingRow) -> float:
@@ -115,25 +99,3 @@ class Carrier(BallRun):
         # Distance of the ball's centre from its place in the carrier, whose axes are the world's at time 0.
         off = self.system.GetObjectOutput(self.joint, Output.DisplacementLocal)
         return self.ball.built(abs(self._factor(row) * row.along), -float(off @ self.normal))
-
-
-def _joint_axes(generators: tuple[Generator, Generator]) -> tuple[FloatArray, list[int]]:
-    """Axes of the carrier's joint, as columns, and 1 for each translation and rotation that it locks.
-
-    Raises:
-        Refused: the generators are two rotations, or skew, so that no single joint frees them.
-    """
-    if all(generator.kind == "rotation" for generator in generators):
-        raise Refused("one joint cannot guide the carrier about two axes")
-    axis_1, axis_2 = (np.asarray(generator.axis) for generator in generators)
-    parallel = bool(abs(axis_1 @ axis_2) > 1 - 1e-12)
-    if not parallel and abs(axis_1 @ axis_2) > 1e-12:
-        raise Refused("one joint cannot guide the carrier along skew axes")
-    side = np.eye(3)[np.argmin(np.abs(axis_1))] if parallel else axis_2
-    side = side - (side @ axis_1) * axis_1
-    side = side / np.linalg.norm(side)
-    axes = np.stack([np.cross(side, axis_1), side, axis_1], axis=-1)
-    constrained = [1] * 6
-    for generator, axis in zip(generators, (2, 2 if parallel else 1), strict=True):
-        constrained[axis + (3 if generator.kind == "rotation" else 0)] = 0
-    return axes, constrained

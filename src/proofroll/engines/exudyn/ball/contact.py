@@ -16,41 +16,31 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event, EventKind
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, newton_euler
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.exudyn.ball.ball import add_ball
 from proofroll.engines.exudyn.ball.local_frame import curvature
 from proofroll.engines.exudyn.contact.hollow_spheres import ON_A_PLANE
-from proofroll.engines.exudyn.integration import BallRun, Integration
+from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
-# Slip speed, in units of ``friction_zone``, from which the ball counts as slipping: at a grazing onset, time steps
-# throw the slip velocity to and fro across the edge of the zone itself.
+# Slip speed, in units of ``friction_zone``, from which the ball counts as slipping: time steps throw the slip velocity
+# to and fro across the edge of the zone itself.
 SURELY = 2.0
-# Part of the natural force [1]: with less normal force than this, a ball that slips for lack of grip is about to leave
-# the wall, and one with unbounded friction would leave it hardly later.
-LETTING_GO = 0.01
 # Looked up once: the functions that Exudyn calls use them at every iterate and step.
 POSITION, COORDINATES = Output.Position, Output.Coordinates
 # What double precision leaves of any quantity, relative to its scale.
 ROUND_OFF = 1e-12
 
 
-class PenaltyContact(BallRun):
+class PenaltyContact(ExudynModel):
     """A rigid ball and one ``ObjectContactSphereSphere`` with a hollow sphere; needs no generators of the surface."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
-        """Builds and initialises; raises Refused if static and kinetic friction differ, or nothing presses the ball."""
-        law = body.contact
-        if law.mu_static != law.mu_kinetic:
-            raise Refused("its contact has one coefficient of friction; make mu_kinetic equal to mu_static")
-        self.bounded = math.isfinite(law.mu_static)
-        self._natural = body.ball.mass * natural_acceleration(body)
-        stiffness, self.zone, self._grip = settings.penalty
-        mu = law.mu_kinetic if self.bounded else self._grip
+        """Builds and initialises; raises Refused if nothing presses the ball, or rolling needs more than the grip."""
+        stiffness, self.zone, mu = settings.penalty
         e1 = body.surface.normal(body.p0)
         force = newton_euler(body, body.p0, body.v0, body.w0)[2]
         N = float(-force @ e1)
@@ -59,9 +49,9 @@ class PenaltyContact(BallRun):
         friction = force + N * e1
         # At this slip velocity the softened friction is the one that rolling needs, from time 0 on.
         needed = float(np.linalg.norm(friction))
-        if needed > mu * N and not self.bounded:
+        if needed > mu * N:
             raise Refused("rolling needs more friction than grip at time 0; use a larger grip")
-        creep = -self.zone * friction / (max(mu * N, needed) or 1.0)
+        creep = -self.zone * friction / (mu * N)
         sunk = N / stiffness
         if sunk >= body.ball.radius:
             raise Refused(f"the load presses the ball {sunk:.3g} m into so soft a wall; use a larger stiffness")
@@ -98,55 +88,24 @@ class PenaltyContact(BallRun):
         self.system.Assemble()
         self._start = body, settings, creep, N, mu, hollow
         self._t = 0.0
-        self._left: tuple[float, float] | None = None
-        self._sticks = needed <= mu * N
         self.system.SetPostStepUserFunction(self._watch)
         self.integration = Integration(self.system, settings)
-        if not self._sticks:
-            self.integration.events.append(Event(EventKind.SLIP, 0.0, 0.0, 0.0))
 
     def _watch(self, system: Any, t: float) -> bool:
-        """Records events; Exudyn calls it after each step and once at the start. False ends the run."""
+        """Ends a run that leaves the model; Exudyn calls it after each step and once at the start. False ends it."""
         if t <= self._t:
             return True
+        self._t = t
         gap, speed, _, _ = system.GetNodeOutput(self.data, COORDINATES).tolist()
         if gap > 0:
-            self.integration.events.append(Event(EventKind.LIFT_OFF, 0.5 * (self._t + t), self._t, t))
             self.integration.complaint = "the ball leaves the wall"
-            return False
-        slip = speed / self.zone
-        if self._sticks:
-            if slip < 1:
-                self._left = None
-            elif self._left is None:
-                self._left = self._t, t
-            if self._left is not None and slip > SURELY:
-                self._switch(EventKind.SLIP, *self._left)
-        elif slip < 1:
-            self._switch(EventKind.STICK, self._t, t)
-        self._t = t
-        return self.integration.complaint is None
-
-    def _switch(self, kind: EventKind, low: float, high: float) -> None:
-        if not self.bounded:
-            # Any bounded friction slips just before the ball leaves the wall: then the grip is not too small.
-            if self._pressing() < LETTING_GO * self._natural:
-                self._sticks = False
-                return
+        elif speed > SURELY * self.zone:
             self.integration.complaint = "the ball slips, as rolling needs more friction than grip (use a larger grip),"
-            return
-        self.integration.events.append(Event(kind, 0.5 * (low + high), low, high))
-        self._sticks, self._left = kind == EventKind.STICK, None
-
-    def _pressing(self) -> float:
-        """Normal force on a slipping ball [N], from the size of the contact force and the grip."""
-        force = np.asarray(self.system.GetObjectOutput(self.contact, Output.Force))
-        return float(np.linalg.norm(force)) / math.hypot(1.0, self._grip)
+        return self.integration.complaint is None
 
     def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`. The force is that of the contact."""
-        force = self.system.GetObjectOutput(self.contact, Output.Force)
-        return dataclasses.replace(self.ball.sample(force), sticking=self._sticks if self.bounded else None)
+        return self.ball.sample(self.system.GetObjectOutput(self.contact, Output.Force))
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -154,10 +113,7 @@ class PenaltyContact(BallRun):
         gap = float(self.system.GetObjectOutput(self.contact, Output.DisplacementLocal))
         built = self.ball.built(float(contact["spheresRadii"][0] + gap / 2), gap)
         mu = float(contact["dynamicFriction"])
-        terms = built.terms or frozenset()
-        if mu != self._grip:
-            terms |= {BallCapability.BOUNDED_FRICTION}
-        return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, terms=terms, regularised=_softened(*self._start))
+        return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, regularised=_softened(*self._start))
 
 
 def _follower(
@@ -205,7 +161,8 @@ def _softened(
     F = mu * press / zone * ulp * (speed + a * spin + slip) + N
     natural = natural_acceleration(body)
     stiff = "the stiff contact magnifies the round-off of distance and slip velocity"
-    softened = {
+    grips = "a finite bound stands for unbounded friction; a run that exceeds it is ended"
+    return {
         "gap in the engine": Regularised(
             (press / stiffness + distance) / a + ROUND_OFF, "the contact presses as deep as the ball has sunk in"
         ),
@@ -215,11 +172,8 @@ def _softened(
         **{name: Regularised(F / (m * natural) + ROUND_OFF, stiff) for name in ("F2", "F3", "acceleration")},
         # The moment a F about the centre, over J.
         "angular acceleration": Regularised(m * a**2 / J * F / (m * natural) + ROUND_OFF, stiff),
+        **{f"1 / {name} friction": Regularised(1 / mu + ROUND_OFF, grips) for name in ("static", "kinetic")},
     }
-    if not math.isfinite(body.contact.mu_static):
-        grips = "a finite bound stands for unbounded friction; a run that exceeds it is ended"
-        softened |= {f"1 / {name} friction": Regularised(1 / mu + ROUND_OFF, grips) for name in ("static", "kinetic")}
-    return softened
 
 
 def _centre(body: RollingBall, distance: float) -> FloatArray:

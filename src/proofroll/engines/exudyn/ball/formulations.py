@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.engines.exudyn.ball.carrier import Carrier
 from proofroll.engines.exudyn.ball.contact import PenaltyContact
 from proofroll.engines.exudyn.ball.generic import Generic
@@ -16,17 +16,14 @@ RUNS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
     "rolling_disc": RollingDisc,
     "contact": PenaltyContact,
 }
-_ROLLS: Mapping[str, str] = {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip"}
 PROVIDES: Mapping[str, frozenset[str]] = {
     "generic": ALL_OF_A_BALL - {BallCapability.ORIENTATION},
-    "carrier": ROLLS | {BallCapability.ORIENTATION},
-    "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
+    "carrier": ALL_OF_A_BALL,
+    "rolling_disc": ALL_OF_A_BALL,
     "contact": ALL_OF_A_BALL,
 }
 LACKING: Mapping[str, Mapping[str, str]] = {
     "generic": {BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation"},
-    "carrier": _ROLLS,
-    "rolling_disc": _ROLLS,
 }
 INHERENT: Mapping[str, Mapping[str, str]] = {
     formulation: {BallCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}

@@ -12,12 +12,12 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.exudyn.ball.ball import add_ball
-from proofroll.engines.exudyn.integration import BallRun, Integration
+from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 
-class RollingDisc(BallRun):
+class RollingDisc(ExudynModel):
     """A rigid ball and one re-aimed ``ObjectJointRollingDisc``; needs no generators of the surface."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:

@@ -7,7 +7,7 @@ should stick creeps.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple
 
@@ -16,6 +16,7 @@ from typing_extensions import override
 
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import NotUnique, Refused
+from proofroll.core.events import Event
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.contact.acting import OPEN
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
@@ -23,6 +24,7 @@ from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.run.contacts.step_events import StepEvents, state_of
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
@@ -66,11 +68,21 @@ def family(settings: ExudynSettings) -> Mapping[str, str]:
 
 
 class _Made(NamedTuple):
-    """One contact in Exudyn: its object, the sign of its force on body a, and how deep it starts [m]."""
+    """One contact in Exudyn.
+
+    Attributes:
+        item: its object.
+        data: node with its gap [m] and slip speed [m/s].
+        sign: of its force on body a.
+        sunk: depth at the start [m].
+        zone: slip speed from which its friction is at the bound [m/s]; infinite where friction is unbounded.
+    """
 
     item: Any
+    data: Any
     sign: float
     sunk: float
+    zone: float
 
 
 class Spheres(Redundant):
@@ -82,6 +94,7 @@ class Spheres(Redundant):
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
         """Adds contacts at the depth of their load at the start, with spheres enlarged by that depth."""
         self._contacts: list[_Made] = []
+        self._events = StepEvents(mechanism.contacts, settings.dt)
         self._following: list[HollowSphere | MovingPlane] = []
         self._softness, self._larger, self._builds_up = 0.0, 0.0, False
         if not mechanism.contacts:
@@ -104,6 +117,8 @@ class Spheres(Redundant):
         moments = start.force[len(start.force) - len(dynamics.turning) :]
         for friction, moment in zip(dynamics.turning, moments, strict=True):
             lacking += self._add_turning(friction, moment, start.state.touching[friction.pressed_by], settings)
+        if self._events:
+            self.system.SetPostStepUserFunction(self._observe)
         if self._following:
             self.system.SetPreNewtonResidualUserFunction(self._follow)
         load = float(np.abs(start.force[: len(mechanism.contacts)]).max(initial=0.0))
@@ -124,10 +139,11 @@ class Spheres(Redundant):
         (body, shape), (partner, second) = sides
         assert isinstance(shape, SphereShape)
         self._larger = max(self._larger, sunk / shape.radius)
+        data = self.system.AddNode(
+            items.NodeGenericData(initialCoordinates=[gap - sunk, slip, 0.0, 0.0], numberOfDataCoordinates=4)
+        )
         law: dict[str, Any] = {
-            "nodeNumber": self.system.AddNode(
-                items.NodeGenericData(initialCoordinates=[gap - sunk, slip, 0.0, 0.0], numberOfDataCoordinates=4)
-            ),
+            "nodeNumber": data,
             "dynamicFriction": min(contact.friction, _GRIP),
             "frictionProportionalZone": zone * _GRIP if np.isinf(contact.friction) else zone,
             "contactStiffness": stiffness,
@@ -160,7 +176,14 @@ class Spheres(Redundant):
                 spheresRadii=[shape.radius + sunk, second.radius],
                 **law,
             )
-        return _Made(self.system.AddObject(made), sign, sunk)
+        sticks, slips = np.isinf(contact.friction), not contact.friction
+        return _Made(
+            item=self.system.AddObject(made),
+            data=data,
+            sign=sign,
+            sunk=sunk,
+            zone=np.inf if sticks else 0.0 if slips else zone,
+        )
 
     def _add_turning(
         self, friction: TurningFriction, moment: Array, touch: Touching, settings: ExudynSettings
@@ -220,6 +243,20 @@ class Spheres(Redundant):
     def _follow(self, system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG002 -- Exudyn's signature
         for wall in self._following:
             wall.follow(system)
+
+    def _observe(self, system: Any, t: float) -> bool:
+        """Takes the contacts' states after a step; Exudyn calls it once at the start, too. True goes on."""
+        if t > 0.0:
+            states = []
+            for made in self._contacts:
+                gap, slip, _, _ = system.GetNodeOutput(made.data, Output.Coordinates).tolist()
+                states.append(state_of(-gap, slip, made.zone))
+            self._events.observe(t, tuple(states))
+        return True
+
+    def events(self) -> Sequence[Event] | None:
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`; what slips faster than its zone has left it."""
+        return self._events.events()
 
     def _moved(self, *bodies: str) -> float:
         """Reduced mass of two bodies [kg]; the world counts as infinite."""

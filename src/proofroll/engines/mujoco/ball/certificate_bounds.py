@@ -8,8 +8,7 @@ import numpy as np
 from proofroll.core.engine import Regularised
 from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.mujoco.ball.friction import corrects
-from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings
+from proofroll.engines.mujoco.settings import MujocoSettings
 
 _FORCES = ("acceleration", "N", "F2", "F3")
 _MORE = "friction against turning or rolling, which the scene does not ask for, turns the ball otherwise"
@@ -17,8 +16,6 @@ _MORE = "friction against turning or rolling, which the scene does not ask for, 
 _MARGIN = 1.1
 _SOLVER = 1e-8
 _ROUND_OFF = 1e-12
-# Error left where a state at time 0 is found by iteration.
-_SEQUENCE = 1e-6
 
 
 def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regularised]:
@@ -36,16 +33,14 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     # normal acceleration of the path (``bend``) if J̇v is missing, and its change over ``normal_lead``. Along the wall
     # a ω × ė1 is missing, divided between motion and friction.
     ahead = 2 * settings.normal_lead * abs(float(e1_rate @ initial_response(body)[0]))
-    pressed = PRELOAD if corrects(body.contact, settings) else 0.0
-    missing = (1 - least + pressed) * load + ahead + (bend if lacks else 0.0)
+    missing = (1 - least) * load + ahead + (bend if lacks else 0.0)
     turning = np.cross(e1, np.cross(body.w0, e1_rate))  # its part along the wall, turned
     creep = a * float(np.linalg.norm(turning)) * r / (1 + r) if lacks else 0.0
     why = "the impedance of a soft contact is below 1" + (" and its rows lack J̇v" if lacks else "")
     result = dict(_computed(body, settings))
     if settings.start == "touching":
         # Friction is bounded by the little normal force of a contact at depth zero.
-        supplied = least * max(float(body.gravity @ e1) + (0.0 if lacks else bend), 0.0)
-        lost = _law_of_friction(body, settings, supplied * body.ball.mass)
+        lost = _law_of_friction(body, settings, 0.0 if lacks else least * bend * body.ball.mass)
         why += "; the ball starts at depth zero, where no depth makes up for it"
         if lost:
             why += " and the normal force that remains does not hold the friction"
@@ -59,10 +54,7 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     sunk = f"a soft contact carries the load only at a depth, {depth:.1e} of the radius at most"
     rolls = "MuJoCo's contact point, at which it rolls, lies midway in that depth"
     # The depth shortens the lever of friction, which balances gravity along the wall.
-    law = _MARGIN * _law_of_friction(body, settings, None)
-    if law:
-        why += "; as the ball slips from the start, MuJoCo's cone of friction lifts it or turns its friction"
-    soft = (2 * (1 - least) * load + depth * gravity + _MARGIN * creep + law) / scale + _SOLVER
+    soft = (2 * (1 - least) * load + depth * gravity + _MARGIN * creep) / scale + _SOLVER
     return result | {
         "position": Regularised(depth, sunk),
         "gap": Regularised(depth, sunk),
@@ -93,38 +85,30 @@ def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str
 
 def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str, Regularised]]:
     """Tolerances of the coefficient that stands for unbounded friction, of rolling resistance and of the velocity."""
-    if math.isinf(body.contact.mu_static):
-        stands = f"MuJoCo has no unbounded friction: a coefficient of {settings.friction:g} stands for it"
-        for name in ("1 / static friction", "1 / kinetic friction"):
-            yield name, Regularised((1 + _ROUND_OFF) / settings.friction, stands)
+    stands = f"MuJoCo has no unbounded friction: a coefficient of {settings.friction:g} stands for it"
+    for name in ("1 / static friction", "1 / kinetic friction"):
+        yield name, Regularised((1 + _ROUND_OFF) / settings.friction, stands)
     if body.contact.rolling_resistance:
         yield "rolling resistance", Regularised(_SOLVER, "its torque uses the normal force of the evaluation before")
     if settings.velocity_lag:
-        # With the correction of a slip, that acceleration is found by iteration.
-        share = _SEQUENCE if corrects(body.contact, settings) else _SOLVER
-        yield "velocity", Regularised(share, "it is MuJoCo's of half a step before plus half a step's acceleration")
+        yield "velocity", Regularised(_SOLVER, "it is MuJoCo's of half a step before plus half a step's acceleration")
 
 
-def _law_of_friction(body: RollingBall, settings: MujocoSettings, unloaded: float | None) -> float:
+def _law_of_friction(body: RollingBall, settings: MujocoSettings, N: float) -> float:
     """Bound of the error of the acceleration at time 0 from MuJoCo's law of friction [m/s²]; 0 if the ball sticks.
 
-    ``unloaded`` is the normal force of a contact at depth zero, which has not its full load yet [N].
+    ``N`` is the normal force of a contact at depth zero, which has not its full load yet [N].
     """
-    ball, contact = body.ball, body.contact
-    bounded = math.isfinite(contact.mu_static)
-    static, kinetic = (contact.mu_static, contact.mu_kinetic) if bounded else (settings.friction, settings.friction)
+    ball, mu = body.ball, settings.friction
     e1 = body.surface.normal(body.p0)
     force = newton_euler(body, body.p0, body.v0, body.w0)[2]
     loaded = -float(force @ e1)
     needed = float(np.linalg.norm(force + loaded * e1))
-    if not bounded and (unloaded is None or needed > static * loaded):
+    if needed > mu * loaded:
         return 0.0  # a ball that slips under its full load shows a coefficient that is too small, not softness
-    N = loaded if unloaded is None else unloaded
     pyramidal = settings.cone == "pyramidal"
-    if needed * (math.sqrt(2) if pyramidal else 1.0) <= static * N:
+    if needed * (math.sqrt(2) if pyramidal else 1.0) <= mu * N:
         return 0.0
-    slip_rate = max(needed - kinetic * N, 0.0) * (1 / ball.mass + ball.radius**2 / ball.inertia)
-    lift = 0.0 if corrects(contact, settings) else kinetic * slip_rate
-    # Friction of the unloaded contact is wrong altogether; that of a loaded pyramid has a wrong direction.
-    wrong = (min(needed, static * loaded) if unloaded is not None else 0.0) + (kinetic * N if pyramidal else 0.0)
-    return lift + wrong / ball.mass
+    slip_rate = max(needed - mu * N, 0.0) * (1 / ball.mass + ball.radius**2 / ball.inertia)
+    # Friction of the unloaded contact is wrong altogether; that of a pyramid also has a wrong direction.
+    return mu * slip_rate + (needed + (mu * N if pyramidal else 0.0)) / ball.mass

@@ -11,31 +11,27 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.ball.contact import foreseen_normal_force
 from proofroll.engines.mujoco.ball.formulation import Formulation
-from proofroll.engines.mujoco.ball.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.ball.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 
 class Chart(Formulation):
-    """Joints ``u1``, ``u2`` (the surface's own motions), ``normal`` (the depth) and ``spin`` (a ball joint).
+    """Joints ``u1`` (about the axis), ``u2`` (along it), ``normal`` (the depth) and ``spin`` (a ball joint).
 
     In these coordinates the contact's Jacobian is constant along the surface, so the term J̇v that MuJoCo leaves out
     of contact rows vanishes. Contact, friction and the normal degree of freedom remain MuJoCo's own. The site
     ``touch`` rides on ``u1`` and ``u2`` at the wall; the plane takes its pose, and stays a fixed body for MuJoCo.
     """
 
-    def __init__(
-        self, model: Any, body: RollingBall, settings: MujocoSettings, friction: BoundedFriction | None
-    ) -> None:
-        super().__init__(model, body, settings, friction)
-        self._corrects = corrects(body.contact, settings)
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
+        super().__init__(model, body, settings)
         self._wall = model.geom("wall").id
         self._touch = model.site("touch").id
         self._depth = int(model.joint("normal").dofadr[0])
 
     @staticmethod
     def write(spec: Any, body: RollingBall) -> None:
-        """Writes one joint for each of the two rigid motions that map the surface onto itself.
+        """Writes one joint for each coordinate of the surface: a hinge about the cylinder's axis, and a slide along it.
 
         Raises:
             Refused: the file's joints are of another kind.
@@ -46,13 +42,15 @@ class Chart(Formulation):
         centre = frame.T @ surface.position(origin)
         pose(spec.body("chart"), np.zeros(3), quaternion_of(frame))
         spec.body("carriage").pos = centre
-        for name, generator in zip(("u1", "u2"), surface.generators, strict=True):
+        hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+        for name, kind, text, position in (
+            ("u1", hinge, "rotation", -centre),
+            ("u2", slide, "translation", np.zeros(3)),
+        ):
             joint = spec.joint(name)
-            hinge = generator.kind == "rotation"
-            if joint.type != (mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE):
-                raise Refused(f"joint {name} of mujoco_chart.xml is not the {generator.kind} that the surface has")
-            joint.axis = frame.T @ np.asarray(generator.axis)
-            joint.pos = -centre if hinge else np.zeros(3)
+            if joint.type != kind:
+                raise Refused(f"joint {name} of mujoco_chart.xml is not the {text} that the surface has")
+            joint.axis, joint.pos = np.array([0.0, 0.0, 1.0]), position
         spec.site("touch").pos = [body.ball.radius, 0.0, 0.0]
         pose(spec.geom("wall"), *tangent_plane(body))
 
@@ -65,11 +63,7 @@ class Chart(Formulation):
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
         with self._callbacks(data):
-            if self._friction is None:
-                mujoco.mj_step(self._model, data, nstep=steps)
-                return
-            for _ in range(steps):
-                self._friction.step(data)
+            mujoco.mj_step(self._model, data, nstep=steps)
 
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
@@ -81,13 +75,11 @@ class Chart(Formulation):
         """Sets MuJoCo's callbacks, which are global to the process, only while this run computes with ``data``."""
         mujoco.set_mjcb_contactfilter(self._wall_poser(data))
         mujoco.set_mjcb_passive(self._resister(data) if self.resistance.f else None)
-        mujoco.set_mjcb_control(self._correct if self._corrects else None)
         try:
             yield
         finally:
             mujoco.set_mjcb_contactfilter(None)
             mujoco.set_mjcb_passive(None)
-            mujoco.set_mjcb_control(None)
 
     def _wall_poser(self, data: Any) -> Callable[[Any, Any, int, int], int]:
         """Contact filter that poses the wall: MuJoCo calls it between kinematics and collision at each stage of RK4.
@@ -116,8 +108,3 @@ class Chart(Formulation):
             apply(torque, N, (-e1x, -e1y, -e1z), velocity.tolist())
 
         return resist
-
-    def _correct(self, model: Any, data: Any) -> None:  # noqa: ARG002 -- MuJoCo's signature
-        """Control callback that corrects slip: MuJoCo calls it after reference accelerations and before forces."""
-        if self._friction is not None:
-            self._friction.correct(data, -float(data.qfrc_constraint[self._depth]))

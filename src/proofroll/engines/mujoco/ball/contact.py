@@ -11,7 +11,6 @@ import mujoco
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.model import RollingBall
 
 # Numbers of user data that foreseen_normal_force keeps.
 MEMORY = 4
@@ -64,25 +63,9 @@ class Resistance:
 
     Attributes:
         f: distance by which the normal force is shifted forward [m].
-        stopping: torque that slows a rolling ball by 1 m/s in one step: (1 + κ) m a / dt [N s].
-        pull: velocity that gravity adds to a rolling ball in one step: dt g / (1 + κ) [m/s].
     """
 
     f: float
-    stopping: float
-    pull: tuple[float, float, float]
-
-    @classmethod
-    def of(cls, body: RollingBall, dt: float) -> Resistance:
-        """Resistance of the scene at the step ``dt`` [s]."""
-        rolls = 1 + body.ball.inertia_ratio
-        x, y, z = (dt / rolls * body.gravity).tolist()
-        stopping = rolls * body.ball.mass * body.ball.radius / dt
-        return cls(body.contact.rolling_resistance, stopping, (x, y, z))
-
-    def stops(self, N: float, speed: float) -> bool:
-        """True if the whole torque at ``N`` [N] would stop a ball with this speed [m/s] within the step."""
-        return self.stopping * speed <= self.f * N
 
     def apply(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
         """Writes the moment -f N (v/V) × e1 [N m] into ``torque``, with the normal force N [N] of MuJoCo's own contact.
@@ -94,28 +77,13 @@ class Resistance:
         v0, v1, v2 = v
         e0, e1_, e2 = e1
         speed = math.hypot(v0, v1, v2)
-        if self.stopping * speed <= self.f * N:
-            self.stop(torque, N, e1, v)
-            return
-        scale = -self.f * N / speed
+        scale = -self.f * N / speed if speed else 0.0
         torque[0] = scale * (v1 * e2 - v2 * e1_)
         torque[1] = scale * (v2 * e0 - v0 * e2)
         torque[2] = scale * (v0 * e1_ - v1 * e0)
 
-    def stop(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
-        """Writes the torque into ``torque`` for a ball so slow that the whole torque would stop it within this step.
-
-        Limited to the torque that brings the ball to rest at the end of the step: more would reverse it. Arguments as
-        in :meth:`apply`.
-        """
-        inward = sum(pull * normal for pull, normal in zip(self.pull, e1, strict=True))
-        free = [rate + pull - inward * normal for rate, pull, normal in zip(v, self.pull, e1, strict=True)]
-        speed = math.hypot(*free)
-        scale = -min(self.f * N / speed, self.stopping) if speed else 0.0
-        torque[:] = scale * np.cross(free, e1)
-
     def lever(self) -> float:
-        """Lever arm of the resistance torque at N = 1 N, at a speed too fast to stop in one step [m]."""
+        """Lever arm of the resistance torque at N = 1 N [m]."""
         torque = np.zeros(3)
-        self.apply(torque, 1.0, (1.0, 0.0, 0.0), (0.0, 1.0 + 2 * self.f / self.stopping, 0.0))
+        self.apply(torque, 1.0, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
         return float(np.linalg.norm(torque))

@@ -5,28 +5,25 @@ from typing import Any
 
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.ball.contact import Resistance
-from proofroll.engines.mujoco.ball.friction import BoundedFriction
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 
 class Formulation(ABC):
-    """One way to present the wall to MuJoCo, and to step the model; ``friction`` watches stick and slip, if bounded.
+    """One way to present the wall to MuJoCo, and to step the model.
 
     Attributes:
         resistance: the torque of rolling resistance that its steps apply.
     """
 
-    def __init__(
-        self, model: Any, body: RollingBall, settings: MujocoSettings, friction: BoundedFriction | None
-    ) -> None:
-        self._model, self._friction = model, friction
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:  # noqa: ARG002 -- of subclasses
+        self._model = model
         self._surface, self._ball = body.surface, model.body("ball").id
-        self.resistance = Resistance.of(body, settings.dt)
+        self.resistance = Resistance(body.contact.rolling_resistance)
 
     @staticmethod
     @abstractmethod
     def write(spec: Any, body: RollingBall) -> None:
-        """Sets the numbers of the wall and of the joints. Raises Refused if the wall cannot be presented so."""
+        """Sets the numbers of the wall and of the joints. Raises Refused if the model's file does not suit them."""
 
     @property
     def resists(self) -> bool:

@@ -12,7 +12,6 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.ball.contact import foreseen_normal_force
 from proofroll.engines.mujoco.ball.formulation import Formulation
-from proofroll.engines.mujoco.ball.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.ball.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings
 
@@ -23,11 +22,8 @@ class Free(Formulation):
     The plane stands for the wall only to first order: the contact rows lack J̇v (the turning of the normal).
     """
 
-    def __init__(
-        self, model: Any, body: RollingBall, settings: MujocoSettings, friction: BoundedFriction | None
-    ) -> None:
-        super().__init__(model, body, settings, friction)
-        self._edits = settings.curvature or corrects(body.contact, settings)
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
+        super().__init__(model, body, settings)
         self._radius = body.ball.radius
         self._wall = model.geom("wall").id
         self._curvature = settings.curvature
@@ -44,27 +40,25 @@ class Free(Formulation):
 
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
-        if not self._edits:
+        if not self._curvature:
             self._run_plainly(data, steps)
             return
         for _ in range(steps):
             motion = self._prepare(data)
             mujoco.mj_step1(self._model, data)
-            self._edit(data, *motion)
+            self._add_curvature(data, *motion)
             mujoco.mj_step2(self._model, data)
-            if self._friction is not None:
-                self._friction.observe(data)
 
     def _run_plainly(self, data: Any, steps: int) -> None:
         """Steps without edits of the contact, hence without lag: :meth:`_prepare` written out in plain floats.
 
         MuJoCo takes some microseconds for a step of this model, and numpy as long for an operation on three numbers.
         """
-        model, friction, nearby, radius = self._model, self._friction, self._surface.nearby, self._radius
+        model, nearby, radius = self._model, self._surface.nearby, self._radius
         position, rates, pushed = data.qpos[:3], data.qvel[:3], data.qfrc_constraint[:3]
         place, quaternion, facing = data.mocap_pos[0], data.mocap_quat[0], np.zeros(3)
         normal, torque = data.geom_xmat[self._wall, 2::3], data.xfrc_applied[self._ball, 3:]
-        resists, step = self.resistance.f > 0, None if friction is None else friction.step
+        resists = self.resistance.f > 0
         for _ in range(steps):
             x, y, z = position.tolist()
             gap, e1x, e1y, e1z = nearby(x, y, z)
@@ -75,68 +69,52 @@ class Free(Formulation):
             if resists:
                 N = foreseen_normal_force(data, float(pushed.dot(normal)))
                 self.resistance.apply(torque, N, (e1x, e1y, e1z), rates.tolist())
-            if step is None:
-                mujoco.mj_step(model, data)
-            else:
-                step(data)
+            mujoco.mj_step(model, data)
 
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
         motion = self._prepare(data)
-        if not self._edits:
+        if not self._curvature:
             mujoco.mj_forward(self._model, data)
             return
         mujoco.mj_fwdPosition(self._model, data)
         mujoco.mj_fwdVelocity(self._model, data)
-        self._edit(data, *motion)
+        self._add_curvature(data, *motion)
         mujoco.mj_fwdActuation(self._model, data)
         mujoco.mj_fwdAcceleration(self._model, data)
         mujoco.mj_fwdConstraint(self._model, data)
 
-    def _prepare(self, data: Any) -> tuple[FloatArray, FloatArray, float]:
+    def _prepare(self, data: Any) -> tuple[FloatArray, FloatArray]:
         """Poses the plane and applies rolling resistance.
 
         Returns:
-            Velocities at the time of the positions (m/s, rad/s), accelerations and normal force [N] of the evaluation
-            before.
+            Velocities at the time of the positions (m/s, rad/s), and accelerations of the evaluation before.
         """
         p = data.qpos[:3]
         e1 = self._surface.normal(p)
         rates: FloatArray = data.qvel
         normal = data.geom_xmat[self._wall, 2::3]  # still that of the step before, like qacc and qfrc_constraint
-        N = float(data.qfrc_constraint[:3] @ normal)
         trend = data.qacc.copy()
         if self._half:
             # Along the planes only: velocity and acceleration of the step before have parts across the present one.
             trend[:3] -= (trend[:3] @ normal) * normal
             rates = rates + self._half * trend
             rates[:3] -= (rates[:3] @ e1) * e1
+        N = float(data.qfrc_constraint[:3] @ normal)
         data.mocap_pos[0] = p + (self._radius + self._surface.gap(p)) * e1
         mujoco.mju_quatZ2Vec(data.mocap_quat[0], -e1)
         if self.resistance.f:
-            foreseen = foreseen_normal_force(data, N)
-            torque, spin = data.xfrc_applied[self._ball, 3:], rates[:3].tolist()
-            if self._half and self.resistance.stops(foreseen, math.hypot(*spin)):
-                self.resistance.stop(torque, foreseen, e1.tolist(), data.qvel[:3].tolist())
-            else:
-                self.resistance.apply(torque, foreseen, e1.tolist(), spin)
-        return rates, trend, N
-
-    def _edit(self, data: Any, rates: FloatArray, trend: FloatArray, N: float) -> None:
-        """Adds curvature and the correction of slip to the contact's reference acceleration, if the settings ask."""
-        if data.nefc == 0:
-            return
-        if self._curvature:
-            self._add_curvature(data, rates, trend)
-        if self._friction is not None:
-            self._friction.correct(data, N)
+            torque = data.xfrc_applied[self._ball, 3:]
+            self.resistance.apply(torque, foreseen_normal_force(data, N), e1.tolist(), rates[:3].tolist())
+        return rates, trend
 
     def _add_curvature(self, data: Any, rates: FloatArray, trend: FloatArray) -> None:
         """Adds -J̇v to the contact's reference acceleration, less what MuJoCo's damping already gives.
 
-        Differentiating n·v = 0 (n = -e1) and t·(v + a ω × e1) = 0 leaves ė1·v and -a t·(ω × ė1) on the right. Where
-        the ball slips, the same rows give the acceleration of the slip along the wall.
+        Differentiating n·v = 0 (n = -e1) and t·(v + a ω × e1) = 0 leaves ė1·v and -a t·(ω × ė1) on the right.
         """
+        if data.nefc == 0:
+            return
         contact = data.contact[0]
         gradient = self._surface.normal_gradient(data.qpos[:3])
         e1_rate = gradient @ rates[:3]
@@ -151,10 +129,8 @@ class Free(Formulation):
 class Facets(Formulation):
     """The ball on a free joint in a ring of boxes whose faces are tangent to the wall: the obvious concave wall."""
 
-    def __init__(
-        self, model: Any, body: RollingBall, settings: MujocoSettings, friction: BoundedFriction | None
-    ) -> None:
-        super().__init__(model, body, settings, friction)
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
+        super().__init__(model, body, settings)
         wall = model.body("wall")
         axis = np.zeros(9)
         mujoco.mju_quat2Mat(axis, wall.quat)
@@ -170,12 +146,8 @@ class Facets(Formulation):
         How many boxes there are, how thick and how long they are, is the file's.
 
         Raises:
-            Refused: no rotation slides the surface along itself, so a ring would not enclose it; or the ring is too
-                short for the ball's way along its axis.
+            Refused: the ring is too short for the ball's way along its axis.
         """
-        generators = body.surface.generators
-        if generators[0].kind != "rotation":
-            raise Refused("facets needs a wall that closes on itself")
         origin = np.zeros(2)
         frame = body.surface.frame(origin)
         face = frame.T @ body.wall.position(origin)

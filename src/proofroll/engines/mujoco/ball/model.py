@@ -3,7 +3,6 @@
 A scene without a file gets the structure that is written here.
 """
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.ball.contact import MEMORY
-from proofroll.engines.mujoco.ball.friction import SLIP_MEMORY, condim, corrects
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 # How much of the wall's tangent plane is drawn, in radii of the ball; for MuJoCo it has no end.
@@ -44,8 +42,8 @@ _CHART = """
     <body name="chart">
       <body name="carriage">
         <inertial pos="0 0 0" mass="1e-13" diaginertia="1e-14 1e-14 1e-14"/>
-        <joint name="u1" type="{first}"/>
-        <joint name="u2" type="{second}"/>
+        <joint name="u1" type="hinge"/>
+        <joint name="u2" type="slide"/>
         <site name="touch" zaxis="-1 0 0" size="0.003"/>
         <body name="slider">
           <inertial pos="0 0 0" mass="1e-13" diaginertia="1e-14 1e-14 1e-14"/>
@@ -60,7 +58,6 @@ _CHART = """
   </worldbody>
 </mujoco>
 """
-_JOINTS = {"rotation": "hinge", "translation": "slide"}
 
 
 def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
@@ -91,8 +88,7 @@ def _written(body: RollingBall, name: str, formulation: str) -> str:
         return _FREE.format(**names)
     if formulation != "chart":
         raise Refused(f"{formulation} needs a wall made of MuJoCo's shapes, mujoco_{formulation}.xml beside the scene")
-    joint_1, joint_2 = (_JOINTS[generator.kind] for generator in body.surface.generators)
-    return _CHART.format(**names, first=joint_1, second=joint_2)
+    return _CHART.format(**names)
 
 
 def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> None:
@@ -109,24 +105,22 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     spec.nuserdata = MEMORY if body.contact.rolling_resistance else 0
-    spec.nuserdata += SLIP_MEMORY if corrects(body.contact, settings) else 0
     # A diverging run must be seen: by default MuJoCo resets the model to its initial state and goes on.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    mu = body.contact.mu_static if math.isfinite(body.contact.mu_static) else settings.friction
     for geom in spec.geoms:
-        geom.condim = condim(mu, settings)
-        geom.friction = settings.friction_coefficients(mu)
+        geom.condim = settings.condim
+        geom.friction = settings.friction_coefficients(settings.friction)
         # MuJoCo's defaults are written too: the file may hold others.
         geom.solref = [settings.contact_time, 1.0]
         geom.solimp = settings.solimp
     if settings.friction_damping is not None:
-        _write_pair(spec, settings, mu, settings.friction_damping)
+        _write_pair(spec, settings, settings.friction_damping)
 
 
-def _write_pair(spec: Any, settings: MujocoSettings, mu: float, damping: float) -> None:
+def _write_pair(spec: Any, settings: MujocoSettings, damping: float) -> None:
     """Declares the contact as a pair of geoms, for only a pair has ``solreffriction``; it replaces MuJoCo's own."""
-    pair = spec.add_pair(geomname1="wall", geomname2="ball", condim=condim(mu, settings))
-    sliding, turning, rolling = settings.friction_coefficients(mu)
+    pair = spec.add_pair(geomname1="wall", geomname2="ball", condim=settings.condim)
+    sliding, turning, rolling = settings.friction_coefficients(settings.friction)
     pair.friction = [sliding, sliding, turning, rolling, rolling]
     pair.solref, pair.solimp = spec.geom("ball").solref, spec.geom("ball").solimp
     # Stiffness and damping with the sign that marks the direct format; a slip has no position to be stiff about.

@@ -1,13 +1,11 @@
 """Run of a ball on a surface in MuJoCo."""
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Self
 
 import mujoco
 import numpy as np
 
-from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
@@ -18,10 +16,8 @@ from proofroll.engines.mujoco.ball.chart import Chart
 from proofroll.engines.mujoco.ball.contact import contact_coefficient, contact_force
 from proofroll.engines.mujoco.ball.formulation import Formulation
 from proofroll.engines.mujoco.ball.free import Facets, Free
-from proofroll.engines.mujoco.ball.friction import BoundedFriction
 from proofroll.engines.mujoco.ball.model import read_spec, write_physics
 from proofroll.engines.mujoco.ball.start import EVALUATIONS, accelerations, start
-from proofroll.engines.mujoco.contact.coefficients import check_coefficients
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
 from proofroll.engines.mujoco.settings import ROLLS, MujocoSettings, check
 
@@ -30,17 +26,7 @@ _FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, 
 _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
 # Part of the natural force above which a normal force is more than round-off.
 _PRESSED = 1e-6
-PROVIDES: Mapping[str, frozenset[str]] = {
-    "chart": ALL_OF_A_BALL,
-    "free": ALL_OF_A_BALL,
-    "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION},
-}
-LACKING: Mapping[str, Mapping[str, str]] = {
-    "facets": {
-        BallCapability.BOUNDED_FRICTION: "each edge between two boxes throws the ball off the wall, so facets "
-        "cannot tell when it slips",
-    },
-}
+PROVIDES: Mapping[str, frozenset[str]] = dict.fromkeys(_FORMULATIONS, ALL_OF_A_BALL)
 INHERENT: Mapping[str, Mapping[str, str]] = {
     formulation: {BallCapability.ORIENTATION: "the ball's joint, a ball or free joint, has it in qpos"}
     for formulation in _FORMULATIONS
@@ -48,7 +34,7 @@ INHERENT: Mapping[str, Mapping[str, str]] = {
 
 
 class MujocoBall(SteppedModel):
-    """A ball on any surface.
+    """A ball in a cylinder.
 
     The ball's orientation is in every model, asked for or not: free and ball joints have it in their state.
     """
@@ -56,28 +42,19 @@ class MujocoBall(SteppedModel):
     def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
         super().__init__(model, settings)
         self._body = body
-        self._friction = BoundedFriction(model, body, settings) if math.isfinite(body.contact.mu_static) else None
-        self._formulation = _FORMULATIONS[settings.formulation](model, body, settings, self._friction)
+        self._formulation = _FORMULATIONS[settings.formulation](model, body, settings)
         self._ball = model.body("ball").id
         self._geom = model.geom("ball").id
         wall = model.geom("wall").id if settings.formulation != "facets" else int(model.body("wall").geomadr[0])
         self._geoms = (wall, self._geom)
         with silent():
-            self._start(slips=False)
-            if self._friction is not None and not self._friction.start(self._data):
-                self._start(slips=True)
-
-    def _start(self, *, slips: bool) -> None:
-        start(self._model, self._data, self._body, self._settings, self._formulation, slips=slips)
+            start(model, self._data, body, settings, self._formulation)
 
     @classmethod
     def of(cls, scene: Scene, settings: MujocoSettings) -> Self:
         """Run of the scene's ball. Raises InputError or Refused for settings that it cannot have."""
         body = rolling_ball(scene)
-        bounded = math.isfinite(body.contact.mu_static)
-        check(settings, bounded=bounded)
-        if bounded:
-            check_coefficients((body.contact.mu_static, body.contact.mu_kinetic), settings, "the wall")
+        check(settings)
         forget_callbacks()
         return cls(compiled(_spec(scene, body, settings)), body, settings)
 
@@ -104,7 +81,6 @@ class MujocoBall(SteppedModel):
         """See :class:`proofroll.core.engine.Engine`."""
         data = self._evaluated()
         force = contact_force(self._model, data, self._geom)
-        sticking = None if self._friction is None else self._friction.holds(data)
         data.qvel += self._settings.velocity_lag * data.qacc
         mujoco.mj_comVel(self._model, data)
         velocity = np.zeros(6)
@@ -115,18 +91,13 @@ class MujocoBall(SteppedModel):
             w_WB=velocity[:3],
             q_WB=data.xquat[self._ball].copy(),
             force=force,
-            sticking=sticking,
         )
-
-    def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return [] if self._friction is None else self._friction.events(self._evaluated())
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         model = self._model
-        static, kinetic = self._coefficients()
         data = self._evaluated()
+        mu = contact_coefficient(model, data, self._geoms)
         gap = min(data.contact.dist) if data.ncon else None
         acceleration, turning = accelerations(model, data)
         return BallBuilt(
@@ -135,41 +106,28 @@ class MujocoBall(SteppedModel):
             gravity=model.opt.gravity.copy(),
             ball_radius=float(model.geom_size[self._geom, 0]),
             rolling_resistance=self._lever(data),
-            mu_static=static,
-            mu_kinetic=kinetic,
+            mu_static=mu,
+            mu_kinetic=mu,
             gap=None if gap is None else float(gap),
             acceleration=acceleration,
             angular_acceleration=turning,
             terms=terms_held(
                 # a contact of six dimensions resists rolling by itself
                 resists=self._formulation.resists or int(model.geom_condim[self._geom]) >= ROLLS,
-                slips=self._friction,
                 turns=int(model.joint("spin").type[0]) in _TURNING_JOINTS,
             ),
             regularised=softness(self._body, self._settings),
         )
 
-    def _coefficients(self) -> tuple[float, float]:
-        """Static and kinetic coefficient of friction of MuJoCo's contact; without a contact yet, of the next one."""
-
-        def read() -> float:
-            return contact_coefficient(self._model, self._evaluated(), self._geoms)
-
-        if self._friction is None:
-            mu = read()
-            return mu, mu
-        return self._friction.coefficients(read)
-
     def _lever(self, data: Any) -> float:
         """Lever arm f of the rolling resistance [m]: applied torque by normal force; else from the torque's own law.
 
-        The law is read where the quotient has no meaning: the torque is cut so that it does not reverse a ball it stops
-        within a step, and a start at depth zero may have no normal force yet.
+        The law is read at a start at depth zero, which may have no normal force yet.
         """
         torque = float(np.linalg.norm(data.xfrc_applied[self._ball, 3:]))
         N = -float(contact_force(self._model, data, self._geom) @ self._body.surface.normal(data.xpos[self._ball]))
         least = _PRESSED * self._body.ball.mass * natural_acceleration(self._body)
-        if least < N and not self._formulation.resistance.stops(N, float(np.linalg.norm(self._body.v0))):
+        if least < N:
             return torque / N
         return self._formulation.resistance.lever()
 

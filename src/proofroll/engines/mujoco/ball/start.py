@@ -1,6 +1,5 @@
 """Initial state of a ball, and the depth at which a soft contact carries its load."""
 
-import math
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -12,7 +11,6 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.ball.formulation import Formulation
-from proofroll.engines.mujoco.ball.friction import corrects
 from proofroll.engines.mujoco.running import evaluate_behind
 from proofroll.engines.mujoco.settings import MujocoSettings
 
@@ -23,8 +21,6 @@ EVALUATIONS = 3
 _ROUNDS_OF_LAG = 13
 _ROUNDS_OF_SOFT_LAG = 25
 _SOFT = 0.9
-# The correction of a slip has converged when this part of its error is left.
-_SEQUENCE = 1e-10
 # Relative tolerance of the settled depth.
 _DEPTH = 1e-14
 # Steps of false position before the search goes on by bisection.
@@ -60,10 +56,8 @@ def put_ball(model: Any, data: Any, body: RollingBall, depth: float) -> None:
     data.qvel[:] = np.linalg.solve(jacobian, np.concatenate([body.v0, w]))
 
 
-def start(
-    model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Formulation, *, slips: bool
-) -> None:
-    """Writes the state at time 0 into ``data`` and computes its forces; ``slips``: the ball is known not to stick.
+def start(model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Formulation) -> None:
+    """Writes the state at time 0 into ``data`` and computes its forces.
 
     Raises:
         Refused: the contact is too soft for a settled start.
@@ -71,7 +65,10 @@ def start(
     lag = settings.velocity_lag
     # Lagging velocities are damped by b = 2 / (d tc), of which a soft contact turns the part d into acceleration.
     share = 2 * lag / settings.contact_time
-    rounds = _rounds(body, settings, slips)
+    # Evaluations until all terms converge that use results of the evaluation before.
+    rounds = EVALUATIONS
+    if lag:
+        rounds = _ROUNDS_OF_LAG if settings.impedances[0] >= _SOFT else _ROUNDS_OF_SOFT_LAG
 
     def evaluate_at(depth: float) -> None:
         put_ball(model, data, body, depth)
@@ -79,25 +76,8 @@ def start(
 
     depth = _TOUCHING * body.ball.radius
     if settings.start == "settled":
-        settled = _settled_depth(model, data, body, evaluate_at)
-        # Bounded friction may lift the ball more than the load presses it: then it starts at the surface.
-        # At depth 0 the last digit decides whether they touch.
-        depth = settled if settled and math.isinf(body.contact.mu_static) else max(settled, depth)
+        depth = _settled_depth(model, data, body, evaluate_at) or depth
     evaluate_at(depth)
-
-
-def _rounds(body: RollingBall, settings: MujocoSettings, slips: bool) -> int:
-    """Number (odd) of evaluations at time 0 until all terms converge that use results of the evaluation before.
-
-    Such terms are lagging velocities, the torque of rolling resistance and the correction of slip.
-    """
-    rounds = EVALUATIONS
-    if settings.velocity_lag:
-        rounds = _ROUNDS_OF_LAG if settings.impedances[0] >= _SOFT else _ROUNDS_OF_SOFT_LAG
-    if slips and corrects(body.contact, settings) and body.contact.mu_kinetic:
-        g = body.contact.mu_kinetic**2 * (1 + 1 / body.ball.inertia_ratio)
-        rounds += 2 * math.ceil(math.log(_SEQUENCE) / math.log(g / (1 + g)))
-    return rounds
 
 
 def accelerations(model: Any, data: Any) -> tuple[FloatArray, FloatArray]:
@@ -134,7 +114,7 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
     closest = max(_DEPTH * upper, float(np.spacing(np.max(np.abs(body.p0)))))
     at_low, at_upper, tries = excess(low), excess(upper), 0
     # The function is nearly linear, so by false position (the Illinois method: Dowell and Jarratt, BIT 11, 1971). Every
-    # third step, and all later ones, bisect: that converges even if friction switches between two depths.
+    # third step, and all later ones, bisect, which always converges.
     last_force = 0
     while upper - low > closest and at_upper:
         tries += 1

@@ -28,7 +28,7 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
     SphereShape,
 )
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
-from proofroll.engines.mujoco.contact.coefficients import NEAR_CONE, SMALLEST_FRICTION, check_coefficients
+from proofroll.engines.mujoco.contact.coefficients import NEAR_CONE, check_coefficients
 from proofroll.engines.mujoco.contact.walls import check_walls, curved_end, shapes_at_start
 from proofroll.engines.mujoco.settings import SLIDES, TURNS, UNBOUNDED_FRICTION, MujocoSettings
 
@@ -69,11 +69,6 @@ def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
 
 def _check_turning(contact: BodyContact) -> None:
     """Raises Refused for friction against turning that MuJoCo's one cone of a contact bounds by another law."""
-    if contact.rolling_resistance:
-        raise Refused(
-            f"{contact.name} has rolling resistance: in MuJoCo (condim 6) it shares one cone with sliding and spin, "
-            f"of {SMALLEST_FRICTION:g} m at least, and what one takes the others lack; the scene bounds each alone"
-        )
     if contact.spinning_friction and np.isfinite(contact.friction):
         raise Refused(
             f"{contact.name} has friction against spin: in MuJoCo (condim 4) it shares one cone with sliding, and what "
@@ -173,16 +168,20 @@ class ContactsRead(NamedTuple):
 
 
 class Contacts:
-    """The contacts of a compiled model."""
+    """The contacts of a compiled model.
+
+    Attributes:
+        boxes: numbers of the first contacts of boxes, whose geoms meet at any of several points.
+        of_geom: number of the first contact of each geom, and 1 if the geom is body a's or -1 if it is body b's.
+    """
 
     def __init__(self, model: Any, mechanism: Mechanism, settings: MujocoSettings) -> None:
         self._model, self._mechanism, self._settings = model, mechanism, settings
         firsts = [k - contact.slot if contact.box_slot else k for k, contact in enumerate(mechanism.contacts)]
         self._geoms = [[model.geom(f"contact{k}{end}").id for end in "ab"] for k in firsts]
-        self._boxes = {k for k, contact in enumerate(mechanism.contacts) if contact.box_slot and not contact.slot}
-        # Geom -> number of its contact, and 1 if the geom is body a's or -1 if it is body b's.
-        self._of_geom = {a: (k, 1.0) for k, (a, _) in zip(firsts, self._geoms, strict=True)}
-        self._of_geom |= {b: (k, -1.0) for k, (_, b) in zip(firsts, self._geoms, strict=True)}
+        self.boxes = {k for k, contact in enumerate(mechanism.contacts) if contact.box_slot and not contact.slot}
+        self.of_geom = {a: (k, 1.0) for k, (a, _) in zip(firsts, self._geoms, strict=True)}
+        self.of_geom |= {b: (k, -1.0) for k, (_, b) in zip(firsts, self._geoms, strict=True)}
         self._normal_rows: dict[int, list[Array]] = {}
         curved = {k for k, contact in enumerate(mechanism.contacts) if curved_end(contact) is not None}
         self._turned = curved if settings.curvature else set()
@@ -196,7 +195,7 @@ class Contacts:
         for index in range(data.ncon):
             contact = data.contact[index]
             mujoco.mj_contactForce(self._model, data, index, wrench)
-            number, sign = self._contact(data, contact)
+            number, sign = self.owner(data, contact)
             # The frame's first axis points from geom[0] to geom[1], and the force is the one on geom[1].
             total[number] += sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
         return total
@@ -293,15 +292,15 @@ class Contacts:
 
     def _number(self, contact: Any) -> int:
         """Number of the mechanism's contact to which MuJoCo's contact belongs."""
-        return self._of_geom[int(contact.geom[1])][0]
+        return self.of_geom[int(contact.geom[1])][0]
 
-    def _contact(self, data: Any, contact: Any) -> tuple[int, float]:
+    def owner(self, data: Any, contact: Any) -> tuple[int, float]:
         """Number of the mechanism's contact that MuJoCo's contact is, and 1 or -1: its force acts on body a or b.
 
         Of two boxes it is the nearest of their corners and crossings.
         """
-        number, sign = self._of_geom[int(contact.geom[1])]
-        if number not in self._boxes:
+        number, sign = self.of_geom[int(contact.geom[1])]
+        if number not in self.boxes:
             return number, sign
         contacts, none = self._mechanism.contacts, np.zeros(3)
         slot = contacts[number].box_slot
@@ -348,7 +347,7 @@ class Contacts:
 
     def _turning(self, data: Any, contact: Any) -> Array:
         """J̇v of a contact in its frame [m/s²], for the joint velocities of the last ``mj_comVel``."""
-        number, sign = self._contact(data, contact)
+        number, sign = self.owner(data, contact)
         contact_of_scene, rate = self._mechanism.contacts[number], np.zeros((3, self._model.nv))
         names = contact_of_scene.body_a, contact_of_scene.body_b
         bodies = [self._model.body(name).id for name in names]
@@ -405,7 +404,7 @@ class Contacts:
         all_rows = rows_of(data, data.nefc)
         for index in range(data.ncon):
             contact = data.contact[index]
-            number, sign = self._contact(data, contact)
+            number, sign = self.owner(data, contact)
             if not contact.dist >= gap[number]:  # a cylinder has several contact points: the nearest is taken
                 gap[number], normal[number] = contact.dist, sign * contact.frame[:3]
                 place[number] = contact.pos + self._to_surface(number) * contact.dist * normal[number]

@@ -1,6 +1,6 @@
 """Formulation ``geoms``: a mechanism of :mod:`~proofroll.engines.mujoco.smooth.mechanism` whose bodies may touch."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -11,11 +11,14 @@ from typing_extensions import override
 from proofroll.core.arrays import longest
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
+from proofroll.core.events import Event
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.sampling import DEPENDENT, MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.engines.mujoco.contact.contact_states import ContactStates
 from proofroll.engines.mujoco.contact.mechanism_contacts import Contacts, check_contacts, times_softer
+from proofroll.engines.mujoco.contact.rolling_resistance import RollingResistance
 from proofroll.engines.mujoco.contact.walls import Walls, curved_end
 from proofroll.engines.mujoco.running import evaluate_behind, silent
 from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check, check_restitution
@@ -50,15 +53,20 @@ def family(settings: MujocoSettings) -> Mapping[str, str]:
     return of_contact(kind, time=settings.contact_time if settings.time_constant is None else None)
 
 
+# All that MuJoCo's steps start from.
+_WHOLE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
 class MujocoGeoms(MujocoMechanism):
     """Run of a mechanism with contacts; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     provides: ClassVar[frozenset[str]] = PROVIDES
     lacking: ClassVar[Mapping[str, str]] = LACKING
+    _resistance: RollingResistance | None = None  # before the model is there
 
     def __init__(self, scene: Any, settings: MujocoSettings) -> None:
         mechanism = mechanism_of(scene)
-        check(settings, bounded=False)
+        check(settings)
         if mechanism.prescribed or all(curved_end(contact) is None for contact in mechanism.contacts):
             # nothing to curve, or motions, whose rows take velocities for those of the positions
             settings = replace(settings, curvature=False)
@@ -67,17 +75,24 @@ class MujocoGeoms(MujocoMechanism):
             check_restitution(settings)
         super().__init__(mechanism, settings)
         self._contacts = Contacts(self._model, mechanism, settings)
+        self._states = ContactStates(self._contacts, mechanism, settings)
+        self._resistance = RollingResistance(self._model, mechanism, settings, self._contacts)
         self._walls = Walls(self._model, mechanism)
-        if settings.curvature:
-            with silent():
-                self._start_behind(2 * settings.velocity_lag / settings.contact_time)
+        velocities = self._data.qvel.copy()
+        rounds = 2 if self._resistance else 1  # its torque belongs to the forces at the start
+        for number in range(rounds):
+            if settings.curvature:
+                with silent():
+                    self._start_behind(2 * settings.velocity_lag / settings.contact_time, velocities)
+            if self._resistance and not number:
+                self._resistance.begin(self._evaluated(), self._data)
 
-    def _start_behind(self, share: float) -> None:
-        """Takes the velocities at the start back by their lag, and loads the contacts of curved walls.
+    def _start_behind(self, share: float, velocities: Array) -> None:
+        """Takes the ``velocities`` at the start back by their lag, and loads the contacts of curved walls.
 
         An evaluation leaves the part ``share`` of an error of accelerations.
         """
-        velocities = self._data.qvel.copy()
+        self._data.qvel[:] = velocities
         evaluate_behind(self._data, self._evaluate_step, self._settings.velocity_lag, share, _LAGS)
         self._walls.lift(self._contacts.depths(self._data))
         self._data.qvel[:] = velocities
@@ -89,23 +104,67 @@ class MujocoGeoms(MujocoMechanism):
             raise Refused("the plane that stands for a curved wall is posed in every step, and in no MJCF")
         if self._settings.cone_correction:
             raise Refused("the correction of the cone is made in every step, and in no MJCF; set cone_correction=false")
+        if self._resistance:
+            raise Refused("the torque of rolling resistance is computed in every step, and in no MJCF")
         return super().spec()
 
     def _run(self, steps: int) -> None:
-        if not (self._settings.cone_correction or self._walls):
+        edits, observes = self._settings.cone_correction or self._settings.curvature, bool(self._states.events)
+        if not (edits or observes or self._resistance or self._walls):
             super()._run(steps)
+            return
+        if not (edits or self._resistance or self._walls) and self._passes(steps):
             return
         for _ in range(steps):
             self._walls.pose(self._data)
-            if not (self._settings.cone_correction or self._settings.curvature):
+            if edits:
+                self._step_edited()
+            else:
                 super()._run(1)
-                continue
-            self._contacts.watch(self._data)
-            self._motions.apply(self._data)
-            mujoco.mj_step1(self._model, self._data)
-            self._drive(self._model, self._data)
-            self._edit(self._data, remember=True)
-            mujoco.mj_step2(self._model, self._data)
+            if observes:
+                self._states.observe(self._data)
+            if self._resistance:
+                self._resistance.remember(self._data, self._data.time - self._states.behind)
+
+    def _passes(self, steps: int) -> bool:
+        """Makes steps at once if no contact changes its state by them; False: it changes, and no step was made."""
+        state = np.empty(mujoco.mj_stateSize(self._model, _WHOLE))
+        mujoco.mj_getState(self._model, self._data, state, _WHOLE)
+        super()._run(steps)
+        if self._states.changed(self._data):
+            mujoco.mj_setState(self._model, self._data, state, _WHOLE)
+            return False
+        self._states.observe(self._data)
+        return True
+
+    def _step_edited(self) -> None:
+        """Makes one step with edited reference accelerations."""
+        self._contacts.watch(self._data)
+        self._motions.apply(self._data)
+        mujoco.mj_step1(self._model, self._data)
+        self._drive(self._model, self._data)
+        self._edit(self._data, remember=True)
+        mujoco.mj_step2(self._model, self._data)
+
+    def events(self) -> Sequence[Event] | None:
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
+        return self._states.events.events()
+
+    @property
+    @override
+    def _applies(self) -> bool:
+        return super()._applies or bool(self._resistance)
+
+    @override
+    def _drive(self, _: Any, data: Any) -> None:
+        super()._drive(_, data)
+        if self._resistance:
+            if not super()._applies:
+                data.xfrc_applied[:] = 0.0
+            foreseen = self._resistance.foreseen(float(data.time))
+            moments = self._resistance.apply(data, foreseen, self._states, self._resistance.of_step)
+            if data is self._data:
+                self._resistance.of_step = moments
 
     def _edit(self, data: Any, *, remember: bool = False) -> None:
         """Corrects the reference accelerations of contacts as the settings ask."""
@@ -128,6 +187,17 @@ class MujocoGeoms(MujocoMechanism):
             mujoco.mj_fwdVelocity(self._model, data)
 
     def _forward(self, data: Any) -> None:
+        self._forward_once(data)
+        if self._resistance:
+            if super()._applies:
+                self._loads.apply(data)
+            else:
+                data.xfrc_applied[:] = 0.0
+            pressing = self._resistance.pressing(data)
+            self._resistance.apply(data, pressing, self._states, self._resistance.applied)
+            self._forward_once(data)
+
+    def _forward_once(self, data: Any) -> None:
         self._walls.pose(data)
         if not (self._settings.cone_correction or self._settings.curvature):
             super()._forward(data)

@@ -73,7 +73,7 @@ class MujocoMechanism(SteppedModel):
     lacking: ClassVar[Mapping[str, str]] = LACKING
 
     def __init__(self, scene: Any, settings: MujocoSettings) -> None:
-        check(settings, bounded=False)
+        check(settings)
         mechanism = mechanism_of(scene)
         require(mechanism, self.provides, self.lacking)
         forget_callbacks()
@@ -162,9 +162,9 @@ class MujocoMechanism(SteppedModel):
 
         Applied forces depend on poses, which MuJoCo computes within a step: they are set there.
         """
-        if not (self._moving or self._loads.any or self._motions):
+        if not (self._moving or self._applies or self._motions):
             super()._run(steps)
-        elif self._settings.integrator == "RK4" or self._loads.any:
+        elif self._settings.integrator == "RK4" or self._applies:
             mujoco.set_mjcb_control(self._drive_in_step)
             try:
                 super()._run(steps)
@@ -175,6 +175,11 @@ class MujocoMechanism(SteppedModel):
                 self._drive(self._model, self._data)
                 self._motions.apply(self._data)
                 mujoco.mj_step(self._model, self._data)
+
+    @property
+    def _applies(self) -> bool:
+        """True if forces depend on poses."""
+        return self._loads.any
 
     def drive(self, values: Array) -> None:
         """See :class:`proofroll.core.engine_abilities.TakesTargets`."""
@@ -195,7 +200,7 @@ class MujocoMechanism(SteppedModel):
 
     def _drive_at_pose(self, data: Any) -> None:
         """Sets drives, targets and applied forces for the state of ``data``, whose poses may be old."""
-        if self._loads.any:
+        if self._applies:
             for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
                 stage(self._model, data)
         self._drive(self._model, data)

@@ -9,8 +9,7 @@ import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Generator
-from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, ContactRows, SlidingContact
+from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, ContactRows
 
 
 class _AlongAxes(NamedTuple):
@@ -32,7 +31,7 @@ class _AlongAxes(NamedTuple):
 
 
 class Composite(BallWithRows):
-    """Two joints along the generators carry a massless carriage; a spherical joint in it carries the ball.
+    """A joint about the cylinder's axis and one along it carry a massless carriage; a spherical joint carries the ball.
 
     Coordinates are (u1, u2, orientation of the ball in the carriage), velocities (u̇1, u̇2, spin relative to the
     carriage in the ball's axes). The two rolling rows are the only constraints. The spherical joint transmits the
@@ -49,8 +48,10 @@ class Composite(BallWithRows):
         self._frame0 = body.surface.frame(np.zeros(2))
         self._carriage = 0
         self._read: Any = None  # the data to which self._wrench refers
-        for name, generator in zip(body.surface.coordinates, body.surface.generators, strict=True):
-            self._carriage = self.model.addJoint(self._carriage, _joint(generator), pin.SE3.Identity(), name)
+        axis = self._frame0[:, 2]
+        joints = pin.JointModelRevoluteUnaligned(axis), pin.JointModelPrismaticUnaligned(axis)
+        for name, joint in zip(body.surface.coordinates, joints, strict=True):
+            self._carriage = self.model.addJoint(self._carriage, joint, pin.SE3.Identity(), name)
         placement = pin.SE3(self._frame0, body.surface.position(np.zeros(2)))
         self._wrench = np.zeros(3)
         self._add_ball(body, self._carriage, pin.JointModelSpherical(), placement)
@@ -130,7 +131,7 @@ class Composite(BallWithRows):
             (x2, y2), (x3, y3) = terms.tangents
             v2, v3 = x2 * rate_1 + y2 * rate_2, x3 * rate_1 + y3 * rate_2
             speed = math.hypot(v2, v3)
-            lever = self._f * self.normal_force(data) / speed if speed else 0.0
+            lever = self._f * self._pressing(data) / speed if speed else 0.0
             torque = terms.by_moment.dot(np.array((0.0, -lever * v3, lever * v2)))
         return pin.forwardDynamics(self.model, data, torque, terms.rows, drift)  # type: ignore[no-any-return]  # it is an array
 
@@ -148,14 +149,12 @@ class Composite(BallWithRows):
             torque = torque * self._transmitted(data, frame[:, 0])
         return pin.forwardDynamics(self.model, data, torque, rows, drift)  # type: ignore[no-any-return]  # it is an array
 
-    def normal_force(self, data: Any) -> float:
-        """Normal force from the bias forces, which ``pin.forwardDynamics`` leaves in ``data``."""
-        if self._own is not None:
-            if data is not self._read:
-                # A view of Pinocchio's memory, looked up once: the look-up takes as long as the dynamics.
-                self._read, self._wrench = data, data.f[self.ball].linear
-            return -self._wrench.item(0)
-        return self._transmitted(data, data.oMi[self._carriage].rotation.dot(self._frame0[:, 0]))
+    def _pressing(self, data: Any) -> float:
+        """Normal force N [N] from the bias forces in ``data``, with the ball's axes along e1, e2, e3."""
+        if data is not self._read:
+            # A view of Pinocchio's memory, looked up once: the look-up takes as long as the dynamics.
+            self._read, self._wrench = data, data.f[self.ball].linear
+        return -self._wrench.item(0)
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force: N from the joint's wrench, F2 and F3 from the multipliers."""
@@ -163,47 +162,6 @@ class Composite(BallWithRows):
         frame = data.oMi[self._carriage].rotation @ self._frame0
         pin.rnea(self.model, data, q, v, acceleration)
         return acceleration, frame @ np.array([-self._transmitted(data, frame[:, 0]), *friction])
-
-    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
-        """See :class:`.ball_with_rows.BallWithRows`; friction acts as joint torques."""
-        frame, rows, drift, resistance = self.rows(data, q, v)
-        e1, tangents = frame[:, 0], frame[:, 1:]
-        # Neither friction along the wall nor the joints can change N.
-        normal_force = self._transmitted(data, e1)
-        friction = self.friction(normal_force, tangents.T @ direction)
-        torque = rows.T @ friction
-        if self._f:
-            torque += normal_force * resistance
-        acceleration = np.array(pin.aba(self.model, data, q, v, torque))
-        slip_rate = tangents @ (rows @ acceleration + drift)
-        return SlidingContact(
-            acceleration=acceleration,
-            normal_force=normal_force,
-            slip=tangents @ (rows @ v),
-            slip_rate=slip_rate,
-            friction=tangents @ friction,
-            e1=e1,
-        )
-
-    def sliding_reaction(
-        self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.ball.ball_with_rows.BallWithRows`; N from the joint's wrench."""
-        sliding = self.slide(data, q, v, direction)
-        pin.rnea(self.model, data, q, v, sliding.acceleration)
-        force = sliding.friction - self._transmitted(data, sliding.e1) * sliding.e1
-        return sliding.acceleration, np.asarray(force)
-
-    def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- the protocol's
-        """See :class:`~proofroll.engines.pinocchio.ball.ball_with_rows.BallWithRows`: the joints hold the surface."""
-        return q, v
-
-
-def _joint(generator: Generator) -> Any:
-    axis = np.asarray(generator.axis)
-    if generator.kind == "rotation":
-        return pin.JointModelRevoluteUnaligned(axis)
-    return pin.JointModelPrismaticUnaligned(axis)
 
 
 def _slip_directions(a: float, frame: FloatArray) -> FloatArray:

@@ -1,12 +1,11 @@
 """Formulation ``contact``: a free ball against the wall, with Pinocchio's own frictional contact solver.
 
 In each step the wall is the plane tangent to it at the contact. Pinocchio's PGS or ADMM solver finds the impulse of the
-step within the friction cone.
+step within its widest friction cone, which stands for unbounded friction.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,18 +14,15 @@ import pinocchio as pin
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event, EventKind
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
     natural_acceleration,
-    newton_euler,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.pinocchio.ball.integrators import QUATERNION
 from proofroll.engines.pinocchio.ball.plane_contact import PlaneContact
-from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 # Ratio of friction to its bound above which an impulse lies on the cone [1].
@@ -44,13 +40,11 @@ class Kick(NamedTuple):
         v: joint velocity after it, shape (6,).
         impulse: along the axes of the plane [N s], shape (3,).
         normal_force: mean over the span of the kick [N].
-        status: ``stick``, ``slip``, or ``lift_off`` where the wall does not press.
     """
 
     v: FloatArray
     impulse: FloatArray
     normal_force: float
-    status: EventKind
 
 
 class ContactSteps:
@@ -67,22 +61,16 @@ class ContactSteps:
         leapfrog: True if the velocity is ahead.
         solver, tolerance: Pinocchio's solver, and its tolerance.
         started: True after the first step.
-        bounded: True if friction is bounded.
-        mu_static, mu_kinetic: coefficients of the cone [1].
         q, v: joint configuration and velocity.
-        happened: events so far, also with unbounded friction.
     """
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
         """Starts at time 0.
 
         Raises:
-            Refused: Pinocchio's solver does not find the first impulse.
+            Refused: Pinocchio's solver does not find the first impulse within its cone.
         """
         self._surface, self._f = body.surface, body.contact.rolling_resistance
-        rolls = 1 + body.ball.inertia_ratio
-        # For a rolling ball: moment per rate of its speed [N s²], and acceleration by gravity [m/s²].
-        self._stopping, self._pull = rolls * body.ball.mass * body.ball.radius, (body.gravity / rolls).tolist()
         self.dt, self.leapfrog = float(settings.dt or 0.0), settings.integrator == "leapfrog"
         self.solver, self.tolerance = settings.solver or "pgs", float(settings.solver_tolerance or 0.0)
         self.contact = PlaneContact(body, self.solver, self.tolerance)
@@ -90,23 +78,12 @@ class ContactSteps:
         self.started, self._no_torque = False, np.zeros(6)
         self._lever = 0.5 * self.dt * body.ball.radius
         self._faint = _FAINT * body.ball.mass * float(np.linalg.norm(body.gravity)) * self.dt
-        self.bounded = math.isfinite(body.contact.mu_static)
-        unbounded = LARGEST_FRICTION[self.solver]
-        self.mu_static = body.contact.mu_static if self.bounded else unbounded
-        self.mu_kinetic = body.contact.mu_kinetic if self.bounded else unbounded
-
-        self._status: EventKind = EventKind.STICK
         self._normal_force = 0.0  # start of the fixed-point iteration for rolling resistance
-        self.happened: list[Event] = []
         self._time = 0.0
         try:
-            kick = self.kick()
+            self._normal_force = self.kick().normal_force
         except Diverged as error:
             raise Refused(str(error)) from None
-        self._normal_force = kick.normal_force
-        if self.bounded and kick.status == EventKind.SLIP:
-            self._status = EventKind.SLIP
-            self.happened.append(Event(EventKind.SLIP, 0.0, 0.0, 0.0))
 
     @property
     def span(self) -> float:
@@ -117,19 +94,14 @@ class ContactSteps:
         """Advances to ``end`` [s].
 
         Raises:
-            Diverged: Pinocchio's solver does not find the impulse.
+            Diverged: Pinocchio's solver does not find the impulse within its cone.
         """
         model, dt, start = self.contact.model, self.dt, self._time
         for number in range(whole_steps(start, end, dt)):
             self._time = start + number * dt
-            v, _, self._normal_force, status = self.kick()
-            if status != self._status:
-                last_time = max(self._time - dt, 0.0)
-                self.happened.append(Event(status, 0.5 * (last_time + self._time), last_time, self._time))
-                self._status = status
+            self.v, _, self._normal_force = self.kick()
             self.started = True
-            self.v = v
-            self.q = pin.integrate(model, self.q, dt * v)
+            self.q = pin.integrate(model, self.q, dt * self.v)
         self._time = end
 
     def kick(self) -> Kick:
@@ -158,67 +130,47 @@ class ContactSteps:
         torque, normal_force, centred = self._no_torque, self._normal_force, self.leapfrog and self.started
         for number in range(_REPEATS):
             if f:
-                torque = self.resistance(triad, velocity, normal_force, span)
+                torque = self.resistance(triad, velocity, normal_force)
             free = v + span * pin.aba(model, data, q, v, torque)
-            impulse, normal, status = self._solved(delassus, jacobian.dot(free) + shift)
+            impulse = self._solved(delassus, jacobian.dot(free) + shift)
             v_new = free + to_joints.dot(impulse)
-            normal /= span
-            # On a plane N is right at once, but the direction of the resistance is not yet.
+            normal = impulse.item(2) / span
+            # N may be right at once, but the direction of the resistance is not yet.
             if not f or (abs(normal - normal_force) <= _SETTLED * abs(normal) and (number or not centred)):
                 break
             normal_force = normal
             # the resistance belongs to the present time, which with leapfrog is the middle of the kick
             if centred:
                 velocity = (0.5 * (v + v_new)[:3]).tolist()
-        return Kick(v_new, impulse, normal, status)
+        return Kick(v_new, impulse, normal)
 
-    def resistance(
-        self, triad: Sequence[float], v: Sequence[float], normal_force: float, span: float = 0.0
-    ) -> FloatArray:
-        """Generalised force of rolling resistance on the joints, shape (6,), of a ball at ``v`` [m/s].
-
-        It is limited to what stops the ball within the ``span`` [s] of the kick; otherwise the ball would rock for
-        ever.
-        """
+    def resistance(self, triad: Sequence[float], v: Sequence[float], normal_force: float) -> FloatArray:
+        """Generalised force of rolling resistance on the joints, shape (6,), of a ball at ``v`` [m/s]."""
         x, y, z, *_ = triad
         vx, vy, vz = v
-        torque, speed, most = np.zeros(6), math.sqrt(vx * vx + vy * vy + vz * vz), math.inf
-        if span and self._stopping * speed <= self._f * normal_force * span:
-            most = self._stopping / span
-            (gx, gy, gz), (x0, y0, z0) = self._pull, self.v[:3].tolist()
-            inward = span * (gx * x + gy * y + gz * z)
-            vx, vy, vz = x0 + span * gx - inward * x, y0 + span * gy - inward * y, z0 + span * gz - inward * z
-            speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+        torque, speed = np.zeros(6), math.sqrt(vx * vx + vy * vy + vz * vz)
         if speed > 0:
-            f = min(self._f * normal_force / speed, most)
+            f = self._f * normal_force / speed
             moment = np.array((f * (y * vz - z * vy), f * (z * vx - x * vz), f * (x * vy - y * vx)))
             torque[3:] = self.contact.turned.T.dot(moment)
         return torque
 
-    def _solved(self, delassus: Any, free: FloatArray) -> tuple[FloatArray, float, EventKind]:
-        """Impulse [N s], shape (3,), its normal part, and status; ``free``: contact velocity without impulse [m/s]."""
-        mu = self.mu_static if self._status == EventKind.STICK else self.mu_kinetic
-        impulse = self.contact.impulse(delassus, free, mu)
-        if impulse is None:
-            raise self._not_found()
-        F2, F3, N = impulse.tolist()
-        if not self._faint < N:
-            return impulse, N, EventKind.LIFT_OFF
-        if math.hypot(F2, F3) < _ON_CONE * mu * N:
-            return impulse, N, EventKind.STICK
-        if not self.bounded:
-            raise Diverged(f"at {self._time:g} s more friction is needed than {mu:g} times the normal force")
-        if mu != self.mu_kinetic:
-            impulse = self.contact.impulse(delassus, free, self.mu_kinetic)
-            if impulse is None:
-                raise self._not_found()
-            N = impulse.item(2)
-        return impulse, N, EventKind.SLIP
+    def _solved(self, delassus: Any, free: FloatArray) -> FloatArray:
+        """Impulse [N s], shape (3,); ``free``: contact velocity without impulse [m/s].
 
-    def _not_found(self) -> Diverged:
-        return Diverged(
-            f"Pinocchio's {self.solver} solver did not reach solver_tolerance={self.tolerance:g} at {self._time:g} s"
-        )
+        Raises:
+            Diverged: the solver does not find the impulse, or the impulse lies on the cone.
+        """
+        impulse, mu = self.contact.impulse(delassus, free), self.contact.friction
+        if impulse is None:
+            raise Diverged(
+                f"Pinocchio's {self.solver} solver did not reach solver_tolerance={self.tolerance:g} at "
+                f"{self._time:g} s"
+            )
+        F2, F3, N = impulse.tolist()
+        if self._faint < N and math.hypot(F2, F3) >= _ON_CONE * mu * N:
+            raise Diverged(f"at {self._time:g} s more friction is needed than {mu:g} times the normal force")
+        return impulse
 
 
 # Factor on the errors due to solver tolerance and round-off, above the largest measured on any scene.
@@ -247,7 +199,6 @@ class ContactRun(ContactSteps):
             w_WB=velocity.angular.copy(),
             q_WB=np.roll(pin.Quaternion(pose.rotation).coeffs(), 1),
             force=contact.axes @ kick.impulse / self.span,
-            sticking=kick.status == EventKind.STICK if self.bounded else None,
         )
 
     def built(self) -> BallBuilt:
@@ -264,23 +215,15 @@ class ContactRun(ContactSteps):
             gravity=contact.model.gravity.linear.copy(),
             ball_radius=float(np.linalg.norm(point.joint2_placement.translation)),
             rolling_resistance=lever,
-            mu_static=contact.friction(self.mu_static),
-            mu_kinetic=contact.friction(self.mu_kinetic),
+            mu_static=contact.friction,
+            mu_kinetic=contact.friction,
             # The plane is at the contact; the distance of the wall from it enters the solver separately.
             gap=float(contact.point_data.c1Mc2.translation[2] + self._body.surface.gap(pose.translation)),
             acceleration=acceleration[:3],
             angular_acceleration=pose.rotation @ acceleration[3:],
             regularised=_softened(self._body, self),
-            terms=terms_held(
-                resists=lever,
-                slips=contact.friction(self.mu_static) != LARGEST_FRICTION[self.solver],
-                turns=contact.model.joints[contact.ball].nq == QUATERNION,
-            ),
+            terms=terms_held(resists=lever, turns=contact.model.joints[contact.ball].nq == QUATERNION),
         )
-
-    def events(self) -> tuple[Event, ...]:
-        """See :class:`proofroll.core.engine_abilities.LocatesEvents`; none with unbounded friction."""
-        return tuple(self.happened) if self.bounded else ()
 
 
 def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
@@ -303,10 +246,9 @@ def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
             reasons.append("for the length of a step the wall is a plane, and at time 0 it does not yet bend the path")
     because = "; ".join(reasons)
     result = {name: Regularised(value + rough, because) for name, value in missing.items()}
-    if not steps.bounded:
-        because = f"the friction cone of Pinocchio's solver needs a number, here {steps.mu_static:g}"
-        result |= {f"1 / {kind} friction": Regularised(1 / steps.mu_static, because) for kind in ("static", "kinetic")}
-    return result
+    mu = steps.contact.friction
+    because = f"the friction cone of Pinocchio's solver needs a number, here {mu:g}"
+    return result | {f"1 / {kind} friction": Regularised(1 / mu, because) for kind in ("static", "kinetic")}
 
 
 def _missing_bend(body: RollingBall) -> dict[str, float]:
@@ -316,18 +258,11 @@ def _missing_bend(body: RollingBall) -> dict[str, float]:
     """
     acceleration, force = initial_response(body)
     turning = initial_angular_acceleration(body)
-    e1 = body.surface.normal(body.p0)
-    # In the equations of motion the curvature is multiplied by the spin only.
-    flat = replace(body, w0=np.zeros(3))
-    flat_acceleration, flat_turning, flat_force = body.gravity, np.zeros(3), np.zeros(3)
-    # A plane that would have to pull has no effect; the threshold is round-off.
-    if -newton_euler(flat, flat.p0, flat.v0, flat.w0)[2] @ e1 > 1e-9 * float(np.linalg.norm(force)):
-        flat_acceleration, flat_force = initial_response(flat)
-        flat_turning = initial_angular_acceleration(flat)
-    N, F2, F3 = np.abs((force - flat_force) @ body.surface.frame(body.u0)) / body.ball.mass
+    # Gravity is along the wall, so nothing presses a ball on the plane: it falls.
+    N, F2, F3 = np.abs(force @ body.surface.frame(body.u0)) / body.ball.mass
     return {
-        "acceleration": float(np.max(np.abs(acceleration - flat_acceleration))),
-        "angular acceleration": float(np.max(np.abs(turning - flat_turning))) * body.ball.radius,
+        "acceleration": float(np.max(np.abs(acceleration - body.gravity))),
+        "angular acceleration": float(np.max(np.abs(turning))) * body.ball.radius,
         "N": float(N),
         "F2": float(F2),
         "F3": float(F3),

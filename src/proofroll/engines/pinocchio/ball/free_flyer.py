@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, ContactRows, SlidingContact
+from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, ContactRows
 
 # Writes 18 numbers into an array at once, which is quicker than an assignment for each.
 _PACK: Any = struct.Struct("18d").pack_into
@@ -126,10 +126,6 @@ class FreeFlyer(BallWithRows):
         acceleration[0], acceleration[1], acceleration[2] = ax + bx, ay + by, az + bz
         return acceleration
 
-    @override
-    def normal_force(self, data: Any) -> float:
-        return -float(data.lambda_c[0])
-
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force from the multipliers."""
         frame, *rows = self.rows(data, q, v)
@@ -146,44 +142,3 @@ class FreeFlyer(BallWithRows):
     def gap(self, q: FloatArray) -> float:
         """Distance from the surface [m]."""
         return float(self._surface.gap(q[:3]))
-
-    def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
-        """Sliding with the surface's row only; its column includes friction and rolling resistance per unit of N."""
-        frame, rows, drift, resistance = self.rows(data, q, v)
-        e1, tangents = frame[:, 0], frame[:, 1:]
-        against = self.friction(1.0, tangents.T @ direction)  # per unit of N
-        matrix = np.zeros((7, 7))
-        matrix[:6, :6] = data.M
-        matrix[:6, 6] = against @ rows[1:] + resistance - rows[0]
-        matrix[6, :6] = rows[0]
-        solution = np.linalg.solve(matrix, np.concatenate([-data.nle, -drift[:1]]))
-        acceleration, normal_force = solution[:6], -float(solution[6])
-        slip_rate = tangents @ (rows[1:] @ acceleration + drift[1:])
-        friction = tangents @ (normal_force * against)
-        return SlidingContact(
-            acceleration=acceleration,
-            normal_force=normal_force,
-            slip=tangents @ (rows[1:] @ v),
-            slip_rate=slip_rate,
-            friction=friction,
-            e1=e1,
-        )
-
-    @override
-    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
-        sliding = self._slide(data, q, v, direction)
-        if not self._orientation:  # as in accelerate
-            sliding.acceleration[:3] += pin.skew(v[3:]) @ v[:3]
-        return sliding
-
-    def sliding_reaction(
-        self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.ball.ball_with_rows.BallWithRows`; N is the multiplier."""
-        sliding = self._slide(data, q, v, direction)
-        return sliding.acceleration, np.asarray(sliding.friction - sliding.normal_force * sliding.e1)
-
-    @override
-    def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        q = self.on_surface(q)
-        return q, np.array(pin.impulseDynamics(self.model, data, v, self.rows(data, q, v).rows[:1]))

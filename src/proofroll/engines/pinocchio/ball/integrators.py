@@ -1,6 +1,5 @@
 """Time integration of a ball on Pinocchio's configurations."""
 
-import math
 from abc import ABC, abstractmethod
 from typing import Any
 
@@ -11,8 +10,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import controlled_step, solver_from
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.core.events import Event, EventKind
-from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, left_the_wall
+from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.tangent_map import require_tangent_map
 
@@ -23,26 +21,19 @@ class TangentIntegrator(ABC):
     Attributes:
         t, q, v: time [s], joint configuration and velocity now.
         turns: True if the orientation of the ball is integrated.
-        events: so far; of a ball that cannot slip, only that it left the wall.
-        mu_static: largest |F|/N while sticking [1]; None: unbounded.
-        sticking: True if the ball sticks now; None if it cannot slip.
     """
-
-    mu_static: float | None = None
-    sticking: bool | None = None
 
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
         self._mechanism, self._settings = mechanism, settings
         self._model, self._data = mechanism.model, mechanism.model.createData()
         self.turns = bool(settings.orientation)
-        self.events: list[Event] = []
         self.t, self.q, self.v = 0.0, mechanism.q0.copy(), mechanism.v0.copy()
 
     def advance(self, end: float) -> None:
         """Advances to ``end`` [s].
 
         Raises:
-            Diverged: no step is small enough, the rows have become dependent, or the wall would have to pull.
+            Diverged: no step is small enough, or the rows have become dependent.
         """
         start = self.t
         try:
@@ -71,25 +62,12 @@ class FixedStep(TangentIntegrator):
         self._moving = np.ones(self._model.nv)
         self._moving[-3:] = float(self.turns)
         self._dt = float(settings.dt or 0.0)
-        self._start: FloatArray | None = None
 
     def _advance(self, start: float, end: float) -> None:
-        for number in range(whole_steps(start, end, self._dt)):
-            self._advance_one(start + number * self._dt)
-
-    def _advance_one(self, time: float) -> None:
-        self._step(self._pressed(time) if self._start is None else self._start)
-        if self._settings.projection:
-            self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
-        self._start = self._pressed(time + self._dt)
-
-    def _pressed(self, time: float) -> FloatArray:
-        """Acceleration at the end of a step, where the next one starts; ends the run if the wall would pull."""
-        acceleration = self._acceleration(self.q, self.v)
-        if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
-            self.events.append(Event(EventKind.LIFT_OFF, time - 0.5 * self._dt, time - self._dt, time))
-            raise left_the_wall(f"before {time:.6g} s")
-        return acceleration
+        for _ in range(whole_steps(start, end, self._dt)):
+            self._step(self._acceleration(self.q, self.v))
+            if self._settings.projection:
+                self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
 
     def _acceleration(self, q: FloatArray, v: FloatArray) -> FloatArray:
         return np.array(self._mechanism.accelerate(self._data, q, v))
@@ -136,10 +114,6 @@ class TangentRungeKutta4(FixedStep):
         self.v = self.v + h / 6 * (v1 + 2 * (v2 + v3) + v4)
 
 
-# PATIENCE successive steps, each shorter than SHORT times the time of a radian of rolling, mean no progress: ordinary
-# steps are a hundred times longer, and a jump of the forces is passed in a few dozen.
-SHORT = 1e-4
-PATIENCE = 500
 # Number of components of the orientation in a configuration.
 QUATERNION = 4
 
@@ -147,8 +121,8 @@ QUATERNION = 4
 class Adaptive(TangentIntegrator):
     """DOP853 on configuration and velocity together; an integrated quaternion by its rate (pin.tangentMap).
 
-    One solver lives from event to event. Its time limit moves from sample to sample, so that a step ends at each: the
-    dense output of DOP853 has a lower order.
+    The time limit of the solver moves to the next sample, so that a step ends there: the dense output of DOP853 has a
+    lower order.
     """
 
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
@@ -162,9 +136,7 @@ class Adaptive(TangentIntegrator):
         # Components in the ball's turning axes pass through zero often: with a hundredth of their natural size the
         # tolerance is relative over most of their range.
         self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale[: self._count_q], mechanism.v_scale])
-        self._turning_time = mechanism.q_scale[0] / mechanism.v_scale[0]
         self._solver: Any = None
-        self._short_steps = 0
         self._q = mechanism.q0.copy()
 
     def _joined(self, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -179,58 +151,28 @@ class Adaptive(TangentIntegrator):
         self._q[:n] = y[:n]
         return self._q, y[n:]
 
-    def _moved(self, q: FloatArray, v: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """Time derivative of the integrated state vector."""
-        return np.concatenate(
-            [pin.tangentMap(self._model, q).dot(v) if self.turns else v[: self._count_q], acceleration]
-        )
-
     def _rates(self, _: float, y: FloatArray) -> FloatArray:
+        """Time derivative of the integrated state vector."""
         if self.turns:
             q, v = self._split(y)
-            return self._moved(q, v, self._mechanism.accelerate(self._data, q, v))
+            moved = pin.tangentMap(self._model, q).dot(v)
+            return np.concatenate([moved, self._mechanism.accelerate(self._data, q, v)])
         # The same in plain statements, as it runs a dozen times per step.
         n, q = self._count_q, self._q
         v = y[n:]
         q[:n] = y[:n]
         return np.concatenate((v[:n], self._mechanism.accelerate(self._data, q, v)))
 
-    def _solver_from(self, rates: Any, start: float, y: FloatArray) -> Any:
-        return solver_from(rates, start, y, self._rtol, self._atol)
-
     def _advance(self, start: float, end: float) -> None:
         if end <= start:
             return
-        self._short_steps = 0
         if self._solver is None:
-            self._solver = self._solver_from(self._rates, start, self._joined(self.q, self.v))
-        solver = self._solver
-        while solver.t < end:
-            self._make_step(solver, end)
-            # The last evaluated rates belong to the end of the step, with or without projection.
-            if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
-                self.events.append(Event(EventKind.LIFT_OFF, 0.5 * (solver.t_old + solver.t), solver.t_old, solver.t))
-                raise left_the_wall(f"before {solver.t:.6g} s")
-        self._keep(solver.y)
-
-    def _keep(self, y: FloatArray) -> None:
-        q, v = self._split(y)
+            y = self._joined(self.q, self.v)
+            self._solver = solver_from(self._rates, start, y, self._rtol, self._atol)
+        while self._solver.t < end:
+            controlled_step(self._solver, self._accepted, end)
+        q, v = self._split(self._solver.y)
         self.q, self.v = q.copy(), v.copy()
-
-    def _make_step(self, solver: Any, end: float, most: float = math.inf) -> None:
-        """Makes one step, to ``end`` [s] at most and at most ``most`` [s] long; ends the run if steps get too short."""
-        controlled_step(solver, self._accepted, end, most)
-        longest = SHORT * self._turning_time
-        is_short = solver.step_size < longest
-        if is_short:
-            faster = float(np.max(np.abs(solver.y[self._count_q :]) / self._mechanism.v_scale))
-            is_short = solver.step_size * max(1.0, faster) < longest
-        self._short_steps = self._short_steps + 1 if is_short else 0
-        if self._short_steps > PATIENCE:
-            raise Diverged(
-                f"the steps became too short at {solver.t:g} s: the forces jump there, as rolling resistance "
-                "does when the ball comes to rest"
-            )
 
     def _accepted(self, _: float, y: FloatArray) -> FloatArray:
         """State after a step, projected onto the constraints if the settings say so."""

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.pinocchio.contact.solver import solver_of
+from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION, solver_of
 
 
 class PlaneContact:
@@ -30,6 +30,7 @@ class PlaneContact:
             ball.
         point, point_data: Pinocchio's model and data of the contact.
         options: of the solver.
+        friction: coefficient of the contact's cone, which stands for unbounded friction [1].
     """
 
     def __init__(self, body: RollingBall, kind: str, tolerance: float) -> None:
@@ -60,6 +61,8 @@ class PlaneContact:
         self._from_centre, self._foot = np.zeros((3, 4)), np.zeros(3)  # axes and contact point, in the world
         self._entries, self.axes = self._from_centre.reshape(-1), self._from_centre[:, :3]
         self._solver, self.options, self._result = solver_of(kind, tolerance)
+        self.point.setFriction(LARGEST_FRICTION[kind])
+        self.friction = float(self.point.getFriction())
 
     def pose(self, place: Sequence[float], triad: Sequence[float]) -> FloatArray:
         """Poses the plane where a ball at ``place`` [m] touches; ``triad``: components of e1, e2, e3.
@@ -83,20 +86,14 @@ class PlaneContact:
         self.point.calc(self.model, self.data, self.point_data)
         return self.point.jacobian(self.model, self.data, self.point_data)  # type: ignore[no-any-return]  # it is an array
 
-    def impulse(self, delassus: Any, free: FloatArray, mu: float) -> FloatArray | None:
+    def impulse(self, delassus: Any, free: FloatArray) -> FloatArray | None:
         """Impulse along the axes [N s], shape (3,), overwritten by the next call; None if the solver does not find it.
 
         ``delassus`` is the contact's pin.DelassusOperatorDense, ``free`` the velocity of the contact point without
         impulse [m/s], along the axes, shape (3,).
         """
-        self.point.setFriction(mu)
         # No warm start: the result must not depend on samples taken in between.
         self._result.reset()
         if not self._solver.solve(delassus, free, self.models, self._datas, self.options, self._result):
             return None
         return self._result.retrieveConstraintImpulses()  # type: ignore[no-any-return]  # it is an array
-
-    def friction(self, mu: float) -> float:
-        """Friction coefficient that the contact's cone has after it is set to ``mu``, as before each impulse."""
-        self.point.setFriction(mu)
-        return float(self.point.getFriction())

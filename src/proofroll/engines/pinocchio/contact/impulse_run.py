@@ -1,5 +1,6 @@
 """Formulation ``impulses``: run of a mechanism with contacts, dry friction and stops, and its samples."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ from typing_extensions import override
 from proofroll.core.arrays import longest
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged
+from proofroll.core.events import Event
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -60,7 +62,8 @@ class ImpulseRun(MechanismRun):
         else:
             span = _PART * self._dt
             kick = steps.beginning(span, convex=self._settings.convex)
-        return Impulses(*((part / span) for part in kick._replace(v=kick.v - steps.v)))
+        parts = kick._replace(v=kick.v - steps.v)._asdict()
+        return Impulses(**{name: part if name == "states" else part / span for name, part in parts.items()})
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, accelerations, joint forces in the next step, and empty loop forces."""
@@ -90,6 +93,10 @@ class ImpulseRun(MechanismRun):
         forces = self.steps.joints.along_joints(self.steps.q, kick.along) if kick.along.size else {}
         return replace(super().sample(), contact_force=kick.impulse if self.steps.contacts else None, **forces)
 
+    def events(self) -> Sequence[Event] | None:
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
+        return self.steps.events.events()
+
     @override
     def _drives(self) -> Array:
         self.dynamics.on_motions = self._kick().driving
@@ -102,9 +109,10 @@ class ImpulseRun(MechanismRun):
         hard, twice = (
             self._accelerations(self.steps.beginning(length, convex=False), length) for length in (span, 2 * span)
         )
-        step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
+        kick = self.steps.kick(self.steps.q, self.steps.v)
+        step = self._accelerations(kick, self._dt)
         softened = dict[str, Regularised]()
-        impulses = Impulses(self.steps.v, *np.zeros((4, 0)))
+        impulses = kick._replace(v=self.steps.v)
         accelerations, errors = self._accelerations(impulses, span), self.steps.unsure(span)
         off = [self._accelerations(impulses._replace(v=impulses.v + error), span) for error in errors]
         for name, value in hard.items():

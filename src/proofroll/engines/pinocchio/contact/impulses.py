@@ -5,6 +5,7 @@ step within the friction cones: by Coulomb's law, or by the convex problem witho
 contacts separate.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -15,7 +16,9 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK, States
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
 from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION, solver_of
@@ -67,6 +70,7 @@ class Impulses(NamedTuple):
     Attributes:
         v: velocity after it, shape (nv,).
         impulse: on body a of each contact, world axes [N s], shape (contacts, 3).
+        states: of the contacts: open, sticking or with their impulse on the cone.
         moment: of friction against turning on body a of each contact, world axes [N m s], shape (contacts, 3).
         along: impulses of joint rows [N s, N m s], shape (rows,).
         driving: impulses that impose motions [N s, N m s], shape (motions,).
@@ -74,6 +78,7 @@ class Impulses(NamedTuple):
 
     v: Array
     impulse: Array
+    states: States
     moment: Array
     along: Array
     driving: Array
@@ -120,6 +125,7 @@ class ImpulseSteps:
     Attributes:
         q, v, t: configuration, velocity, time [s].
         restitution: of each contact [1].
+        events: of the contacts.
         joints: joint rows, numbered after the contacts.
     """
 
@@ -135,8 +141,11 @@ class ImpulseSteps:
         self._midpoint = settings.integrator == "midpoint"
         mechanism = tree.mechanism
         self.contacts = mechanism.contacts
+        self.events = step_events.StepEvents(self.contacts, self._dt)
         self.q, self.v, self.t = tree.q0, tree.v0, 0.0
         self._gravity = float(np.linalg.norm(mechanism.gravity))
+        held = step_events.least_slip(mechanism.gravity, self._dt)
+        self._held = np.array([held if contact.friction else -1.0 for contact in self.contacts])
         self._touching = natural_scale(mechanism).gap
         self._index = mechanism.body_index
         self.restitution = np.array([contact.restitution for contact in self.contacts])
@@ -175,6 +184,8 @@ class ImpulseSteps:
             Diverged: Pinocchio's solver does not find the impulses.
         """
         kick = self.kick(self.q, self.v)
+        if self.events:
+            self.events.observe(self.t + self._dt, kick.states)
         if self._midpoint:
             middle = pin.integrate(self._model, self.q, 0.5 * self._dt * self.v)
             self.q = pin.integrate(self._model, middle, 0.5 * self._dt * kick.v)
@@ -384,8 +395,7 @@ class ImpulseSteps:
             sizes = np.array([touch.normal @ push for touch, push in zip(touching, kick.impulse, strict=True)])
             sticking_rows = [np.zeros((0, len(v)))]
             for k in np.flatnonzero(sizes > 0).tolist():
-                aside = np.linalg.norm(kick.impulse[k] - sizes[k] * touching[k].normal)
-                sticking_rows.append(J[k] if aside < _INSIDE * self.contacts[k].friction * sizes[k] else J[k, 2:])
+                sticking_rows.append(J[k, 2:] if kick.states[k] == SLIP else J[k])
             return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(sticking_rows))
 
         moments, impulses = self._moments.found(rows, v, inverse, pressed, self.t)
@@ -403,6 +413,7 @@ class ImpulseSteps:
         rubs = count + len(self.joints.friction)
         gaps = [k for k in (*range(count), *range(rubs, len(blocks))) if np.isfinite(shifts[k, 2])]
         impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(blocks) - count), tuple(range(count, rubs))
+        states = [OPEN] * count
         grown, pushed = bool(which), np.zeros(len(free))
         alone, motor_responses = self._motions
         while True:
@@ -410,7 +421,12 @@ class ImpulseSteps:
             closing = {k for k in gaps if blocks[k][-1] @ v + shifts[k, 2] < -_SMALL * np.abs(blocks[k] @ v).max()}
             if closing <= set(which) and not grown:
                 driving = alone - motor_responses.T @ pushed
-                return Impulses(v=v, impulse=impulse, moment=np.zeros((count, 3)), along=along_rows, driving=driving)
+                held = np.linalg.norm(J[:, :2] @ v + shifts[:count, :2], axis=1) <= self._held
+                states = [
+                    STICK if stays and state == SLIP else state for stays, state in zip(held, states, strict=True)
+                ]
+                moment, seen = np.zeros((count, 3)), tuple(states)
+                return Impulses(v=v, impulse=impulse, states=seen, moment=moment, along=along_rows, driving=driving)
             which, grown = tuple(sorted({*which, *closing})), False
             rows = np.concatenate([blocks[k] for k in which])
             to_joints = inverse @ rows.T
@@ -422,6 +438,8 @@ class ImpulseSteps:
             for end, k in zip(ends, which, strict=True):
                 if k < count:
                     impulse[k] = frame_of_axis(touching[k].normal) @ got[end - 3 : end]
+                    F1, F2, N = got[end - 3 : end].tolist()
+                    states[k] = step_events.state_of(N, math.hypot(F1, F2), _INSIDE * self.contacts[k].friction * N)
                 else:
                     along_rows[k - count] = got[end - 1]
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.surfaces import Surface
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 
 Vector = tuple[float, float, float]
 
@@ -61,7 +61,7 @@ class GeneralSurface:
     and ∂e1 · t = -e1 · ∂t for every tangent t, because e1 · t = 0.
     """
 
-    surface: Surface
+    surface: Cylinder
 
     def at(self, place: Sequence[float]) -> tuple[Frame, Shape]:
         """Frame and shape at a position; the first two numbers of ``place`` are the coordinates."""
@@ -80,28 +80,21 @@ class GeneralSurface:
 
 
 class Uniform:
-    """A surface that two commuting rigid motions slide along itself, so that all its points are alike.
+    """A cylinder: all its points are alike.
 
-    All geometry is then constant in local axes, and the frame at u is the one at u = 0 rotated by the motions.
-
-    Attributes:
-        column: index of the coordinate that turns the frame; None: there is none.
+    All geometry is constant in local axes, and the frame at u is the one at u = 0 turned about the axis.
     """
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, surface: Cylinder) -> None:
         self._start = GeneralSurface(surface).at((0.0, 0.0))
-        # At most one of two commuting motions of a surface is a rotation.
-        self.column = next((i for i, motion in enumerate(surface.generators) if motion.kind == "rotation"), None)
-        k1, k2, k3 = (0.0, 0.0, 0.0) if self.column is None else surface.generators[self.column].axis
+        k1, k2, k3 = surface.axis
         cross = np.array([[0.0, -k3, k2], [k3, 0.0, -k1], [-k2, k1, 0.0]])
         # F0, F1, F2 of the frame F0 + sin α F1 + (1 - cos α) F2 at the coordinate α (Rodrigues).
         self._parts = [(part @ matrix(self._start[0])).T.ravel().tolist() for part in (np.eye(3), cross, cross @ cross)]
 
     def at(self, u: Sequence[float]) -> tuple[Frame, Shape]:
         """See :meth:`GeneralSurface.at`."""
-        if self.column is None:
-            return self._start
-        angle = u[self.column]
+        angle = u[0]
         if not math.isfinite(angle):
             raise FloatingPointError("the place on the surface is not finite")
         sin, back = math.sin(angle), 1.0 - math.cos(angle)

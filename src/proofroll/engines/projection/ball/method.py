@@ -20,10 +20,9 @@ Blajer, Multibody Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,8 +31,6 @@ from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.ball.geometry import Frame, Shape, Uniform, Vector, along
 from proofroll.engines.projection.ball.orientation import Orientation
-
-Active = Literal["contact", "centre"] | None
 
 
 class Kinematics(NamedTuple):
@@ -69,8 +66,7 @@ class Response(NamedTuple):
         acceleration: ṡ, five numbers.
         rate: v̇ = D ṡ + Ḋ s, six numbers.
         N: λ_h, the normal force [N].
-        F2, F3: friction on the ball along e2 and e3 [N]: -λ_nh of a ball that rolls.
-        slip_rate: rate of the slip velocity along e2 and e3 [m/s²].
+        F2, F3: friction on the ball along e2 and e3 [N]: -λ_nh.
     """
 
     acceleration: tuple[float, ...]
@@ -78,7 +74,6 @@ class Response(NamedTuple):
     N: float
     F2: float
     F3: float
-    slip_rate: tuple[float, float]
 
 
 class ProjectedBall:
@@ -90,8 +85,6 @@ class ProjectedBall:
         mobility: S, the same along e2 and e3 [1/kg].
         gravity: in the world [m/s²], shape (3,).
         rolling_resistance: f [m].
-        active: active rows of the non-holonomic constraints: "contact": the two of the contact point, v2 + a ω3 and v3
-            - a ω2; "centre": also the two of a centre at rest, ω2 and ω3; None: no rows.
     """
 
     def __init__(self, body: RollingBall, geometry: Uniform, orientation: Orientation) -> None:
@@ -99,7 +92,6 @@ class ProjectedBall:
         self.mobility = 1.0 / self.mass + self.radius**2 / self.inertia
         self.gravity = body.gravity
         self.rolling_resistance = body.contact.rolling_resistance
-        self.active: Active = "contact"
         self._g = body.gravity.tolist()
         self._geometry = geometry
         self._orientation = orientation
@@ -135,20 +127,9 @@ class ProjectedBall:
             turned=turned,
         )
 
-    def speed(self, x: FloatArray) -> float:
-        """Speed of the centre [m/s]."""
-        n = self._coordinates
-        t2u, t2v, t3u, t3v = self._geometry.at(x[:2].tolist())[1].tangents
-        s_1, s_2 = x[n : n + 2].tolist()
-        return math.hypot(t2u * s_1 + t2v * s_2, t3u * s_1 + t3v * s_2)
-
     def weight(self, kin: Kinematics) -> Vector:
         """Gravity along e1, e2, e3 [m/s²]: applied force of a ball without rolling resistance, divided by its mass."""
         return along(kin.frame, *self._g)
-
-    def normal_force(self, kin: Kinematics) -> float:
-        """Normal force N = λ_h [N] by the orthogonal projection; C_h = [1 0 0 0 0 0] selects e1: only gravity acts."""
-        return self.mass * (self.weight(kin)[0] - kin.drift[0])
 
     def resistance(self, kin: Kinematics, N: float) -> tuple[float, float]:
         """Moment M_C of rolling resistance along e2 and e3 [N m]: N is shifted by f along the centre's velocity.
@@ -160,37 +141,22 @@ class ProjectedBall:
         lever = N * self.rolling_resistance / speed if speed else 0.0
         return -lever * v3, lever * v2
 
-    def response(self, kin: Kinematics, drag: tuple[float, float] = (0.0, 0.0)) -> Response:
-        """Accelerations and reactions by the tangential projection and the active non-holonomic constraints.
-
-        ``drag``: friction on the ball per newton of normal force, along e2 and e3.
-        """
+    def response(self, kin: Kinematics) -> Response:
+        """Accelerations and reactions by the tangential projection and the non-holonomic constraints."""
         a, m, J = self.radius, self.mass, self.inertia
         # a2, a3: translational part of M⁻¹ f along e2 and e3; b2, b3: rotational part, zero along e1
         g1, a2, a3 = self.weight(kin)
         (d1, d2, d3), (r2, r3), (_, q2, q3) = kin.drift, kin.convected, kin.turned
         N, b2, b3 = m * (g1 - d1), 0.0, 0.0
-        if self.active == "centre":
-            F2, F3, a2, a3, slip_rate = -m * a2, -m * a3, 0.0, 0.0, (0.0, 0.0)
-        else:
-            if self.rolling_resistance:
-                M2, M3 = self.resistance(kin, N)
-                b2, b3 = M2 / J, M3 / J
-            F2, F3 = N * drag[0], N * drag[1]
-            slip_rate = a2 - r2 + a * (b3 - q3) + self.mobility * F2, a3 - r3 - a * (b2 - q2) + self.mobility * F3
-            if self.active:
-                F2, F3, slip_rate = F2 - slip_rate[0] / self.mobility, F3 - slip_rate[1] / self.mobility, (0.0, 0.0)
-            a2, a3, b2, b3 = a2 + F2 / m, a3 + F3 / m, b2 - a * F3 / J, b3 + a * F2 / J
+        if self.rolling_resistance:
+            M2, M3 = self.resistance(kin, N)
+            b2, b3 = M2 / J, M3 / J
+        F2, F3 = -(a2 - r2 + a * (b3 - q3)) / self.mobility, -(a3 - r3 - a * (b2 - q2)) / self.mobility
+        a2, a3, b2, b3 = a2 + F2 / m, a3 + F3 / m, b2 - a * F3 / J, b3 + a * F2 / J
         p2, p3, (first2, first3, second2, second3) = a2 - d2, a3 - d3, kin.shape.inverse
         spin = self._orientation.acceleration(kin.pose, kin.r, (0.0, b2, b3), kin.turned, kin.frame)
         acceleration = (first2 * p2 + first3 * p3, second2 * p2 + second3 * p3, *spin)
-        return Response(
-            acceleration=acceleration, rate=(d1, a2, a3, 0.0, b2, b3), N=N, F2=F2, F3=F3, slip_rate=slip_rate
-        )
-
-    def response_at(self, x: FloatArray) -> Response:
-        """Solution of :meth:`response` at the state x."""
-        return self.response(self.kinematics(x))
+        return Response(acceleration=acceleration, rate=(d1, a2, a3, 0.0, b2, b3), N=N, F2=F2, F3=F3)
 
     def velocity_rate(self, kin: Kinematics, acceleration: Sequence[float]) -> FloatArray:
         """Rate v̇ = D ṡ + Ḋ s for accelerations ṡ, shape (6,)."""
@@ -208,37 +174,24 @@ class ProjectedBall:
     def rates(self, x: FloatArray) -> FloatArray:
         """Time derivative ẋ; angles, if there are any, follow from the velocities s."""
         kin = self.kinematics(x)
-        return self.derivative(kin, self.response(kin))
-
-    def derivative(self, kin: Kinematics, response: Response) -> FloatArray:
-        """Time derivative ẋ with the accelerations of ``response``."""
-        return np.array((*kin.rates, *response.acceleration))
-
-    def under(self, active: Active) -> ProjectedBall:
-        """Same ball with other active rows of the non-holonomic constraints."""
-        twin = copy.copy(self)
-        twin.active = active
-        return twin
+        return np.array((*kin.rates, *self.response(kin).acceleration))
 
     def slip(self, kin: Kinematics) -> tuple[float, float]:
         """Slip velocity C v along e2 and e3 [m/s]."""
         _, v2, v3, _, w2, w3 = kin.v
         return v2 + self.radius * w3, v3 - self.radius * w2
 
-    def eliminated(self, x: FloatArray, slip: tuple[float, float] = (0.0, 0.0)) -> FloatArray:
-        """State x with the violation of C v = ``slip`` [m/s] removed from s (Blajer 2002).
+    def eliminated(self, x: FloatArray) -> FloatArray:
+        """State x with the violation of C v = 0 removed from s (Blajer 2002).
 
         s - M̄⁻¹C_nhᵀ(C_nh M̄⁻¹ C_nhᵀ)⁻¹ C_nh s is the nearest admissible s in the metric of M̄ = DᵀMD, where C_nh = C
         D: M⁻¹ Cᵀ S⁻¹ C v in the velocities v.
         """
         kin = self.kinematics(x)
-        if self.active == "centre":
-            _, v2, v3, _, w2, w3 = kin.v
-        else:
-            slip2, slip3 = self.slip(kin)
-            F2, F3 = (slip2 - slip[0]) / self.mobility, (slip3 - slip[1]) / self.mobility
-            v2, v3, lever = F2 / self.mass, F3 / self.mass, self.radius / self.inertia
-            w2, w3 = -lever * F3, lever * F2
+        slip2, slip3 = self.slip(kin)
+        F2, F3 = slip2 / self.mobility, slip3 / self.mobility
+        v2, v3, lever = F2 / self.mass, F3 / self.mass, self.radius / self.inertia
+        w2, w3 = -lever * F3, lever * F2
         first2, first3, second2, second3 = kin.shape.inverse
         spin1, spin2, spin3 = self._orientation.solved(kin.pose, (0.0, w2, w3), kin.frame)
         *q, s_1, s_2, r1, r2, r3 = x.tolist()

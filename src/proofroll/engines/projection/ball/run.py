@@ -7,13 +7,11 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
 from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
-from proofroll.engines.projection.ball.ball_switching import Switching
 from proofroll.engines.projection.ball.geometry import Uniform, matrix
 from proofroll.engines.projection.ball.method import ProjectedBall, start_and_scales
 from proofroll.engines.projection.ball.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
@@ -42,21 +40,16 @@ class ProjectionBall:
         else:
             self._orientation = FollowedFrame() if follow else RotatingFrame()
         self._coordinates = 2 + self._orientation.size
-        turning = [generator.kind == "rotation" for generator in body.surface.generators]
-        periodic = [*turning, *([False] * (2 - len(turning))), *self._orientation.periodic]
+        periodic = [True, False, *self._orientation.periodic]
         self._angles = [index for index, whole in enumerate(periodic) if whole]
         self._ball = ProjectedBall(body, geometry, self._orientation)
         self._eliminate = settings.eliminates
-        self._bounded = math.isfinite(body.contact.mu_static)
         self._fixed_step = settings.dt if settings.resolution == "dt" else 0.0
         resolution, (x, scales) = getattr(settings, settings.resolution), start_and_scales(body, self._orientation)
-        self._motion: Integrator | Switching | TaylorSeries
+        self._motion: Integrator | TaylorSeries
         if settings.integrator == "taylor":
             assert settings.formulation != "dependent"  # refused by the settings
             self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
-        elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
-            stepper = INTEGRATORS[settings.integrator](resolution)
-            self._motion = Switching(self._ball, body, stepper, x, scales, self._check, self._renewed, self._eliminate)
         else:
             self._motion = INTEGRATORS[settings.integrator](resolution)
             self._motion.begin(0.0, x, self._ball.rates, self._accept, scales)
@@ -105,10 +98,6 @@ class ProjectionBall:
         except ArithmeticError as error:
             raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
 
-    def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return tuple(self._motion.events) if isinstance(self._motion, Switching) else ()
-
     def remarks(self) -> Sequence[str]:
         """See :class:`proofroll.core.engine_abilities.TellsRemarks`."""
         times = self._orientation.renewals if isinstance(self._orientation, EulerAngles) else []
@@ -122,29 +111,24 @@ class ProjectionBall:
         x = self._motion.x
         kin = self._ball.kinematics(x)
         frame = matrix(kin.frame)
-        if isinstance(self._motion, Switching):
+        if isinstance(self._motion, TaylorSeries):
             force = self._motion.force
-            sticking = self._motion.mode.sticking if self._bounded else None
-        elif isinstance(self._motion, TaylorSeries):
-            force, sticking = self._motion.force, None
         else:
-            force, sticking = self._ball.contact_force(self._ball.response(kin)), None
+            force = self._ball.contact_force(self._ball.response(kin))
         return BallSample(
             p_WB=self._surface.position(x[:2]),
             v_WB=frame @ kin.v[:3],
             w_WB=frame @ kin.v[3:],
             q_WB=self._orientation.quaternion(x[2 : self._coordinates]),
             force=frame @ force,
-            sticking=sticking,
         )
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         ball, x = self._ball, self._motion.x
-        friction = self._motion.friction if isinstance(self._motion, Switching) else None
         kin = ball.kinematics(x)
         frame = matrix(kin.frame)
-        rates = self._motion.rates if isinstance(self._motion, (Switching, TaylorSeries)) else ball.rates(x)
+        rates = self._motion.rates if isinstance(self._motion, TaylorSeries) else ball.rates(x)
         acceleration = ball.velocity_rate(kin, rates[self._coordinates : self._coordinates + 5].tolist())
         return BallBuilt(
             mass=ball.mass,
@@ -152,11 +136,9 @@ class ProjectionBall:
             gravity=frame @ ball.weight(kin),
             ball_radius=ball.radius,
             rolling_resistance=ball.rolling_resistance,
-            mu_static=friction.mu_static if friction else None,
-            mu_kinetic=friction.mu_kinetic if friction else None,
             acceleration=frame @ acceleration[:3],
             angular_acceleration=frame @ acceleration[3:],
-            terms=terms_held(resists=ball.rolling_resistance, slips=self._bounded, turns=len(x) > _WITHOUT_ORIENTATION),
+            terms=terms_held(resists=ball.rolling_resistance, turns=len(x) > _WITHOUT_ORIENTATION),
         )
 
 

@@ -5,10 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Refused
 from proofroll.core.heyoka_library import require_heyoka
 from proofroll.elements.ball_on_surface.compiled.projection import Formulation, parameters, projected, structure
-from proofroll.elements.ball_on_surface.compiled.rolling import supports
 from proofroll.elements.ball_on_surface.compiled.series import Renewed, Series, still_moving
 from proofroll.elements.ball_on_surface.model import RollingBall
 
@@ -36,15 +34,7 @@ class TaylorSeries(Series):
 
         Raises:
             Missing: heyoka is not installed.
-            Refused: the compiled equations do not cover the scene.
         """
-        if np.isfinite(body.contact.mu_static):
-            raise Refused(
-                "integrator=taylor rolls without slip only: where slip begins and ends its direction is stiff, which "
-                "takes other equations than these; take integrator=dop853"
-            )
-        if not supports(body):
-            raise Refused("integrator=taylor has equations of cylinders and planes only; take integrator=dop853")
         require_heyoka("integrator=taylor")
         model = projected(structure(body, formulation), rtol)
         self._pars, self._evaluate = parameters(body), model.evaluate

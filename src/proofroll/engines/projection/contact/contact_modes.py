@@ -7,8 +7,8 @@ decisions confirm nothing, but equal motions between them do.
 """
 
 import math
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -46,11 +46,12 @@ from proofroll.elements.mechanism.contact.turning import (
 )
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, coefficients_of
 from proofroll.elements.mechanism.scene.signal import breaks, varies
 from proofroll.engines.projection.contact.alternating import AlternatingMotion, Excess, ends_of_efforts
-from proofroll.engines.projection.contact.slip_directions import SlipDirections
+from proofroll.engines.projection.contact.contacts_there import ContactsThere
+from proofroll.engines.projection.contact.slip_directions import SlipDirections, balanced, led_direction
 from proofroll.engines.projection.smooth.connections import Bodies
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.smooth.elimination import Space
@@ -62,33 +63,21 @@ _STANDS = 1e-6  # acceleration, relative to the natural one, too small to start 
 _REST = 1e-2  # slip speed, relative to gravity times a fixed step, below which slips end together with another one
 
 
-class ContactsThere(NamedTuple):
-    """Contacts at a state, without their forces.
-
-    Attributes:
-        touching: geometry and sliding velocity of each contact.
-        J: derivative of each sliding velocity with respect to ν, (contacts, 3, nv).
-        response: H⁻¹ Jᵀ with the mass matrix H, (nv, contacts, 3).
-        rate: rate of each sliding velocity without contact forces, (contacts, 3).
-        free: equations of motion solved without contact forces.
-    """
-
-    touching: tuple[Touching, ...]
-    J: Array
-    response: Array
-    rate: Array
-    free: SolvedState
-
-
 class ContactMotion(AlternatingMotion[ContactMode]):
     """Motion of a tree with contacts; the last component of a state is the time."""
 
     alternates = "contacts"
 
     def __init__(
-        self, equations: DependentCoordinates, mechanism: Mechanism, stepper: Integrator, accept: Accept, step: float
+        self,
+        equations: DependentCoordinates,
+        mechanism: Mechanism,
+        stepper: Integrator,
+        accept: Accept,
+        step: float,
+        tolerance: float,
     ) -> None:
-        """Takes the size of a fixed ``step`` [s]; 0: the step adapts."""
+        """Takes the size of a fixed ``step`` [s], or 0 and the relative ``tolerance`` of steps that adapt."""
         super().__init__(equations, stepper, accept, breaks(mechanism.signals))
         self._bodies, self._joints = mechanism.contacts, joint_contacts(switched_joints(mechanism))
         self._turning = turning_frictions(self._bodies)
@@ -112,7 +101,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         slides = [True] * len(self._bodies) + slides + [False] * len(self._turning)
         # length of each contact's motion by 1 m, or by 1 rad
         self._arms = np.array([1.0 if slide else scale.length for slide in slides])
-        self._slipping = SlipDirections(step, self._still / self._arms)
+        slow = math.sqrt(tolerance) * self._unit
+        self._slipping = SlipDirections(step, self._still / self._arms, slow / self._arms, tolerance**0.25)
         self._timed = any(map(varies, mechanism.signals))
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._limited = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
@@ -221,21 +211,43 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         Raises:
             Diverged: friction makes a normal force negative (Painlevé).
         """
+        headings = self._headings(instant, mode)
+        led = [k for k in headings if self._rubs[k] and self._slipping.led(k)]
+        if len(led) == 1:
+            (k,) = led
+            rate = self._slide_rates(instant, mode, headings, k)
+            headings[k] = led_direction(headings[k], instant.touching[k].normal, rate)
+        return self._forces_against(instant, mode, headings)
+
+    def _headings(self, instant: ContactsThere, mode: ContactMode) -> dict[int, Array]:
+        """Direction of each slip."""
+        pairs = enumerate(zip(mode, instant.touching, strict=True))
+        return {k: self._slipping.heading(k, touch) for k, (acting, touch) in pairs if acting.kind == "slip"}
+
+    def _slide_rates(
+        self, instant: ContactsThere, mode: ContactMode, headings: Mapping[int, Array], k: int
+    ) -> Callable[[Array], Array]:
+        """Rate of the slide of a contact by the direction that its friction acts against."""
+
+        def rate(heading: Array) -> Array:
+            rates = instant.slide_rate(self._forces_against(instant, mode, {**headings, k: heading}))
+            return np.asarray(rates[k])
+
+        return rate
+
+    def _forces_against(self, instant: ContactsThere, mode: ContactMode, headings: Mapping[int, Array]) -> Array:
+        """Forces as of :meth:`forces`, where friction of slips acts against given directions."""
         rows, force = self._rows(instant, mode), np.zeros((len(mode), 3))
         turning = list[tuple[int, int, Array]]()
         for k, contact in enumerate(self.contacts):
-            if mode[k].kind == "slip" and not contact.presses:
-                heading = self._slipping.heading(k, instant.touching[k])
-                force[k] = -self._bounds[k] * heading
+            if k in headings and not contact.presses:
+                force[k] = -self._bounds[k] * headings[k]
                 if contact.pressed_by is not None:
-                    turning.append((k, contact.pressed_by, -self.friction[k] * heading))
+                    turning.append((k, contact.pressed_by, -self.friction[k] * headings[k]))
         if not rows:
             return force
-        directions = [
-            row - self.friction[k] * self._slipping.heading(k, instant.touching[k]) if mode[k].kind == "slip" else row
-            for k, row in rows
-        ]
-        rate = instant.rate + instant.J @ np.einsum("nki,ki->n", instant.response, force)
+        directions = [row - self.friction[k] * headings[k] if k in headings else row for k, row in rows]
+        rate = instant.slide_rate(force)
         K = np.array([row @ instant.J[k] for k, row in rows])
         D = np.array([instant.response[:, k] @ direction for (k, _), direction in zip(rows, directions, strict=True)])
         owned = [(k, direction) for (k, _), direction in zip(rows, directions, strict=True)]
@@ -311,7 +323,15 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         """Stores the directions of slips, to detect reversals."""
         x = y[:-1]
         moving = self._moving(x, self._equations.bodies(x))
-        self._slipping.look(float(y[-1]), self.mode, self._touching(x, moving))
+
+        def leading(k: int) -> Array:
+            instant = self.at(y)
+            headings = self._headings(instant, self.mode)
+            rate = self._slide_rates(instant, self.mode, headings, k)
+            gentle = self._rubs[k] and balanced(rate(headings[k]), rate(-headings[k]))
+            return led_direction(headings[k], instant.touching[k].normal, rate) if gentle else np.zeros(3)
+
+        self._slipping.look(float(y[-1]), self.mode, self._touching(x, moving), leading)
 
     def _enter(self, t: float, x: Array, mode: ContactMode) -> None:
         opened = [k for k, acting in enumerate(mode) if acting.kind == "open" and self.mode[k].kind != "open"]
@@ -414,7 +434,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     def _struck(self, x: Array, instant: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
         """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
         which = [k for k, acting in enumerate(self.mode) if (acting.kind != "open" or k == hit) and self._presses[k]]
-        frames, J, response = self._framed(instant, which)
+        frames, J, response = instant.framed(which)
         c = np.concatenate([frame.T @ instant.touching[k].slide for frame, k in zip(frames, which, strict=True)])
         place, law = 3 * which.index(hit), self.contacts[hit]
         speed, e = -c[place], law.restitution
@@ -435,13 +455,6 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         except Refused as error:
             raise Diverged(str(error)) from None
         return x, closed_mask, settles
-
-    def _framed(self, instant: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
-        """Normal and two tangents of some contacts; J along them, and response to forces along them."""
-        frames = [frame_of_axis(instant.touching[k].normal)[:, [2, 0, 1]] for k in which]
-        J = np.concatenate([frame.T @ instant.J[k] for frame, k in zip(frames, which, strict=True)])
-        response = np.concatenate([instant.response[:, k] @ frame for frame, k in zip(frames, which, strict=True)], 1)
-        return frames, J, response
 
     def _law(self, G: Array, c: Array, which: Sequence[int], sliding: Sequence[Array | None]) -> tuple[Array, Any]:
         time = self.t if hasattr(self._stepper, "t") else 0.0
@@ -467,7 +480,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         which, mode = [k for k, shut in enumerate(closed_mask) if shut], [OPEN for _ in closed_mask]
         if not which:
             return tuple(mode)
-        frames, J, response = self._framed(instant, which)
+        frames, J, response = instant.framed(which)
         c, sliding = np.zeros(3 * len(which)), list[Array | None]()
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
             point = instant.touching[k]

@@ -98,8 +98,9 @@ class ProjectionMechanism:
         self._motion: Integrator | SwitchedMotion | ContactMotion
         stepper = INTEGRATORS[settings.integrator](resolution)
         if mechanism.contacts:
+            step, tolerance = (resolution, 0.0) if settings.resolution == "dt" else (0.0, resolution)
             self._motion = self._touching = ContactMotion(
-                self._equations, mechanism, stepper, self._accepted, resolution if settings.resolution == "dt" else 0.0
+                self._equations, mechanism, stepper, self._accepted, step, tolerance
             )
             return
         if switched:

@@ -18,10 +18,12 @@ class PlannedRun:
     Attributes:
         label: text in a legend; mathematics between dollar signs.
         parameters: parameters of the scene.
+        engine: engine of this run, for what the file's engine does not follow; empty: the file's.
     """
 
     label: str
     parameters: dict[str, float] = field(default_factory=dict)
+    engine: str = ""
 
 
 @dataclass(frozen=True)

@@ -106,22 +106,25 @@ def run_figures(
     Raises:
         InputError, Missing: the engine does not exist or is not installed.
     """
-    spec = parse_engine(engine or figures.engine)
-    facts, truth = resolve([(spec.name, spec.options), (TRUTH, {})], runner.workers)
-    for facts_of in (facts, truth):
+    chosen = engine or figures.engine
+    names = {chosen: parse_engine(chosen), TRUTH: parse_engine(TRUTH)}
+    names |= {planned.engine: parse_engine(planned.engine) for planned in figures.runs.values() if planned.engine}
+    known_facts = dict[str, EngineFacts]()
+    resolved = resolve([(spec.name, spec.options) for spec in names.values()], runner.workers)
+    for name, facts_of in zip(names, resolved, strict=True):
         if isinstance(facts_of, ProofrollError):
             raise facts_of
-    assert isinstance(facts, EngineFacts)  # for the type checker, as the next line
-    assert isinstance(truth, EngineFacts)
+        known_facts[name] = facts_of
     # Orientation is requested only of an engine that has it: without it all but the angles can still be drawn.
-    formulation = str(facts.settings.get("formulation"))
-    provided = () if spec.name == TRUTH else describe(spec.name, runner.workers).provides[formulation]
-    asks = (ORIENTATION,) if BallCapability.ORIENTATION in provided and figures.wants_orientation else ()
-    cases = {name: _case(figures, planned.parameters, facts, asks) for name, planned in figures.runs.items()}
-    truths = {
-        name: _case(figures, planned.parameters, truth, _turned(planned.parameters))
-        for name, planned in figures.runs.items()
-    }
+    facts, spec, asks = known_facts[chosen], names[chosen], tuple[str, ...]()
+    if spec.name != TRUTH and figures.wants_orientation:
+        provided = describe(spec.name, runner.workers).provides[str(facts.settings.get("formulation"))]
+        asks = (ORIENTATION,) if BallCapability.ORIENTATION in provided else ()
+    cases, truths = dict[str, Case](), dict[str, Case]()
+    for name, planned in figures.runs.items():
+        own = planned.engine if planned.engine and spec.name != TRUTH else chosen
+        cases[name] = _case(figures, planned.parameters, known_facts[own], asks if own == chosen else ())
+        truths[name] = _case(figures, planned.parameters, known_facts[TRUTH], ())
     results = runner.run([*cases.values(), *truths.values()], progress)
 
     def made(asked: dict[str, Case]) -> dict[str, FigureRun]:
@@ -138,12 +141,6 @@ def run_figures(
     )
 
 
-def _turned(parameters: dict[str, float]) -> tuple[str, ...]:
-    """Requests to the truth (``asks`` of the scene) with which thousands of samples are cheap."""
-    # With rolling resistance DOP853 would end a step at each sample; routes with orientation interpolate inside steps.
-    return (ORIENTATION,) if parameters.get("rolling_resistance") else ()
-
-
 def _case(figures: Figures, parameters: dict[str, float], facts: EngineFacts, asks: tuple[str, ...]) -> Case:
     scene = load_scene(figures.scene, asks=asks, **parameters)
     limit = figures.time_limit
@@ -153,6 +150,8 @@ def _case(figures: Figures, parameters: dict[str, float], facts: EngineFacts, as
 def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> FigureRun:
     path = runner.store.trajectory(case)
     dataset = read(path) if result.trajectory is not None and path.is_file() else None
+    if dataset is not None and "body" in dataset.dims:  # a ball that may slip is a body, the only one
+        dataset = dataset.isel(body=0, drop=True)
     return FigureRun(rolling_ball(load_scene(figures.scene, **case.parameters)), result, dataset, figures.start_angles)
 
 

@@ -1,13 +1,11 @@
 """Drawings of a ball with symbols: its contact enlarged, and the whole scene by the kind of its wall."""
 
-from functools import singledispatch
-
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
-from proofroll.report.pen import Drawing, View, across, circle, turn, unit
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.report.pen import Drawing, View, across, circle, turn
 
 _BALL = 84.0  # radius of the ball [px]
 # Shift of the normal force by rolling resistance, in radii; the true one would be invisible.
@@ -92,23 +90,13 @@ def _forward(body: RollingBall) -> FloatArray:
 
 
 _SIZE = 128.0  # half the width of the drawn part of a wall [px]
-_LEVEL = 0.02  # angles below this have no arc [rad]
 
 
-@singledispatch
-def overview(wall: Surface, body: RollingBall) -> list[Drawing]:  # noqa: ARG001 -- the kinds below use it
-    """Drawings of the whole scene and of its contact enlarged; empty for a surface without a drawing.
+def overview(wall: Cylinder, body: RollingBall) -> list[Drawing]:
+    """Drawings of the cylinder cut open, and of the contact enlarged.
 
-    Args:
-        wall: the scene's wall; its type chooses the drawing.
-        body: the ball on it.
+    The first has the axis, radii, the circle of the centre, the ball at its start and later.
     """
-    return []
-
-
-@overview.register
-def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
-    """Drawings of a cylinder cut open: axis, radii, circle of the centre, the ball at its start and later."""
     b, surface = wall.radius, body.surface
     drawn, view = Drawing(), View(_direction(-68, 24), (0, 0, 1), _SIZE / b)
     top, bottom, here = 0.62 * b, -1.3 * b, (2.55, -0.72 * b)
@@ -136,46 +124,6 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     drawn.text(leader[-1], "a", beside=(8.0, 5.0))
     drawn.gravity(view, body.gravity, view(-1.35 * b * view.right))
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1))]
-
-
-@overview.register
-def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
-    """Drawings of a slope with its angle, the ball on it, and its speeds down and across."""
-    a, surface = body.ball.radius, body.surface
-    size = 6.0 * a
-    drawn, view = Drawing(), View(_direction(-62, 22), (0, 0, 1), _SIZE / size)
-    corners = [(-0.8, -0.7), (1.3, -0.7), (1.3, 0.7), (-0.8, 0.7)]
-    low, high = (wall.position(size * np.array(u)) for u in (corners[2], corners[3]))
-    drawn.path(view([wall.position(size * np.array(u)) for u in corners]), "wall", closed=True)
-    _slope(drawn, view, low, high)
-    start, frame = body.p0, surface.frame(body.u0)
-    foot = start + a * frame[:, 0]
-    for index, letter in ((1, "V_0"), (2, "V_3")):
-        velocity = size * frame[:, index]
-        drawn.vector(view([foot, foot + 0.95 * velocity]), "thin", surface.coordinates[index - 1], by=14.0)
-        drawn.vector(view([start, start + 0.62 * velocity]), "motion", letter, by=13.0)
-    drawn.disc(view(start).tolist(), a * view.scale, "ball")
-    rim = view(start) + np.outer([0.0, a * view.scale, a * view.scale + 14.0], [-0.7, -0.7])
-    drawn.path(rim, "thin")
-    drawn.text(rim[-1], "a", beside=(-6.0, -2.0))
-    drawn.gravity(view, body.gravity, view(-1.15 * size * view.right))
-    return [drawn, contact(body, (-0.42, 0.4, 0.8), (-1, 0, 0))]
-
-
-def _slope(drawn: Drawing, view: View, low: FloatArray, high: FloatArray) -> None:
-    """Draws the angle of a line from the horizontal, at its lower end; nothing for a level line."""
-    if low[2] > high[2]:
-        low, high = high, low
-    flat = np.array([high[0], high[1], low[2]])
-    angle = float(np.arctan2(high[2] - low[2], np.hypot(*(high - low)[:2])))
-    if angle < _LEVEL:
-        return
-    line = unit(flat - low)
-    reach = 0.4 * float(np.linalg.norm(high - low))
-    arc = view([low + reach * (np.cos(s) * line + np.sin(s) * np.array([0, 0, 1])) for s in turn(0.0, angle)])
-    drawn.path(view([low, flat]), "hidden")
-    drawn.path(arc, "thin")
-    drawn.text(arc[len(arc) // 2], "α", beside=(-10.0, 5.0))
 
 
 def _tube(drawn: Drawing, view: View, wall: Cylinder, top: float, bottom: float) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.of_body import ball_of
 from proofroll.papers.blajer_2006.report import onsets
 from proofroll.report.kinds import ReportKind
 
@@ -33,13 +33,14 @@ class BallReport(ReportKind):
 
     @staticmethod
     def covers(scene: Scene) -> bool:
-        """True if one ball on one surface is the scene's only element."""
-        return len(scene.elements) == 1 and isinstance(scene.elements[0], BallOnSurface)
+        """True if one ball in an upright cylinder is the scene's only element."""
+        (element,) = scene.elements if len(scene.elements) == 1 else (None,)
+        return isinstance(element, BallOnSurface) or (element is not None and ball_of(element) is not None)
 
     @staticmethod
     def group(scene: Scene) -> str:
         """Group of the ball's contact with the wall: slipping or rolling."""
-        return "ball slipping" if BallCapability.BOUNDED_FRICTION in scene.elements[0].requires else "ball rolling"
+        return "ball rolling" if isinstance(scene.elements[0], BallOnSurface) else "ball slipping"
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
@@ -49,7 +50,7 @@ class BallReport(ReportKind):
         shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)
         labels = ("as a whole", "where the ball touches the wall")
         pictures = [item.picture(label) for item, label in zip(overview(shown.wall, shown), labels, strict=False)]
-        return pictures, "" if pictures else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
+        return pictures, ""
 
     truth_facts = staticmethod(onsets.truth_facts)
     run_facts = staticmethod(onsets.run_facts)

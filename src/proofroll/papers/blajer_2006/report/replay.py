@@ -25,7 +25,8 @@ from proofroll.report.replay.replay import frame_times, in_sight
 # Variables of a trajectory by name, "time" included.
 Sampled = Mapping[str, npt.NDArray[Any]]
 # Names of the variables that a replay uses, if present.
-NEEDED = ("time", "p_WB", "v_WB", "w_WB", "q_WB", "N", "F2", "F3", "sticking", "event_kind", "event_time")
+_MOTION = ("p_WB", "v_WB", "w_WB", "q_WB")
+NEEDED = ("time", *_MOTION, "N", "F2", "F3", "event_kind", "event_time")
 
 # Steps of the quadrature of the spin from one sample to the next; with 1.3 rad between samples its error is below
 # 1e-5 rad.
@@ -46,6 +47,8 @@ SLIPS, STICKS, AWAY = 0, 1, 2
 _AFTER: Mapping[str, int] = {
     EventKind.SLIP: SLIPS,
     EventKind.STICK: STICKS,
+    EventKind.REST: STICKS,
+    EventKind.IMPACT: STICKS,
     EventKind.LIFT_OFF: AWAY,
 }
 
@@ -110,16 +113,14 @@ def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
 
 
 def _state(sampled: Sampled, times: FloatArray) -> npt.NDArray[np.uint8] | None:
-    """State of the contact at each frame, from the events, whose times are finer than the samples; None: unknown.
-
-    With unbounded friction a ball on the wall sticks.
-    """
-    if "sticking" not in sampled and not len(sampled.get("event_kind", ())):
+    """State of the contact at each frame, from the events, whose times are finer than the samples; None: unknown."""
+    if "event_kind" not in sampled:
         return None
-    start = int(sampled["sticking"][0]) if "sticking" in sampled else STICKS
-    state = np.full(times.shape, start, dtype=np.uint8)
-    for kind, time in _events(sampled):
-        state[times >= time] = _AFTER[kind]  # never at NaN
+    events = [(_AFTER[kind], time) for kind, time in _events(sampled) if kind in _AFTER]
+    slips = bool(events) and events[0][0] == STICKS  # what sticks first has slipped
+    state = np.full(times.shape, SLIPS if slips else STICKS, dtype=np.uint8)
+    for after, time in events:
+        state[times >= time] = after  # never at NaN
     return state
 
 
@@ -150,10 +151,11 @@ def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumb
     """Drawing of a ball in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
     body = rolling_ball(replayed.scene)
     coordinates = body.surface.coordinates
-    sampled = present(replayed.true, [*NEEDED, *coordinates])
+    sampled = _of_ball(present(replayed.true, [*NEEDED, *coordinates]))
     times = frame_times(float(sampled["time"][-1]), float(np.linalg.norm(sampled["w_WB"], axis=1).max()))
     true = poses(body, sampled, times)
-    ghosts = [_reachable(poses(body, present(ghost.motion, NEEDED), times), true, body) for ghost in replayed.ghosts]
+    given = [_of_ball(present(ghost.motion, NEEDED)) for ghost in replayed.ghosts]
+    ghosts = [_reachable(poses(body, motion, times), true, body) for motion in given]
     u = np.stack([np.interp(times, sampled["time"], sampled[name]) for name in coordinates], axis=1)
     built = wall(body, u)
     numbers = PackedNumbers()
@@ -189,6 +191,11 @@ def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumb
         "wall": {"rows": len(built.points), "columns": built.points.shape[1], "lines": list(built.lines)},
     }
     return case, [shown.time.size for shown in ghosts], numbers
+
+
+def _of_ball(sampled: Sampled) -> Sampled:
+    """Samples of a ball, from those of a mechanism with one body, too."""
+    return {name: values[:, 0] if name in _MOTION and values.ndim > 2 else values for name, values in sampled.items()}
 
 
 def _events(sampled: Sampled) -> list[tuple[str, float]]:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.errors import InputError, ProofrollError, Refused
 from proofroll.core.events import Event, EventKind, events_of
 from proofroll.core.plugins import engine_names, parse_engine
-from proofroll.elements.ball_on_surface.element import BallOnSurface
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
 from proofroll.running.case import Case, EngineFacts, Result, Status
@@ -75,7 +75,8 @@ def default_engines(workers: Workers | None = None) -> list[str]:
             specs.append(name)  # its row gives the reason
             continue
         provided = told.provides.items()
-        specs += [f"{name}[formulation={key}]" for key, texts in provided if BallCapability.BOUNDED_FRICTION in texts]
+        slips = MechanismCapability.CONTACT_FRICTION
+        specs += [f"{name}[formulation={key}]" for key, texts in provided if slips in texts]
     return specs
 
 
@@ -101,20 +102,22 @@ def onset_study(
         progress: called with each finished case.
 
     Raises:
-        InputError: the scene is not one ball that begins to roll on a plane or in a cylinder, its friction is
+        InputError: the scene is not one ball that begins to roll in an upright cylinder, its friction is
             unbounded, or a name is unknown.
     """
     from proofroll.truth.ball_on_surface.onset import onset
 
     loaded = load_scene(scene, **parameters)
-    if len(loaded.elements) > 1 or not isinstance(loaded.elements[0], BallOnSurface):
-        advice = "a first slip needs one ball that begins to roll on a plane or in a cylinder; name a scene of these"
-        raise InputError("scene", scene, advice)
-    if BallCapability.BOUNDED_FRICTION not in loaded.requires:
+    try:
+        body = rolling_ball(loaded)
+    except Refused:
+        advice = "a first slip needs one ball that begins to roll in an upright cylinder; name such a scene"
+        raise InputError("scene", scene, advice) from None
+    if math.isinf(body.contact.mu_static):
         raise InputError("mu_static", "inf", "without bounded friction the ball never slips; give --set mu_static=…")
     with ThreadPoolExecutor(1) as pool:  # engines start while the truth is worked out
         able = None if engines else pool.submit(default_engines, runner.workers)
-        truth = onset(loaded, until, uncertainty)
+        truth = onset(body, until, uncertainty)
         names = list(engines) if able is None else able.result()
     specs = [parse_engine(name) for name in names]
     facts = resolve([(spec.name, spec.options) for spec in specs], runner.workers)

@@ -27,7 +27,7 @@ def test_euler_angles_come_back_over_many_turns() -> None:
 
 def test_every_known_quantity_has_values_or_is_the_engines_to_tell() -> None:
     """All but the Euler angles follow from the truth's trajectory, in the order of its samples."""
-    scene = load_scene("inclined_plane")
+    scene = load_scene("sphere_in_cylinder")
     dataset = truth(scene, np.linspace(0.0, 0.2, 5))
     missing = []
     for name in known(rolling_ball(scene)):

@@ -11,7 +11,6 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.report.drawings import overview
-from proofroll.papers.blajer_2006.report.drawings import overview as by_kind
 from proofroll.report.pen import Drawing, View, circle, turn
 
 
@@ -39,7 +38,6 @@ def places(mark: dict[str, Any]) -> np.ndarray[Any, Any]:
     ("scene", "wanted"),
     [
         ("sphere_in_cylinder", {"a", "b", "c = b − a", "γ", "z", "V0", "g"}),
-        ("inclined_plane", {"a", "α", "V0", "V3", "down", "across", "g"}),
     ],
 )
 def test_every_symbol_of_the_scene_is_in_its_drawing(scene: str, wanted: set[str]) -> None:
@@ -49,14 +47,10 @@ def test_every_symbol_of_the_scene_is_in_its_drawing(scene: str, wanted: set[str
     assert {"a", "e1", "e2", "e3", "ω1", "ω2", "ω3", "N", "F2", "F3", "f"} == set(letters(contact))
 
 
-@pytest.mark.parametrize("scene", ["sphere_in_cylinder", "inclined_plane"])
-def test_what_is_not_there_is_not_drawn(scene: str) -> None:
+def test_what_is_not_there_is_not_drawn() -> None:
     """No arm of rolling resistance without rolling resistance, no arrow of gravity without gravity."""
-    assert "f" not in letters(drawn(scene)[1])
-    if scene == "sphere_in_cylinder":
-        assert "g" not in letters(drawn(scene, gravity=0.0)[0])
-    else:
-        assert "α" not in letters(drawn(scene, tilt=0.0)[0])
+    assert "f" not in letters(drawn("sphere_in_cylinder")[1])
+    assert "g" not in letters(drawn("sphere_in_cylinder", gravity=0.0)[0])
 
 
 def test_the_ball_is_drawn_to_the_scale_of_its_wall() -> None:
@@ -68,25 +62,12 @@ def test_the_ball_is_drawn_to_the_scale_of_its_wall() -> None:
         assert 2 * ball["radius"] / np.ptp(rim[:, 0]) == pytest.approx(radius / 0.225, rel=0.02)
 
 
-def test_the_slope_is_drawn_at_its_angle() -> None:
-    """A steeper plane looks steeper, and one that descends the other way is drawn so."""
-    heights = []
-    for tilt in (-0.6, 0.1, 0.9):
-        corners = places(
-            next(mark for mark in drawn("inclined_plane", tilt=tilt)[0]["marks"] if mark["look"] == "wall")
-        )
-        heights.append(corners[1, 1] - corners[0, 1])  # downwards in the picture, from the upper edge to the lower
-    assert heights[0] < heights[1] < heights[2]
-
-
 @pytest.mark.parametrize(
     ("scene", "parameters"),
     [
         ("sphere_in_cylinder", {"radius": 1e-6}),
         ("sphere_in_cylinder", {"radius": 0.224}),
         ("sphere_in_cylinder", {"cylinder_radius": 1e3}),
-        ("inclined_plane", {"tilt": 1.57}),
-        ("inclined_plane", {"speed": 0.0, "cross_speed": 0.0, "rolling_resistance": 1e-3}),
     ],
 )
 def test_any_parameters_give_a_picture_that_holds_all_its_marks(scene: str, parameters: dict[str, float]) -> None:
@@ -101,12 +82,6 @@ def test_any_parameters_give_a_picture_that_holds_all_its_marks(scene: str, para
             assert np.all(np.isfinite(corners))
             assert np.all(corners >= [x, y])
             assert np.all(corners <= [x + width, y + height])
-
-
-def test_a_surface_that_nobody_has_drawn_has_no_drawing() -> None:
-    """The kinds are told apart by type, so another type gets nothing rather than a wrong picture."""
-    body = rolling_ball(load_scene("sphere_in_cylinder"))
-    assert by_kind(object(), body) == []  # type: ignore[arg-type]  # that is the point
 
 
 def test_indices_are_told_from_letters() -> None:

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from proofroll.core import heyoka_library
 from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.slip import regimes as regimes_study
 from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_map, regime_maps
-from proofroll.truth.ball_on_surface import taylor
 from proofroll.truth.ball_on_surface.regimes import Regime
 
-slow = pytest.mark.skipif(not taylor.library.available(), reason="a map takes minutes without heyoka")
+slow = pytest.mark.skipif(not heyoka_library.available(), reason="a map takes minutes without heyoka")
 
 TEXT = """
 study = "regimes"

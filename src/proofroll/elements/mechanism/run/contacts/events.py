@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,7 +13,8 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.bounces import Bounce
 from proofroll.core.columns import Columns
 from proofroll.core.element_abilities import SeenInRun
-from proofroll.core.events import Event, EventKind
+from proofroll.core.events import Event, EventKind, wrong_bracket
+from proofroll.elements.mechanism.contact.coulomb import largest_friction
 from proofroll.elements.mechanism.run.contacts.bounces import sampled_bounces
 from proofroll.elements.mechanism.run.contacts.observables import (
     PRESSES,
@@ -21,6 +23,7 @@ from proofroll.elements.mechanism.run.contacts.observables import (
     given_forces,
     normal_forces,
 )
+from proofroll.elements.mechanism.run.contacts.step_events import StepEvent
 from proofroll.elements.mechanism.run.dataset import placed_from
 
 if TYPE_CHECKING:
@@ -30,6 +33,8 @@ if TYPE_CHECKING:
 _States = NDArray[np.bool_]
 # Slip speed of a contact that counts as sticking, relative to the mechanism's speed: softened contacts creep.
 _CREEPS = 1e-3
+# Parts of the bound of friction: what is at the cone, and what may be at a pyramid within it.
+_ON_CONE, _ON_PYRAMID = 0.99, 0.7
 # Gap at the start that counts as closed, relative to the mechanism's size.
 _CLOSED = 1e-6
 # Room of a time in which a gap closes, relative: digits of its samples.
@@ -84,6 +89,8 @@ class ContactWatch:
         count, mechanism = len(samples), self._element.mechanism
         if not mechanism.contacts:
             return SeenInRun(count, located if mechanism.has_events else None, None)
+        if located and wrong_bracket(located):  # whoever keeps the record says so
+            return SeenInRun(count, located, None)
         if any(sample.q_WB is None for sample in samples):
             return SeenInRun(count, None, None)
         pressed = given_forces(mechanism, samples)
@@ -92,7 +99,7 @@ class ContactWatch:
         placed = placed_from(self._element, times[:count], samples)
         turning = np.abs(placed.w_WB).max(axis=(1, 2)) * self._element.length
         speeds = np.maximum(np.abs(placed.v_WB).max(axis=(1, 2)), turning)
-        seen = self._events(times[:count], follow_contacts(placed), pressed, speeds)
+        seen = self._events(times[:count], follow_contacts(placed), pressed, speeds, located)
         return SeenInRun(count, self._reconciled(located or (), seen), None)
 
     def bounces(self, columns: Columns) -> Sequence[Bounce]:
@@ -100,23 +107,38 @@ class ContactWatch:
         return sampled_bounces(self._element.mechanism, columns)
 
     def _reconciled(self, located: Sequence[Event], seen: Sequence[Sighting]) -> Sequence[Event]:
-        """The engine's own events of contacts, unless its samples show one that is not among them.
+        """Events that samples show, each as the engine locates it, and what it locates between them.
+
+        Of a contact whose samples show an event that the engine does not tell, nothing else that it tells is believed.
 
         Args:
             located: the engine's own.
             seen: events in the samples.
         """
-        names = {contact.name for contact in self._element.mechanism.contacts}
-        events = [event for event in located if event.name in names]
-        left = list(events)
-        for sighting in seen:
-            match = next((candidate for candidate in left if _alike(candidate, sighting)), None)
-            if match is None:
-                return [other.event for other in seen]
-            left.remove(match)
-        return events
+        place = {id(event): number for number, event in enumerate(located)}  # of events at one time
+        ordered: list[tuple[float, int, Event]] = []
+        for contact in self._element.mechanism.contacts:
+            left = [event for event in located if event.name == contact.name]
+            told = True
+            for sighting in (item for item in seen if item.event.name == contact.name):
+                event = next((candidate for candidate in left if _alike(candidate, sighting)), None)
+                if event is None:
+                    told = False
+                    ordered.append((sighting.event.time, len(located), sighting.event))
+                else:
+                    left.remove(event)
+                    ordered.append((event.time, place[id(event)], _as_seen(event, sighting)))
+            ordered += [(event.time, place[id(event)], event) for event in left if told and not _hops(event)]
+        return [event for *_, event in sorted(ordered, key=lambda item: item[:2])]
 
-    def _events(self, times: FloatArray, followed: Followed, pressed: FloatArray, speeds: FloatArray) -> list[Sighting]:
+    def _events(
+        self,
+        times: FloatArray,
+        followed: Followed,
+        pressed: FloatArray,
+        speeds: FloatArray,
+        located: Sequence[Event] | None,
+    ) -> list[Sighting]:
         """Events in order."""
         presses = normal_forces(followed, pressed) > PRESSES * self._element.force
         # Several engines have forces only after a first step, and a slip from rest is slow at first
@@ -126,7 +148,7 @@ class ContactWatch:
         for c in range(presses.shape[1]):
             room, moves = _CLOSED * self._element.length, _CREEPS * self._element.speed
             presses[:, c] |= _stays_closed(presses[:, c], followed.gap[:, c], u_n[:, c], room, moves)
-        slips = presses & (followed.slip > _CREEPS * self._element.speed)
+        slips = presses & self._slips(times, followed, pressed, located)
         slips[0] |= presses[0] & slips[1]
         slips = presses & _without_lone(slips)
         stands = (speeds <= _CREEPS * self._element.speed) & ~slips.any(axis=1)
@@ -147,6 +169,44 @@ class ContactWatch:
                     events.append(Sighting(event, since, low, high))
         return sorted(events, key=lambda sighting: sighting.event.time)
 
+    def _slips(
+        self, times: FloatArray, followed: Followed, pressed: FloatArray, located: Sequence[Event] | None
+    ) -> _States:
+        """True where a contact moves along its surfaces with friction at its bound, shape (time, contacts).
+
+        Contacts that creep while they stick have less friction, and unbounded friction never slips. Whether friction
+        below the cone is at its bound the engine's own events say, as that of a pyramid is.
+        """
+        contacts = self._element.mechanism.contacts
+        friction = np.array([contact.friction for contact in contacts])
+        normal, u_n = (np.sum(followed.normal * vectors, axis=-1) for vectors in (pressed, followed.slide))
+        across = pressed - followed.normal * normal[..., None]
+        along = followed.slide - followed.normal * u_n[..., None]
+        moves = np.isfinite(friction) & (followed.slip > _CREEPS * self._element.speed)
+        moves &= (np.sum(across * along, axis=-1) <= 0) | (friction == 0)  # without friction round-off has a sign
+        size, bound = np.linalg.norm(across, axis=-1), largest_friction(friction, normal)
+        on_cone, near = moves & (size >= _ON_CONE * bound), moves & (size >= _ON_PYRAMID * bound)
+        if located is None:
+            return np.asarray(near)
+        slips = on_cone.copy()
+        for c, contact in enumerate(contacts):
+            told = _told_slips(times, [event for event in located if event.name == contact.name])
+            known = np.isfinite(told)
+            claims = np.where(known, told > 0, near[:, c]) if known.any() else np.any(on_cone[:, c])
+            slips[:, c] |= moves[:, c] & claims
+        return np.asarray(slips)
+
+
+def _told_slips(times: FloatArray, located: Sequence[Event]) -> FloatArray:
+    """1 where an engine tells that a contact slips, 0 where it sticks, NaN where neither; shape (time,)."""
+    states = np.full(len(times), np.nan)
+    slips = {str(EventKind.SLIP): 1.0, EventKind.TURN: 1.0, EventKind.STICK: 0.0, EventKind.REST: 0.0}
+    if located and located[0].kind in slips:
+        states[:] = float(located[0].kind != EventKind.SLIP)
+    for event in located:
+        states[times >= event.time] = slips.get(event.kind, np.nan)
+    return states
+
 
 def _rises_since(slip: FloatArray, k: int) -> int:
     """Number of the sample from which a slip speed rises up to sample k: one that grazes first creeps."""
@@ -162,6 +222,18 @@ def _alike(located: Event, sighting: Sighting) -> bool:
         and located.name == seen.name
         and _ALIKE.get(located.kind, located.kind) == _ALIKE.get(seen.kind, seen.kind)
     )
+
+
+def _as_seen(located: Event, sighting: Sighting) -> Event:
+    """The engine's event; whether what it holds also rests is seen in the samples where its steps do not tell."""
+    if not isinstance(located, StepEvent):
+        return located
+    return replace(sighting.event, time=located.time, time_low=located.time_low, time_high=located.time_high)
+
+
+def _hops(event: Event) -> bool:
+    """True if it is a contact that parts or closes within an engine's steps and in no sample: it may hop."""
+    return isinstance(event, StepEvent) and event.kind in {EventKind.IMPACT, EventKind.LIFT_OFF}
 
 
 def _without_lone(states: _States) -> _States:

@@ -2,7 +2,6 @@
 
 from enum import StrEnum
 
-from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
 
@@ -30,4 +29,4 @@ def of_contact(
     parts = (("k", stiffness, "N/m"), ("v_reg", zone, "m/s"), ("time constant", time, "s"))
     numbers = [f"{name} = {value:g} {unit}" for name, value, unit in parts if value is not None]
     text = f"{family.value}, {', '.join(numbers)}" if numbers else family.value
-    return dict.fromkeys((MechanismCapability.CONTACT, BallCapability.BOUNDED_FRICTION), text)
+    return {MechanismCapability.CONTACT: text}

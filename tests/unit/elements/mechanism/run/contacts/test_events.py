@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from proofroll.core.events import Event
 from proofroll.elements.mechanism.run.contacts.events import _CREEPS, ContactWatch
+from proofroll.elements.mechanism.run.contacts.step_events import StepEvent
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.run.sampling import MechanismSample
 from proofroll.files.scene_file import load_scene
@@ -27,14 +29,19 @@ def seen(
     speeds: list[list[float]],
     N: list[float],
     element: MechanismElement,
-    located: list[Event] | None = None,
+    located: Sequence[Event] | None = None,
+    share: float = 1.0,
 ) -> list[Event]:
-    """Events of samples of a ball that does not turn."""
+    """Events of samples of a ball that does not turn; friction is at its bound, against the slip."""
     q, radius = np.array([1.0, 0, 0, 0]), 0.05
-    samples = [
-        MechanismSample(np.array([0, 0, radius + h]), np.array(v), np.zeros(3), q_WB=q, contact_force=n * UP)
-        for h, v, n in zip(heights, speeds, N, strict=True)
-    ]
+    friction = min(element.mechanism.contacts[0].friction, 1.0)
+    samples = []
+    for h, v, n in zip(heights, speeds, N, strict=True):
+        slip = np.array([*v[:2], 0.0])
+        force = n * (UP - share * friction * slip / (np.linalg.norm(slip) or 1.0))
+        samples.append(
+            MechanismSample(np.array([0, 0, radius + h]), np.array(v), np.zeros(3), q_WB=q, contact_force=force)
+        )
     watch = ContactWatch(element)
     found = watch.conclude(EVERY * np.arange(len(samples)), samples, located)
     assert found.events is not None
@@ -158,3 +165,21 @@ def test_an_engine_without_forces_of_contact_has_no_events() -> None:
     assert watch.conclude(EVERY * np.arange(3), [sample] * 3, None).events is None
     silent = replace(sample, contact_force=np.full(3, np.nan))
     assert watch.conclude(EVERY * np.arange(3), [sample, silent, silent], None).events is None
+
+
+def test_what_creeps_within_its_cone_does_not_slip() -> None:
+    """Speed above the threshold with friction below its bound is no slip, and unbounded friction never slips."""
+    creeps = [[0.0, 0, 0]] * 3 + [[0.3, 0, 0]] * 5
+    assert told(seen([0] * 8, creeps, [1.0] * 8, ball())) == [("slip", 2)]
+    assert seen([0] * 8, creeps, [1.0] * 8, ball(), share=0.5) == []
+    assert seen([0] * 8, creeps, [1.0] * 8, ball(), [], share=0.9) == []  # told to stick, within the cone
+    mechanism = ball().mechanism
+    gripping = replace(mechanism, pairs=tuple(replace(pair, friction=np.inf) for pair in mechanism.pairs))
+    assert seen([0] * 8, creeps, [1.0] * 8, MechanismElement(gripping), share=0.0) == []
+
+
+def test_an_event_of_steps_is_what_samples_see_of_it() -> None:
+    """A contact that holds in an engine's steps rests if samples show it; one that parts between samples hops."""
+    slides = [[0.3, 0, 0], [0.2, 0, 0], [0.1, 0, 0], *[[0, 0, 0]] * 4]
+    located = [StepEvent(kind, t, t - 1e-3, t, "contact") for kind, t in (("lift_off", 0.004), ("stick", 0.031))]
+    assert seen([0] * 7, slides, [1.0] * 7, ball(), located) == [Event("rest", 0.031, 0.03, 0.031, "contact")]

@@ -1,4 +1,4 @@
-"""Tables of bowls, cones and tori in a scene file; the general mechanics follows a ball on them."""
+"""Tables of planes, bowls, cones and tori in a scene file; the general mechanics follows a ball on them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,32 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from proofroll.core.bounds import OutOfBounds, require_bounds
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Plane through the world's origin; coordinates are the distances down the slope and across it.
+
+    Attributes:
+        name: used by contacts.
+        kind: name of the surface in scene files.
+        tilt: rotation from the horizontal about the world's y axis [rad]; positive descends along +x.
+        height: height of the plane above the world's origin, along its normal [m].
+        turning: rate of a turntable, about the normal through the world's origin, upwards [rad/s].
+    """
+
+    name: str
+    tilt: float = field(default=0.0, metadata={"unit": "rad"})
+    height: float = field(default=0.0, metadata={"unit": "m"})
+    turning: float = field(default=0.0, metadata={"unit": "rad/s"})
+    kind: Literal["plane"] = "plane"
+
+    units = ("m", "m")
+
+    def __post_init__(self) -> None:
+        require_bounds("tilt", self.tilt)
+        require_bounds("height", self.height)
+        require_bounds("turning", self.turning)
 
 
 @dataclass(frozen=True)

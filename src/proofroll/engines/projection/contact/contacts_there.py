@@ -1,0 +1,39 @@
+"""Contacts at a state of a tree, and how they respond to forces."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.engines.projection.smooth.dependent import SolvedState
+
+
+class ContactsThere(NamedTuple):
+    """Contacts at a state, without their forces.
+
+    Attributes:
+        touching: geometry and sliding velocity of each contact.
+        J: derivative of each sliding velocity with respect to ν, (contacts, 3, nv).
+        response: H⁻¹ Jᵀ with the mass matrix H, (nv, contacts, 3).
+        rate: rate of each sliding velocity without contact forces, (contacts, 3).
+        free: equations of motion solved without contact forces.
+    """
+
+    touching: tuple[Touching, ...]
+    J: Array
+    response: Array
+    rate: Array
+    free: SolvedState
+
+    def slide_rate(self, force: Array) -> Array:
+        """Rate of each sliding velocity with forces on body a of each contact, (contacts, 3)."""
+        return np.asarray(self.rate + self.J @ np.einsum("nki,ki->n", self.response, force))
+
+    def framed(self, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
+        """Normal and two tangents of some contacts; J along them, and response to forces along them."""
+        frames = [frame_of_axis(self.touching[k].normal)[:, [2, 0, 1]] for k in which]
+        J = np.concatenate([frame.T @ self.J[k] for frame, k in zip(frames, which, strict=True)])
+        response = np.concatenate([self.response[:, k] @ frame for frame, k in zip(frames, which, strict=True)], 1)
+        return frames, J, response

@@ -1,0 +1,74 @@
+"""Slips of contacts, located in the steps of the engines and not between samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from balls_as_bodies import as_bodies
+
+import proofroll
+from proofroll.core.events import events_of
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
+
+STEP = 1e-3
+ENGINES = [
+    "mujoco[formulation=geoms,preset=tuned]",
+    "mujoco[formulation=geoms,preset=matched]",
+    "exudyn[formulation=spheres]",
+    "pinocchio[formulation=impulses,preset=tuned]",
+    "pinocchio[formulation=impulses,preset=matched]",
+]
+
+
+SLIPS = 0.176668  # s; of the ball, by its truth
+
+
+def ball() -> tuple[Scene, tuple[float, ...]]:
+    """A ball that rolls around in the cylinder with little friction, and the time at which it slips."""
+    return as_bodies("sphere_in_cylinder", speed=4, rolling_resistance=0, mu_static=0.15), (SLIPS,)
+
+
+@pytest.mark.drill
+def test_the_ball_slips_where_its_truth_says() -> None:
+    """Both routes of the truth have the time that engines are held to."""
+    (slip,) = events_of(proofroll.simulate(ball()[0], "truth", until=0.2, every=0.02))
+    assert slip.time == pytest.approx(SLIPS, abs=1e-6)
+
+
+def sled() -> tuple[Scene, tuple[float, ...]]:
+    """A sled on three feet of unequal loads whose push grows, and the time at which it overcomes all friction."""
+    mass, mu, rate, feet = 10.0, 0.4, 800.0, ((0.15, 0.1), (0.15, -0.1), (-0.2, 0.0))
+    spheres = [Geometry(f"foot{k}", "sled", "sphere", (*place, -0.08), radius=0.02) for k, place in enumerate(feet)]
+    mechanism = Mechanism(
+        (Body("sled", mass, inertia=(0.1, 0.2, 0.3)),),
+        (Joint("free", "free", "world", "sled", q0=(0, 0, 0.1, 1, 0, 0, 0)),),
+        geometries=(Geometry("floor", "world", "plane"), *spheres),
+        pairs=tuple(Pair(sphere.name, (sphere.name, "floor"), mu) for sphere in spheres),
+        forces=(Force("push", "sled", "force", (Formula(f"{rate}*t"), 0.0, 0.0)),),
+    )
+    return Scene("pushed_sled", "", (MechanismElement(mechanism),)), (mu * mass * 9.81 / rate,) * 3
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("moving", [ball, sled])
+def test_a_slip_is_located_within_two_steps(moving: Callable[[], tuple[Scene, tuple[float, ...]]], engine: str) -> None:
+    """A ball that loses its grip and a sled that begins to move do so where the truth has it, by samples of 20 ms."""
+    scene, times = moving()
+    until = math.ceil(times[0] / 0.02) * 0.02
+    events = events_of(proofroll.simulate(scene, engine, until=until, every=0.02))
+    assert [event.kind for event in events] == ["slip"] * len(times)
+    assert [event.time for event in events] == pytest.approx(times, abs=2 * STEP)
+    assert max(event.time_high - event.time_low for event in events) <= STEP * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_unbounded_friction_never_slips(engine: str) -> None:
+    """A ball that rolls in the cylinder creeps in steps of first order, and has no event."""
+    scene = as_bodies("sphere_in_cylinder", speed=4, rolling_resistance=0)
+    assert events_of(proofroll.simulate(scene, engine, until=0.1, every=0.02)) == []
