@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import pytest
 from balls_as_bodies import as_bodies
+from scipy.optimize import brentq
 
 import proofroll
 from proofroll.core.events import events_of
@@ -41,22 +42,30 @@ def test_the_ball_slips_where_its_truth_says() -> None:
     assert slip.time == pytest.approx(SLIPS, abs=1e-6)
 
 
-def sled() -> tuple[Scene, tuple[float, ...]]:
-    """A sled on three feet of unequal loads whose push grows, and the time at which it overcomes all friction."""
-    mass, mu, rate, feet = 10.0, 0.4, 800.0, ((0.15, 0.1), (0.15, -0.1), (-0.2, 0.0))
+MASS, FRICTION = 10.0, 0.4  # of the sled [kg]
+
+
+def sled(push: str) -> Scene:
+    """A sled on three feet of unequal loads with a ``push`` [N]."""
+    feet = ((0.15, 0.1), (0.15, -0.1), (-0.2, 0.0))
     spheres = [Geometry(f"foot{k}", "sled", "sphere", (*place, -0.08), radius=0.02) for k, place in enumerate(feet)]
     mechanism = Mechanism(
-        (Body("sled", mass, inertia=(0.1, 0.2, 0.3)),),
+        (Body("sled", MASS, inertia=(0.1, 0.2, 0.3)),),
         (Joint("free", "free", "world", "sled", q0=(0, 0, 0.1, 1, 0, 0, 0)),),
         geometries=(Geometry("floor", "world", "plane"), *spheres),
-        pairs=tuple(Pair(sphere.name, (sphere.name, "floor"), mu) for sphere in spheres),
-        forces=(Force("push", "sled", "force", (Formula(f"{rate}*t"), 0.0, 0.0)),),
+        pairs=tuple(Pair(sphere.name, (sphere.name, "floor"), FRICTION) for sphere in spheres),
+        forces=(Force("push", "sled", "force", (Formula(push), 0.0, 0.0)),),
     )
-    return Scene("pushed_sled", "", (MechanismElement(mechanism),)), (mu * mass * 9.81 / rate,) * 3
+    return Scene("pushed_sled", "", (MechanismElement(mechanism),))
+
+
+def growing_push() -> tuple[Scene, tuple[float, ...]]:
+    """A sled whose push grows, and the time at which it overcomes all friction."""
+    return sled("800*t"), (FRICTION * MASS * 9.81 / 800,) * 3
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("moving", [ball, sled])
+@pytest.mark.parametrize("moving", [ball, growing_push])
 def test_a_slip_is_located_within_two_steps(moving: Callable[[], tuple[Scene, tuple[float, ...]]], engine: str) -> None:
     """A ball that loses its grip and a sled that begins to move do so where the truth has it, by samples of 20 ms."""
     scene, times = moving()
@@ -64,7 +73,25 @@ def test_a_slip_is_located_within_two_steps(moving: Callable[[], tuple[Scene, tu
     events = events_of(proofroll.simulate(scene, engine, until=until, every=0.02))
     assert [event.kind for event in events] == ["slip"] * len(times)
     assert [event.time for event in events] == pytest.approx(times, abs=2 * STEP)
-    assert max(event.time_high - event.time_low for event in events) <= STEP * (1 + 1e-9)
+    assert max(event.time_high - event.time_low for event in events) <= 2 * STEP * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_slip_between_two_samples_is_seen(engine: str) -> None:
+    """A gentle push moves the sled and friction stops it, both between the same two samples."""
+    peak, centre, width, held = 42.0, 0.15, 0.05, FRICTION * MASS * 9.81
+    start = centre - width * math.sqrt(math.log(peak / held))
+
+    def gained(time: float) -> float:
+        """Momentum of the sled in parts of its largest friction [s]."""
+        push = peak * width * math.sqrt(math.pi) / 2 / held
+        return push * (math.erf((time - centre) / width) - math.erf((start - centre) / width)) - (time - start)
+
+    stop = brentq(gained, centre, 0.3)
+    scene = sled(f"{peak}*exp(-((t - {centre})/{width})**2)")
+    events = events_of(proofroll.simulate(scene, engine, until=0.3, every=0.1))
+    assert [event.kind for event in events] == ["slip"] * 3 + ["stick"] * 3
+    assert [event.time for event in events] == pytest.approx([start] * 3 + [stop] * 3, abs=2 * STEP)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -51,10 +51,6 @@ class ContactStates:
         """Takes the states of all contacts in the last step of ``data``."""
         self.events.observe(data.time - self.behind, self._states(data))
 
-    def changed(self, data: Any) -> bool:
-        """True if the states of contacts in the last step of ``data`` are not those of the last observation."""
-        return not self.events.shows(self._states(data))
-
     def _states(self, data: Any) -> States:
         """States of all contacts in the last step; one at several points sticks if one does."""
         if not data.ncon:

@@ -53,8 +53,8 @@ def family(settings: MujocoSettings) -> Mapping[str, str]:
     return of_contact(kind, time=settings.contact_time if settings.time_constant is None else None)
 
 
-# All that MuJoCo's steps start from.
-_WHOLE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+# Steps made at once where nothing is done in each: what lasts longer is seen, and located to this many steps.
+_AT_ONCE = 2
 
 
 class MujocoGeoms(MujocoMechanism):
@@ -113,7 +113,10 @@ class MujocoGeoms(MujocoMechanism):
         if not (edits or observes or self._resistance or self._walls):
             super()._run(steps)
             return
-        if not (edits or self._resistance or self._walls) and self._passes(steps):
+        if not (edits or self._resistance or self._walls):
+            for made in range(0, steps, _AT_ONCE):
+                super()._run(min(_AT_ONCE, steps - made))
+                self._states.observe(self._data)
             return
         for _ in range(steps):
             self._walls.pose(self._data)
@@ -125,17 +128,6 @@ class MujocoGeoms(MujocoMechanism):
                 self._states.observe(self._data)
             if self._resistance:
                 self._resistance.remember(self._data, self._data.time - self._states.behind)
-
-    def _passes(self, steps: int) -> bool:
-        """Makes steps at once if no contact changes its state by them; False: it changes, and no step was made."""
-        state = np.empty(mujoco.mj_stateSize(self._model, _WHOLE))
-        mujoco.mj_getState(self._model, self._data, state, _WHOLE)
-        super()._run(steps)
-        if self._states.changed(self._data):
-            mujoco.mj_setState(self._model, self._data, state, _WHOLE)
-            return False
-        self._states.observe(self._data)
-        return True
 
     def _step_edited(self) -> None:
         """Makes one step with edited reference accelerations."""

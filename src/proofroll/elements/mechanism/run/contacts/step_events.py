@@ -73,16 +73,12 @@ class StepEvents:
             self._states = states
         self._time = time
 
-    def shows(self, states: States) -> bool:
-        """True if the last step had these states."""
-        return states == self._states
-
     def state(self, number: int) -> int:
         """State of a contact in the last step; one that is not watched sticks."""
         return self._states[number] if self._states else STICK
 
     def events(self) -> Sequence[StepEvent] | None:
-        """Events so far, in order, each with a bracket of one step; None if no contact may slip."""
+        """Events so far, in order, each with a bracket from look to look; None if no contact may slip."""
         if not self:
             return None
         found = [event for number in range(len(self._names)) for event in self._events_of(number)]

@@ -22,8 +22,6 @@ from proofroll.files.scene_file import load_scene
 # Scenes that a ball's own mechanics follows, with motions about all axes
 SCENES = {
     "sphere_in_cylinder": {"axial_speed": 0.7, "radial_spin": 12.0, "rolling_resistance": 5e-4},
-    "tilted_cylinder": {"axial_speed": 0.4, "radial_spin": -7.0},
-    "inclined_plane": {"normal_spin": 5.0},
 }
 
 
