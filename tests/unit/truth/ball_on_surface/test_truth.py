@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from proofroll.core import heyoka_library as library
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.dataset import columns
@@ -46,6 +47,24 @@ def test_closed_form_of_the_paper(speed: float) -> None:
     }
     for name, values in expected.items():
         assert found[name].to_numpy() == pytest.approx(values, rel=1e-12, abs=1e-12), name
+
+
+@pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
+@pytest.mark.parametrize("asks", [(), ("orientation",)])
+@pytest.mark.parametrize("rolling_resistance", [0.0, 5e-4])
+def test_series_leave_round_off(rolling_resistance: float, asks: tuple[str, ...]) -> None:
+    """Forces have bars of 5e-14 of their size, whether or not the orientation is asked for."""
+    scene = load_scene("sphere_in_cylinder", speed=4.0, rolling_resistance=rolling_resistance, asks=asks)
+    found = truth(scene, np.linspace(0, 2, 101))
+    assert max(found[name].attrs["error_bar"] for name in ("N", "F2", "F3")) <= 2e-12
+    assert ("attitude" in found) == bool(asks)
+
+
+@pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
+def test_ten_thousand_oscillations() -> None:
+    """The height is known to a millionth of a radius after 10,000 oscillations."""
+    found = truth(load_scene("sphere_in_cylinder"), np.linspace(0, 5900, 1001))
+    assert 0 < found["z"].attrs["error_bar"] <= 1e-6 * A
 
 
 def test_needed_friction_of_the_paper() -> None:
