@@ -1,5 +1,6 @@
 """Both routes of a ball that rolls in an upright cylinder as compiled Taylor series (heyoka), for long motions."""
 
+import copy
 from functools import lru_cache
 from typing import Any
 
@@ -60,9 +61,7 @@ def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
 
 
 def _sampled(integrator: Any, pars: FloatArray, x: FloatArray, times: FloatArray) -> FloatArray:
-    """States at rising times [s], the first of which is that of the state ``x``, shape (n, k)."""
-    import copy
-
+    """States at rising times [s] from the state ``x`` at the first one on, shape (n, k)."""
     series = copy.copy(integrator)  # the original is shared
     series.time, series.pars[:], series.state[:] = 0.0, pars, x
     spans = np.asarray(times - times[0], dtype=np.float64)
