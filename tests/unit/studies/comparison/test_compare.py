@@ -251,9 +251,9 @@ def test_who_shares_a_route_with_the_truth_is_marked(tmp_path: Path, monkeypatch
     """A run of an engine that declares the truth's own equations is marked; one of an engine that does not is not."""
     (run,) = judged(tmp_path / "other", claim([ROW], [4.0]), the_truth).runs
     assert run.shared == ""
-    monkeypatch.setattr(f"{__name__}.FACTS", dataclasses.replace(FACTS, shares=["joint coordinates"]))
+    monkeypatch.setattr(f"{__name__}.FACTS", dataclasses.replace(FACTS, shares=["closed form"]))
     (run,) = judged(tmp_path / "same", claim([ROW], [4.0]), the_truth).runs
-    assert run.shared.startswith("rests on the same equations as the truth itself (joint coordinates")
+    assert run.shared.startswith("rests on the same equations as the truth itself (closed form")
 
 
 @pytest.mark.parametrize("expect", [Verdict.AGREES, Verdict.CONVERGES, Verdict.DIFFERS])

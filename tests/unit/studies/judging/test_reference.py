@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -179,8 +180,8 @@ def against(formulation: str, **parameters: float) -> str:
 def test_who_rests_on_a_route_of_the_truth_is_told() -> None:
     """The least model shares the route that the truth takes in this case, or not, and the other route is named."""
     said = against("equations", rolling_resistance=5e-4)
-    assert said.startswith("rests on the same equations as the truth itself (reduced equations, DOP853)")
-    assert said.endswith(": only unreduced Newton-Euler, DOP853 checks both")
+    assert said.startswith("rests on the same equations as the truth itself (reduced equations, ")
+    assert re.search(": only unreduced Newton-Euler, [^,]* checks both$", said)
     assert against("closed_form").startswith(
         "rests on the same equations as the truth itself (closed form (Blajer 2006))"
     )

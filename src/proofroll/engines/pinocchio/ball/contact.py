@@ -234,7 +234,9 @@ def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
     natural = natural_acceleration(body)
     # Velocity errors: what the solver leaves, and the round-off of the position over a step.
     size = body.ball.radius + float(np.linalg.norm(body.p0))
-    velocity = impulse + float(np.finfo(float).eps) * size / dt
+    # Where the wall does not press yet, round-off may, and friction is up to its coefficient times that.
+    pressed = 1.0 if steps.leapfrog else 1.0 + steps.contact.friction
+    velocity = impulse + float(np.finfo(float).eps) * size / dt * pressed
     rough = _MARGIN * velocity / (dt * natural)
     reasons = ["round-off of the position, divided by the square of the step, is acceleration"]
     if impulse:
