@@ -12,11 +12,11 @@ from annotated_types import Gt
 from proofroll.core.engine import whole_steps
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism, Tree
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import BODIES, MechanismCapability
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import Array, skew, to_quaternion
 
-JOINTS = frozenset({MechanismCapability.FIXED, MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC})
+JOINTS = BODIES | {MechanismCapability.FIXED, MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC}
 
 
 @dataclass(frozen=True)

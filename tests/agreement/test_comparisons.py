@@ -11,7 +11,7 @@ import pytest
 from proofroll.core.comparison import Comparison, Edge, Row
 from proofroll.core.plugins import engine_names, load_engine, parse_engine, resolve_settings
 from proofroll.core.verdict import Verdict
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.comparison_file import comparison_names, load_comparison
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
@@ -170,7 +170,7 @@ def test_every_setting_is_shown(name: str) -> None:
     there_are = {
         (name, formulation, preset)
         for formulation, presets in engine.presets.items()
-        if BallCapability.ROLLING in engine.provides[formulation]
+        if MechanismCapability.UNBOUNDED_FRICTION in engine.provides[formulation]
         for preset in presets
     }
     assert there_are - shown == {key for key in OMITTED if key[0] == name}

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 from liars import ALL, AT_ONCE, BALLS, EVERY, MECHANISMS, Lie, Moment, of_mechanism
+from placed_balls import scene_with
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.events import Event
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.mechanism.run.element import MechanismElement
 
 

@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import StoredTrajectory

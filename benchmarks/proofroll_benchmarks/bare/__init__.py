@@ -18,7 +18,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.elements.mechanism.run.element import MechanismElement

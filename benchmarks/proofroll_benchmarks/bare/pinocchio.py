@@ -18,7 +18,8 @@ from scipy.integrate import DOP853
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.elements.mechanism.scene.joint_kinds import FACTS
 from proofroll.engines.pinocchio.ball.plane_contact import PlaneContact
@@ -40,7 +41,7 @@ def prepare(scene: Scene, settings: Any) -> Bare:
         return Bare(_contact(body, settings), 1e-9, "the geometry is rounded otherwise, and the solver stops at 1e-12")
     if settings.integrator != "dop853" or not settings.projection:
         raise Refused("there is a bare loop only with dop853 and projection")
-    if settings.orientation or BallCapability.ORIENTATION in scene.requires:
+    if settings.orientation or MechanismCapability.ORIENTATION in scene.requires:
         raise Refused("there is no bare loop that follows the ball's orientation")
     rows = (_Composite if settings.formulation == "composite" else _FreeFlyer)(body)
     return Bare(

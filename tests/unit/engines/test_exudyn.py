@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from placed_balls import placed, scene_with
 
 from proofroll import load_scene
 from proofroll.core.certificate import certify
@@ -13,7 +14,6 @@ from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.running.simulation import build, simulate
 
 pytest.importorskip("exudyn")
@@ -40,7 +40,7 @@ def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis, and gravity along it, leaning by ``tilt`` [rad]."""
     scene = load_scene("sphere_in_cylinder", **parameters)
     gravity = Gravity(9.81, (-math.sin(tilt), 0.0, -math.cos(tilt)))
-    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt), gravity=gravity)
+    return scene_with(scene, surface=dataclasses.replace(placed(scene).surface, tilt=tilt), gravity=gravity)
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.engines.exudyn.ball.generic_forces import base, force_function, quadratic_terms
 from proofroll.engines.exudyn.ball.local_frame import local_geometry, slow
 from proofroll.files.scene_file import load_scene

@@ -10,6 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from placed_balls import placed, scene_with
 from true_runs import true_run
 
 from proofroll.conformance.motion import order_is_as_declared
@@ -21,7 +22,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
-from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.engines.mujoco import Mujoco, mjspec
 from proofroll.engines.mujoco.settings import OF_MECHANISMS, ORDER_OF_TURNING, PRESETS
@@ -45,7 +46,7 @@ def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis, and gravity along it, leaning by ``tilt`` [rad]."""
     scene = load_scene(CYLINDER, **parameters)
     gravity = Gravity(9.81, (-math.sin(tilt), 0.0, -math.cos(tilt)))
-    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt), gravity=gravity)
+    return scene_with(scene, surface=dataclasses.replace(placed(scene).surface, tilt=tilt), gravity=gravity)
 
 
 @functools.cache
@@ -173,7 +174,7 @@ def mutated(mutation: str, parameters: dict[str, float]) -> Scene:
     """The scene in the cylinder with one thing wrong."""
     if mutation == "inertia x2":
         scene = load_scene(CYLINDER, **parameters)
-        return scene_with(scene, ball=dataclasses.replace(scene.elements[0].ball, inertia_ratio=0.8))
+        return scene_with(scene, ball=dataclasses.replace(placed(scene).ball, inertia_ratio=0.8))
     name, factor = {
         "gravity x1.1": ("gravity", 1.1),
         "f x2": ("rolling_resistance", 2.0),

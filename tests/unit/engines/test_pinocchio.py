@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from placed_balls import compared, placed, scene_with
 from true_runs import true_run
 
 from proofroll.core.certificate import Standing, certify
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 
@@ -34,7 +34,7 @@ def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis, and gravity along it, leaning by ``tilt`` [rad]."""
     scene = load_scene("sphere_in_cylinder", **parameters)
     gravity = Gravity(9.81, (-math.sin(tilt), 0.0, -math.cos(tilt)))
-    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt), gravity=gravity)
+    return scene_with(scene, surface=dataclasses.replace(placed(scene).surface, tilt=tilt), gravity=gravity)
 
 
 SCENES = {
@@ -52,7 +52,7 @@ def largest_errors(scene: Scene, engine: str, until: float, every: float) -> dic
     """Largest absolute difference from the truth, per variable."""
     true, run = true_run(scene, until, every), simulate(scene, engine, until=until, every=every)
     assert run.status == "done", run.message
-    return {str(name): float(np.abs(run[name] - true[name]).max()) for name in true.data_vars}
+    return {str(name): float(np.abs(run[name] - true[name]).max()) for name in compared(true, run)}
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -235,7 +235,7 @@ def test_summary_is_one_sentence() -> None:
 def test_resistance_is_read_at_rest(formulation: str) -> None:
     """Rolling resistance is read back where the ball rests, too, though its moment has no direction there."""
     moving = cylinder(rolling_resistance=RESISTANCE)
-    scene = scene_with(moving, start=dataclasses.replace(moving.elements[0].start, velocity=(0.0, 0.0)))
+    scene = scene_with(moving, start=dataclasses.replace(placed(moving).start, velocity=(0.0, 0.0)))
     assert build(scene, "pinocchio", formulation=formulation).built().rolling_resistance == pytest.approx(
         RESISTANCE, rel=1e-14
     )

@@ -9,12 +9,12 @@ from functools import cache
 import numpy as np
 import pytest
 import xarray as xr
+from placed_balls import compared, placed, scene_with
 
 from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 
@@ -28,7 +28,7 @@ def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis, and gravity along it, leaning by ``tilt`` [rad]."""
     scene = load_scene("sphere_in_cylinder", **parameters)
     gravity = Gravity(9.81, (-math.sin(tilt), 0.0, -math.cos(tilt)))
-    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt), gravity=gravity)
+    return scene_with(scene, surface=dataclasses.replace(placed(scene).surface, tilt=tilt), gravity=gravity)
 
 
 @cache
@@ -41,7 +41,7 @@ def errors(engine: str, until: float = 0.5, **parameters: float) -> dict[str, fl
     """Largest difference from the truth with unbounded friction, after time 0."""
     true, run = (_moved(name, until, **parameters) for name in ("truth", engine))
     assert run.status == "done", run.message
-    return {str(name): float(np.abs(run[name] - true[name])[1:].max()) for name in true.data_vars}
+    return {str(name): float(np.abs(run[name] - true[name])[1:].max()) for name in compared(true, run)}
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -11,17 +11,17 @@ from true_runs import true_run
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 
 RESISTANCE = 5e-4
 NEEDS = {
     "nothing": ({}, frozenset()),
-    "resistance": ({"rolling_resistance": RESISTANCE}, {BallCapability.ROLLING_RESISTANCE}),
+    "resistance": ({"rolling_resistance": RESISTANCE}, {MechanismCapability.TURNING_FRICTION}),
 }
 OURS = ("projection", "reduced", "exudyn", "pinocchio", "mujoco")
-TURNING = frozenset({BallCapability.ORIENTATION})
+TURNING = frozenset({MechanismCapability.ORIENTATION})
 
 
 def scene(*asks: str, **parameters: float) -> Scene:
@@ -45,7 +45,7 @@ def scene(*asks: str, **parameters: float) -> Scene:
     ],
 )
 @pytest.mark.parametrize("need", NEEDS)
-def test_terms_follow_the_scene(engine: str, always: frozenset[BallCapability], need: str) -> None:
+def test_terms_follow_the_scene(engine: str, always: frozenset[MechanismCapability], need: str) -> None:
     """Each term is told exactly where the scene requires it, but for an orientation that is always there."""
     parameters, terms = NEEDS[need]
     assert build(scene(**parameters), engine).built().terms == always | terms
@@ -145,7 +145,7 @@ def test_mujoco_contact_of_more_dimensions(formulation: str, condim: int, coeffi
     contact = engine._evaluated().contact[0]
     assert contact.dim == condim
     assert contact.friction[2 : 2 + len(coefficients)].tolist() == coefficients
-    assert (BallCapability.ROLLING_RESISTANCE in engine.built().terms) == (condim == 6)
+    assert (MechanismCapability.TURNING_FRICTION in engine.built().terms) == (condim == 6)
     run, truth = simulate(scene(), options, until=1.0, every=0.1), true_run(scene(), 1.0, 0.1)
     assert run.status == "done"
     assert float(np.max(np.abs(run.z - truth.z))) > 0.02  # of a range of 0.12 m

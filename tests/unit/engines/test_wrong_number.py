@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from functools import cache
 
 import pytest
+from placed_balls import gravity_of, placed, scene_with
 
 from proofroll.core.certificate import certify
 from proofroll.core.errors import Missing
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
 
@@ -47,7 +47,7 @@ def models() -> list[object]:
             found.append(pytest.param(name, id=name, marks=pytest.mark.skip(reason=str(reason))))
             continue
         for formulation, presets in engine.presets.items():
-            if BallCapability.ROLLING in engine.provides[formulation]:
+            if MechanismCapability.UNBOUNDED_FRICTION in engine.provides[formulation]:
                 found.append(f"{name}[formulation={formulation},preset={next(iter(presets))}]")
     admm = [
         f"{each},solver=admm]"
@@ -59,7 +59,7 @@ def models() -> list[object]:
 
 def multiplied(scene: Scene, parameters: Mapping[str, float]) -> Scene:
     """The scene with some of its numbers multiplied."""
-    ball, contact, gravity = scene.elements[0].ball, scene.elements[0].contact, scene.elements[0].gravity
+    ball, contact, gravity = placed(scene).ball, placed(scene).contact, gravity_of(scene)
     for name, factor in parameters.items():
         if name == "gravity":
             gravity = dataclasses.replace(gravity, magnitude=factor * gravity.magnitude)

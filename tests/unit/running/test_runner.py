@@ -48,7 +48,7 @@ OUTCOMES = {
     "moves_the_bar": (Status.CRASHED, "changed proofroll.core.certificate.EXACT in its process"),
     "signs_for_the_ball": (
         Status.CRASHED,
-        "changed proofroll.elements.ball_on_surface.certificate.certify in its process",
+        "changed proofroll.elements.mechanism.run.certificate.certify in its process",
     ),
 }
 

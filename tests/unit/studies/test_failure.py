@@ -9,17 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from placed_balls import run_of
 
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.dataset import columns
-from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.natural_scales import natural_time
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
 from proofroll.studies.failure import LOST_PHASE, Yardstick, meanings, run_outcome
 
 SCENE = load_scene("sphere_in_cylinder")
-TIMES = np.linspace(0.0, 3 * natural_time(rolling_ball(SCENE)), 25)
+TIMES = np.linspace(0.0, 3 * SCENE.elements[0].natural_time, 25)
 DONE = Result(Status.DONE, "reached the end")
 LATE = (np.arange(len(TIMES)) >= 12)[:, None]
 
@@ -44,7 +43,7 @@ def run(p: Any = None, v: Any = None, w: Any = None, upto: int = 25) -> Any:
     """A trajectory of these states, or of the truth's."""
     given = {"p_WB": p, "v_WB": v, "w_WB": w}
     states = (true()[name].to_numpy() if value is None else value for name, value in given.items())
-    return columns(rolling_ball(SCENE), TIMES[:upto], *(state[:upto] for state in states)).dataset()
+    return run_of(SCENE, TIMES[:upto], *(state[:upto] for state in states))
 
 
 def drifting(speed: float) -> Any:
@@ -147,7 +146,7 @@ def test_every_kind_has_a_meaning() -> None:
 
 def test_the_natural_time() -> None:
     """It is the period 2π/(√(2/7) V0/c) of z."""
-    assert natural_time(rolling_ball(SCENE)) == pytest.approx(2 * math.pi / (math.sqrt(2 / 7) * 20.0))
+    assert SCENE.elements[0].natural_time == pytest.approx(2 * math.pi / (math.sqrt(2 / 7) * 20.0))
 
 
 @pytest.mark.parametrize(("after", "failure"), [(1.0, None), (-0.002, None), (-0.2, "reversed")])

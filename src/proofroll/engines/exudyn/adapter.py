@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.exudyn.ball import formulations as ball
@@ -135,7 +135,7 @@ class Exudyn:
         return defaults
 
     @classmethod
-    def build(cls, scene: Scene, settings: ExudynSettings) -> ExudynModel:
+    def build(cls, scene: Scene, settings: ExudynSettings) -> ExudynModel | RunOnBody:
         """See :class:`proofroll.core.engine.Engine`; builds a run of the formulation."""
         if settings.formulation in _WITH_FRAMES and not hasattr(exu, "HT"):
             raise Refused(
@@ -144,7 +144,7 @@ class Exudyn:
         if settings.formulation in OF_MECHANISMS:
             return OF_MECHANISMS[settings.formulation](scene, settings)
         require_provided(cls, settings.formulation, scene)
-        return ball.RUNS[settings.formulation](rolling_ball(scene), settings)
+        return on_body(ball.RUNS[settings.formulation](rolling_ball(scene), settings), scene)
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:

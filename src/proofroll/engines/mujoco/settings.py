@@ -12,7 +12,6 @@ from proofroll.core.engine import Scheme
 from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import InputError, Refused, refuse_first
 from proofroll.core.plugins import release
-from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.run.capabilities import ALL_LOOPS, MechanismCapability
 
 # MuJoCo's defaults: step [s], friction, solref [s], solimp (dmin, dmax).
@@ -201,7 +200,7 @@ def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     normal force that is extrapolated linearly in time.
     """
     if settings.formulation not in OF_MECHANISMS:
-        return {BallCapability.ROLLING_RESISTANCE: 2}
+        return {MechanismCapability.TURNING_FRICTION: 2}
     turning: dict[str, int] = dict.fromkeys((MechanismCapability.SPHERICAL, MechanismCapability.FREE), ORDER_OF_TURNING)
     return turning | dict.fromkeys((*ALL_LOOPS, *_FIRST_ORDER), 1)
 

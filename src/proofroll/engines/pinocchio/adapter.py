@@ -9,6 +9,7 @@ from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunOnBody
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.pinocchio.ball import formulations as ball
@@ -104,7 +105,7 @@ class Pinocchio:
         return defaults | {"gravity": pin.Model().gravity.linear.tolist()}
 
     @classmethod
-    def build(cls, scene: Scene, settings: PinocchioSettings) -> ball.BallRun | MechanismRun:
+    def build(cls, scene: Scene, settings: PinocchioSettings) -> RunOnBody | MechanismRun:
         """See :class:`proofroll.core.engine.Engine`; returns a run of the formulation."""
         if settings.formulation in _OF_PINOCCHIO_4 and release(cls.version()) < (4,):
             raise Refused(f"{settings.formulation} needs the constraints of pinocchio 4.0, and this is {cls.version()}")

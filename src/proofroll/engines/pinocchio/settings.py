@@ -9,7 +9,6 @@ from annotated_types import Ge, Gt
 from proofroll.core.dop853 import TIGHTEST
 from proofroll.core.engine import Scheme
 from proofroll.core.errors import refuse_first
-from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
 _ORDERS = {"semi_implicit_euler": 1, "midpoint": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
@@ -146,7 +145,7 @@ def lowered(settings: PinocchioSettings) -> Mapping[str, int]:
     return (
         {MechanismCapability.SATURATION: 1}
         if settings.formulation in OF_MECHANISMS
-        else {BallCapability.ORIENTATION: _ORDERS["rk4"]}
+        else {MechanismCapability.ORIENTATION: _ORDERS["rk4"]}
     )
 
 

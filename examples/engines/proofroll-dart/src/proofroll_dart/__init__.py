@@ -17,13 +17,13 @@ from proofroll.core.engine import Scheme, whole_steps
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import BODIES, MechanismCapability
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.signal import value_at
 
 _KINDS = {"fixed": "Weld", "revolute": "Revolute", "prismatic": "Prismatic", "universal": "Universal"}
 _DRIVES = {MechanismCapability[name] for name in ("JOINT_SPRINGS", "ACTUATORS", "SATURATION", "SIGNALS")}
-_PROVIDES = frozenset({MechanismCapability[name.upper()] for name in _KINDS} | _DRIVES)
+_PROVIDES = frozenset(BODIES | {MechanismCapability[name.upper()] for name in _KINDS} | _DRIVES)
 _SWITCHING = frozenset({MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS})
 _LACKING = {
     MechanismCapability.SPRINGS: "DART has no springs between points",

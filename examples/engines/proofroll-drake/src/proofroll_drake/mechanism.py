@@ -23,7 +23,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.dynamics.loop_points import held_points
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, BODIES, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_AXIS
 from proofroll.elements.mechanism.scene.signal import value_at
@@ -32,7 +32,7 @@ from proofroll_drake.joints import connect, start
 from proofroll_drake.settings import DrakeSettings
 
 _CAPABILITY = MechanismCapability
-CONTINUOUS: frozenset[str] = ALL_JOINTS | FORCES | {_CAPABILITY.ARMATURE}
+CONTINUOUS: frozenset[str] = BODIES | ALL_JOINTS | FORCES | {_CAPABILITY.ARMATURE}
 DISCRETE: frozenset[str] = CONTINUOUS | {
     _CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT,
     _CAPABILITY.COUPLINGS, _CAPABILITY.STOPS, _CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS,

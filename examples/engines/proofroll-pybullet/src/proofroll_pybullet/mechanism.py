@@ -19,7 +19,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism, Tree
 from proofroll.elements.mechanism.dynamics.loop_points import held_points
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import BODIES, MechanismCapability
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_quaternion
 from proofroll.elements.mechanism.scene.signal import value_at
@@ -27,7 +27,7 @@ from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
 _CAPABILITY = MechanismCapability
-PROVIDES: frozenset[str] = frozenset(
+PROVIDES: frozenset[str] = BODIES | frozenset(
     {
         _CAPABILITY.FIXED, _CAPABILITY.REVOLUTE, _CAPABILITY.PRISMATIC, _CAPABILITY.SPHERICAL,
         _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT, _CAPABILITY.JOINT_SPRINGS,

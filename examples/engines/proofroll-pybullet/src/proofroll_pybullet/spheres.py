@@ -12,14 +12,14 @@ from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import BODIES, MechanismCapability
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_quaternion
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
 _CAPABILITY = MechanismCapability
-PROVIDES: frozenset[str] = frozenset(
+PROVIDES: frozenset[str] = BODIES | frozenset(
     {_CAPABILITY.FREE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
 )
 _ALONE = "its bodies are free ones, each with its spheres"

@@ -15,7 +15,7 @@ from proofroll.core.engine import Regularised, Scheme, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import BODIES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import frame_of_axis, from_quaternion, to_quaternion
@@ -27,7 +27,7 @@ with warnings.catch_warnings():  # SAPIEN says which library of Vulkan it takes;
 from sapien import physx
 
 _CAPABILITY = MechanismCapability
-_PROVIDES = frozenset(
+_PROVIDES = BODIES | frozenset(
     {
         _CAPABILITY.FREE, _CAPABILITY.PLANAR, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION,
         _CAPABILITY.CONTACT_REBOUNDS,

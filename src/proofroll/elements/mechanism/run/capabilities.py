@@ -56,8 +56,12 @@ class MechanismCapability(StrEnum):
     SIGNALS = "drives and targets that change in time"
     HELD = "targets held between instants"
     MOTIONS = "prescribed motions of joints"
+    GENERAL = "more than a ball that rolls in an upright cylinder"
+    ORIENTATION = "the orientation of a ball that rolls"
 
 
+# What every formulation of bodies has, and one of a ball that rolls may lack.
+BODIES = frozenset({MechanismCapability.GENERAL, MechanismCapability.ORIENTATION})
 ALL_JOINTS = frozenset(MechanismCapability[kind.upper()] for kind in FACTS)
 ALL_LOOPS = frozenset(item for item in MechanismCapability if item.name.endswith("_LOOP"))
 _FORCES = ("SPRINGS", "SPRING_LAWS", "BUSHINGS", "APPLIED_FORCES", "JOINT_SPRINGS")

@@ -30,6 +30,7 @@ from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.switches import first_change
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.run.certificate import CAPS, certify
+from proofroll.elements.mechanism.run.contacts import rolling_failure, rolling_program, rolling_scales
 from proofroll.elements.mechanism.run.contacts.local_frame import local_observables, local_sizes, observe_locally
 from proofroll.elements.mechanism.run.contacts.observables import contact_observables, event_observables
 from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, LocalStart, body_on_wall
@@ -83,12 +84,7 @@ class MechanismElement:
     local: LocalStart | None = None
 
     sample_type: ClassVar[type[MechanismSample]] = MechanismSample
-    askable: ClassVar[Mapping[str, str]] = {}  # every sample has all fields
     softened: ClassVar[frozenset[str]] = frozenset(CAPS)
-    failures: ClassVar[Mapping[str, str]] = {
-        OPENED: f"joints or loops opened by more than {OPEN:.0%} of the mechanism's size",
-        ENERGY_GAIN: f"the energy grew by more than {GAIN:.0%} of what its weight or speed can make",
-    }
     failing_events: ClassVar[Mapping[str, str]] = {}
 
     @property
@@ -106,11 +102,37 @@ class MechanismElement:
         """Rank, mobility, and which reactions are determinate."""
         return read_only(analyse(self.mechanism))
 
+    @property
+    def failures(self) -> Mapping[str, str]:
+        """See the protocol."""
+        if self.rolls_evenly:
+            return rolling_failure.MEANINGS
+        return {
+            OPENED: f"joints or loops opened by more than {OPEN:.0%} of the mechanism's size",
+            ENERGY_GAIN: f"the energy grew by more than {GAIN:.0%} of what its weight or speed can make",
+        }
+
     @cached_property
     def requires(self) -> frozenset[str]:
         """See the protocol."""
-        redundant = {MechanismCapability.REDUNDANT} if self.analysis.redundant else set()
-        return frozenset(required(self.mechanism) | redundant)
+        capability = MechanismCapability
+        further = {capability.REDUNDANT: self.analysis.redundant, capability.GENERAL: not self.rolls_evenly}
+        return frozenset(required(self.mechanism) | {need for need, applies in further.items() if applies})
+
+    @property
+    def rolls_evenly(self) -> bool:
+        """True for one ball that rolls in an upright cylinder and never slips, see :class:`.BodyOnWall`."""
+        return self.on_wall is not None and self.on_wall.rolls_evenly and len(self.bodies) == 1
+
+    @property
+    def askable(self) -> Mapping[str, str]:
+        """See the protocol: a ball that rolls evenly is followed with or without its orientation."""
+        return {"orientation": MechanismCapability.ORIENTATION} if self.rolls_evenly else {}
+
+    @property
+    def optional(self) -> frozenset[str]:
+        """See :class:`proofroll.core.element_abilities.HasOptionalCapabilities`."""
+        return frozenset({MechanismCapability.TURNING_FRICTION, *self.askable.values()} if self.rolls_evenly else ())
 
     def commands(self) -> Commands | None:
         """See :class:`proofroll.core.element_abilities.HoldsTargets`."""
@@ -213,6 +235,8 @@ class MechanismElement:
 
         Without these: of its mass on the stiffest spring between points, else the time of a turn, else 1 s.
         """
+        if self.on_wall is not None and self.rolls_evenly:
+            return rolling_scales.natural_time(self.on_wall)
         gravity, rates = float(np.linalg.norm(self.mechanism.gravity)), self.law_rates[1]
         slowest = float(rates.min(initial=np.inf))
         slowest = slowest if slowest > _HELD * float(rates.max(initial=0.0)) and np.isfinite(slowest) else 0.0
@@ -259,7 +283,7 @@ class MechanismElement:
     @cached_property
     def on_wall(self) -> BodyOnWall | None:
         """Its ball on a wall, if it is described in the local frame of that wall."""
-        return None if self.local is None else body_on_wall(self.mechanism, self.local)
+        return None if self.local is None else read_only(body_on_wall(self.mechanism, self.local))
 
     @cached_property
     def observables(self) -> tuple[Observable, ...]:
@@ -318,6 +342,8 @@ class MechanismElement:
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
         """See the protocol."""
+        if self.on_wall is not None and self.rolls_evenly:
+            return rolling_scales.step_numbers(self.on_wall, h, truth)
         return step_numbers(self, h, truth)
 
     @property
@@ -364,9 +390,10 @@ class MechanismElement:
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.run.dataset`."""
         return from_samples(self, times, samples)
 
-    def lacks(self, samples: Sequence[MechanismSample], asks: Sequence[str]) -> str | None:  # noqa: ARG002 -- the protocol's
+    def lacks(self, samples: Sequence[MechanismSample], asks: Sequence[str]) -> str | None:
         """See the protocol."""
-        lacking = any(sample.q_WB is None for sample in samples)
+        asked = not self.rolls_evenly or "orientation" in asks
+        lacking = asked and any(sample.q_WB is None for sample in samples)
         return "the engine does not give the orientation of the bodies" if lacking else None
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
@@ -408,22 +435,36 @@ class MechanismElement:
         """See the protocol."""
         return certify(self, built, sample)
 
-    def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:  # noqa: ARG002 -- the protocol's
+    def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
         """See the protocol."""
+        if self.on_wall is not None and self.rolls_evenly:
+            return rolling_failure.signs(self.on_wall, dataset, truth)
         shown = [Sign(OPENED, dataset["drift"].to_numpy() > OPEN * self.length)]
         if self.conservative:
             energy = dataset["energy"].to_numpy()
             shown.append(Sign(ENERGY_GAIN, energy - energy[0] > GAIN * self.force * self.length))
         return shown
 
+    def cause(self, dataset: xr.Dataset, error: float) -> str | None:
+        """See :class:`proofroll.core.element_abilities.ExplainsErrors`."""
+        if self.on_wall is None or not self.rolls_evenly:
+            return None
+        return rolling_failure.cause(self.on_wall, dataset, error)
+
     def failure_program(self, failed: FailedRun, engine: str | None) -> str:
         """See :class:`proofroll.core.element_abilities.WritesPrograms`."""
+        if self.on_wall is not None and self.rolls_evenly:
+            return rolling_program.program(self.on_wall, failed, engine)
         gain = GAIN * self.force * self.length if self.conservative else 0.0
         return program(self, failed, engine, gain, OPEN * self.length)
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:  # noqa: ARG002 -- the protocol's
         """See the protocol."""
-        return optional_terms(self.mechanism, parameters)
+        terms = optional_terms(self.mechanism, parameters)
+        if not self.rolls_evenly:
+            return terms
+        because, need = "nothing else depends on it", MechanismCapability.ORIENTATION
+        return [*terms, OptionalTerm("orientation asked", because, asks=("orientation",), capability=need)]
 
 
 def the_mechanism(scene: Scene) -> MechanismElement:

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Mapping
 
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, RollingBall
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.engines.exudyn.ball.carrier import Carrier
 from proofroll.engines.exudyn.ball.contact import PenaltyContact
 from proofroll.engines.exudyn.ball.generic import Generic
@@ -17,15 +18,15 @@ RUNS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
     "contact": PenaltyContact,
 }
 PROVIDES: Mapping[str, frozenset[str]] = {
-    "generic": ALL_OF_A_BALL - {BallCapability.ORIENTATION},
+    "generic": ALL_OF_A_BALL - {MechanismCapability.ORIENTATION},
     "carrier": ALL_OF_A_BALL,
     "rolling_disc": ALL_OF_A_BALL,
     "contact": ALL_OF_A_BALL,
 }
 LACKING: Mapping[str, Mapping[str, str]] = {
-    "generic": {BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation"},
+    "generic": {MechanismCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation"},
 }
 INHERENT: Mapping[str, Mapping[str, str]] = {
-    formulation: {BallCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}
+    formulation: {MechanismCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}
     for formulation in ("carrier", "rolling_disc", "contact")
 }

@@ -14,7 +14,14 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.dynamics.commands import drive
 from proofroll.elements.mechanism.dynamics.loop_points import normal_of_plane
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.run.capabilities import (
+    ALL_JOINTS,
+    ALL_LOOPS,
+    BODIES,
+    FORCES,
+    MechanismCapability,
+    require,
+)
 from proofroll.elements.mechanism.run.sampling import (
     MechanismBuilt,
     MechanismSample,
@@ -46,7 +53,7 @@ _OF_JOINTS = {
         "MOTIONS",
     )
 }
-PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS | {MechanismCapability.REDUNDANT})
+PROVIDES = frozenset(BODIES | ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS | {MechanismCapability.REDUNDANT})
 LACKING: Mapping[str, str] = {
     MechanismCapability.REBOUNDS: "its stops are springs with dampers, which have no coefficient of restitution",
 }

@@ -12,7 +12,14 @@ import numpy as np
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD, Joint
 from proofroll.elements.mechanism.dynamics.commands import drive
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.run.capabilities import (
+    ALL_JOINTS,
+    ALL_LOOPS,
+    BODIES,
+    FORCES,
+    MechanismCapability,
+    require,
+)
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, to_quaternion
@@ -25,7 +32,7 @@ from proofroll.engines.exudyn.smooth.joint_laws import JointLaws
 
 _KNOWN = {MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC}
 _DRIVES = {MechanismCapability[name] for name in ("ACTUATORS", "SATURATION", "SIGNALS", "HELD")}
-PROVIDES: frozenset[str] = frozenset(_KNOWN | FORCES | _DRIVES)
+PROVIDES: frozenset[str] = frozenset(BODIES | _KNOWN | FORCES | _DRIVES)
 LACKING: Mapping[str, str] = {
     **dict.fromkeys(ALL_JOINTS - _KNOWN, "a joint of Exudyn's kinematic tree has exactly one coordinate"),
     **dict.fromkeys(ALL_LOOPS, "Exudyn's explicit integrators take no constraints"),

@@ -7,10 +7,11 @@ import mujoco
 import numpy as np
 
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.engines.mujoco.ball.certificate_bounds import softness
 from proofroll.engines.mujoco.ball.chart import Chart
 from proofroll.engines.mujoco.ball.contact import contact_coefficient, contact_force
@@ -28,7 +29,7 @@ _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FR
 _PRESSED = 1e-6
 PROVIDES: Mapping[str, frozenset[str]] = dict.fromkeys(_FORMULATIONS, ALL_OF_A_BALL)
 INHERENT: Mapping[str, Mapping[str, str]] = {
-    formulation: {BallCapability.ORIENTATION: "the ball's joint, a ball or free joint, has it in qpos"}
+    formulation: {MechanismCapability.ORIENTATION: "the ball's joint, a ball or free joint, has it in qpos"}
     for formulation in _FORMULATIONS
 }
 

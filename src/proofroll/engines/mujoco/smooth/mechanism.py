@@ -13,7 +13,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.dynamics.commands import drive
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, BODIES, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import (
     DEPENDENT,
     MechanismBuilt,
@@ -40,7 +40,8 @@ _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 _MARGIN = 1.1
 _BRAKE = 1e9  # 1/s: deceleration over speed that a row of hard dry friction asks for, above any that friction gives
 PROVIDES = (
-    ALL_JOINTS
+    BODIES
+    | ALL_JOINTS
     | FORCES
     | {_CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.DISTANCE_LOOP}
     | {_CAPABILITY.REDUNDANT, _CAPABILITY.JOINT_FRICTION, _CAPABILITY.ARMATURE, _CAPABILITY.STOPS}

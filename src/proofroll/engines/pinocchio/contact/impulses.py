@@ -15,7 +15,7 @@ import pinocchio as pin
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, BODIES, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK, States
@@ -28,7 +28,8 @@ from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
 _CAPABILITY = MechanismCapability
 PROVIDES: frozenset[str] = (
-    ALL_JOINTS
+    BODIES
+    | ALL_JOINTS
     | FORCES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
     | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION}

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
 from proofroll.elements.mechanism.dynamics.light_joints import lacks_inertia
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, BODIES, FORCES, MechanismCapability
 from proofroll.elements.mechanism.scene.bushing import Bushing
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.prescribed import moved
@@ -35,7 +35,7 @@ _OF_JOINTS = {
         "MOTIONS",
     )
 }
-PROVIDES: frozenset[str] = ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS
+PROVIDES: frozenset[str] = BODIES | ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS
 LACKING: Mapping[str, str] = {
     MechanismCapability[name]: "these equations have no law that switches"
     for name in ("JOINT_FRICTION", "STOPS", "REBOUNDS")

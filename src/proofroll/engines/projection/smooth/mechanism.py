@@ -13,7 +13,14 @@ from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.dynamics.commands import drive
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.run.capabilities import (
+    ALL_JOINTS,
+    ALL_LOOPS,
+    BODIES,
+    FORCES,
+    MechanismCapability,
+    require,
+)
 from proofroll.elements.mechanism.run.sampling import (
     MechanismBuilt,
     MechanismSample,
@@ -32,7 +39,8 @@ from proofroll.engines.projection.smooth.dependent import DependentCoordinates, 
 from proofroll.engines.projection.smooth.recursion import compiled
 
 PROVIDES = frozenset(
-    ALL_JOINTS
+    BODIES
+    | ALL_JOINTS
     | ALL_LOOPS
     | FORCES
     | {
