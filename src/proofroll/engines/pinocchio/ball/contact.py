@@ -234,10 +234,12 @@ def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
     natural = natural_acceleration(body)
     # Velocity errors: what the solver leaves, and the round-off of the position over a step.
     size = body.ball.radius + float(np.linalg.norm(body.p0))
-    # Where the wall does not press yet, round-off may, and friction is up to its coefficient times that.
-    pressed = 1.0 if steps.leapfrog else 1.0 + steps.contact.friction
-    velocity = impulse + float(np.finfo(float).eps) * size / dt * pressed
+    epsilon = float(np.finfo(float).eps)
+    velocity = impulse + epsilon * size / dt
     rough = _MARGIN * velocity / (dt * natural)
+    if not steps.leapfrog:
+        # The wall does not press yet but by the round-off of gravity across it, and friction is bounded by that.
+        rough += steps.contact.friction * epsilon * float(np.linalg.norm(body.gravity)) / natural
     reasons = ["round-off of the position, divided by the square of the step, is acceleration"]
     if impulse:
         reasons.append("impulses are found to solver_tolerance")

@@ -122,8 +122,8 @@ def run_figures(
         asks = (ORIENTATION,) if BallCapability.ORIENTATION in provided else ()
     cases, truths = dict[str, Case](), dict[str, Case]()
     for name, planned in figures.runs.items():
-        own = planned.engine if planned.engine and spec.name != TRUTH else chosen
-        cases[name] = _case(figures, planned.parameters, known_facts[own], asks if own == chosen else ())
+        run_engine = planned.engine if planned.engine and spec.name != TRUTH else chosen
+        cases[name] = _case(figures, planned.parameters, known_facts[run_engine], asks if run_engine == chosen else ())
         truths[name] = _case(figures, planned.parameters, known_facts[TRUTH], ())
     results = runner.run([*cases.values(), *truths.values()], progress)
 

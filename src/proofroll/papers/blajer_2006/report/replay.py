@@ -154,8 +154,8 @@ def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumb
     sampled = _of_ball(present(replayed.true, [*NEEDED, *coordinates]))
     times = frame_times(float(sampled["time"][-1]), float(np.linalg.norm(sampled["w_WB"], axis=1).max()))
     true = poses(body, sampled, times)
-    given = [_of_ball(present(ghost.motion, NEEDED)) for ghost in replayed.ghosts]
-    ghosts = [_reachable(poses(body, motion, times), true, body) for motion in given]
+    motions = [_of_ball(present(ghost.motion, NEEDED)) for ghost in replayed.ghosts]
+    ghosts = [_reachable(poses(body, motion, times), true, body) for motion in motions]
     u = np.stack([np.interp(times, sampled["time"], sampled[name]) for name in coordinates], axis=1)
     built = wall(body, u)
     numbers = PackedNumbers()

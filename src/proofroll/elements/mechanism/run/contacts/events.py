@@ -180,19 +180,19 @@ class ContactWatch:
         contacts = self._element.mechanism.contacts
         friction = np.array([contact.friction for contact in contacts])
         normal, u_n = (np.sum(followed.normal * vectors, axis=-1) for vectors in (pressed, followed.slide))
-        across = pressed - followed.normal * normal[..., None]
-        along = followed.slide - followed.normal * u_n[..., None]
+        rubbing = pressed - followed.normal * normal[..., None]
+        slip = followed.slide - followed.normal * u_n[..., None]
         moves = np.isfinite(friction) & (followed.slip > _CREEPS * self._element.speed)
-        moves &= (np.sum(across * along, axis=-1) <= 0) | (friction == 0)  # without friction round-off has a sign
-        size, bound = np.linalg.norm(across, axis=-1), largest_friction(friction, normal)
+        moves &= (np.sum(rubbing * slip, axis=-1) <= 0) | (friction == 0)  # without friction round-off has a sign
+        size, bound = np.linalg.norm(rubbing, axis=-1), largest_friction(friction, normal)
         on_cone, near = moves & (size >= _ON_CONE * bound), moves & (size >= _ON_PYRAMID * bound)
         if located is None:
             return np.asarray(near)
         slips = on_cone.copy()
         for c, contact in enumerate(contacts):
             told = _told_slips(times, [event for event in located if event.name == contact.name])
-            known = np.isfinite(told)
-            claims = np.where(known, told > 0, near[:, c]) if known.any() else np.any(on_cone[:, c])
+            told_mask = np.isfinite(told)
+            claims = np.where(told_mask, told > 0, near[:, c]) if told_mask.any() else np.any(on_cone[:, c])
             slips[:, c] |= moves[:, c] & claims
         return np.asarray(slips)
 

@@ -81,8 +81,8 @@ class StepEvents:
         """Events so far, in order, each with a bracket from look to look; None if no contact may slip."""
         if not self:
             return None
-        found = [event for number in range(len(self._names)) for event in self._events_of(number)]
-        return sorted(found, key=lambda event: event.time)
+        events = [event for number in range(len(self._names)) for event in self._events_of(number)]
+        return sorted(events, key=lambda event: event.time)
 
     def _events_of(self, number: int) -> list[StepEvent]:
         ends = [*(high for _, high, _ in self._changes[1:]), np.inf]
