@@ -101,7 +101,8 @@ class Reference:
 
     def shared(self, routes: Collection[str]) -> str:
         """Sentence about a route of the truth that is among ``routes``, and its check; empty if none is."""
-        names = {key: str(self.dataset.attrs.get(key, "")) for key in ("route", "second_route")}
+        # of further elements, and of an orientation, behind a semicolon
+        names = {key: str(self.dataset.attrs.get(key, "")).partition(";")[0] for key in ("route", "second_route")}
         keys = [key for key, name in names.items() if re.split(r"[,(]", name)[0].strip() in routes]
         if not keys:
             return ""
