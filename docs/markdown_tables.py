@@ -85,7 +85,7 @@ def remark_list(content: ReportedComparison) -> str:
 # Among what the cheapest is named: everything that is an engine's model, contact models, and the scene's own equations.
 _AMONG: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("cheapest engine", ()),
-    ("cheapest contact model", (Level.CONTACT, Level.FACETS)),
+    ("cheapest contact model", (Level.CONTACT,)),
     ("the scene's own equations", (Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION)),
 )
 

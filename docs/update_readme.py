@@ -38,12 +38,12 @@ ROOT = Path(__file__).resolve().parents[1]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)
 POINT = {"speed": 4.0, "rolling_resistance": 0.0}
 SHOWN = (
-    "mujoco[formulation=facets,preset=default]",
-    "mujoco[formulation=free,preset=default]",
-    "mujoco[formulation=free,dt=1e-4]",
+    "mujoco[formulation=chart,preset=default]",
+    "pinocchio[formulation=impulses]",
+    "mujoco[formulation=geoms,dt=1e-4]",
+    "exudyn[formulation=spheres]",
     "mujoco[formulation=chart]",
     "exudyn[formulation=carrier]",
-    "exudyn[formulation=generic]",
     "pinocchio[formulation=composite]",
     "projection[formulation=euler]",
 )

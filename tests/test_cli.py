@@ -90,19 +90,19 @@ BAD = {
     "engine that diverges": (with_option("--engine", "not_a_number"), 3, ["not_a_number diverged", "not finite"]),
     "engine that commands": (with_option("--engine", "commands"), 3, ["commands diverged", "owned2J it stopped"]),
     "engine that refuses": (with_option("--engine", "refuses"), 3, ["refuses refused", "no wheel, no ball"]),
-    "capability that is lacking": (with_option("--set", "rolling_resistance=1e-4"), 3, ["needs rolling resistance"]),
+    "capability that is lacking": (with_option("--set", "rolling_resistance=1e-4"), 3, ["needs friction of contacts"]),
     "something else asked": (with_option("--ask", "colour"), 2, ["--ask = 'colour'", "choose orientation"]),
     "nothing to ask for": (
         ["run", "pendulum", "--engine", "truth", "--ask", "colour"], 2, ["--ask = 'colour'", "besides its motion"]
     ),
     "formulation of another scene": (
-        ["run", "pendulum", "--engine", "mujoco[formulation=free]"], 3, ["revolute joints; choose formulation=joints"]
+        ["run", "pendulum", "--engine", "mujoco[formulation=chart]"], 3, ["revolute joints; choose formulation=joints"]
     ),
     "nothing for a value": (with_option("--out", ""), 2, ["argument = ''", "this is empty"]),
     "picture in a file": (with_option("--plot", "/dev/null/run.svg"), 2, ["--plot = '/dev/null/run.svg'", "cannot be"]),
     "picture of another kind": (with_option("--plot", "run.gif"), 2, ["--plot = 'run.gif'", ".svg"]),
     "a model of another scene": (
-        ["export", "pendulum", "x.xml", "--engine", "mujoco[formulation=free]"], 3, ["needs revolute joints; choose"]
+        ["export", "pendulum", "x.xml", "--engine", "mujoco[formulation=chart]"], 3, ["needs revolute joints; choose"]
     ),
     "number of another kind": (["check", "arm.urdf", "--states", "1e9"], 2, ["--states = '1e9': give a whole number"]),
     "steps without number": (rk4("1e-300"), 2, ["dt = 1e-300", "steps from 0 s", "take a longer one"]),
@@ -121,7 +121,7 @@ BAD = {
     "a version in a name": (["engines", "add", "mujoco==99"], 2, ["add mujoco --requirement mujoco==VERSION"]),
     "no version": (["engines", "add", "mujoco"], 2, ["--requirement is missing", "mujoco==VERSION"]),
     "a scene for a map": (["tradeoff", "/dev/null/scene.toml"], 2, ["scene.toml", "cannot be read"]),
-    "orientation of an engine without": (with_option("--ask", "orientation"), 3, ["needs the ball's orientation"]),
+    "orientation of an engine without": (with_option("--ask", "orientation"), 3, ["orientation of a ball"]),
     "ladder of nothing": (["ladder", "sphere_in_cylinder", "--quantity", "height"], 2, ["quantity = 'height'"]),
     "ladder of no length": (["ladder", "sphere_in_cylinder", "--until", "0"], 2, ["until = 0", "positive"]),
     "unknown comparison": (["compare", "no_such_claim"], 2, ["comparison = 'no_such_claim'"]),
@@ -279,7 +279,9 @@ def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (code, err) == (0, "")
     found = {engine["name"]: engine for engine in json.loads(out)}
     assert found["oracle"]["status"] == "installed"
-    assert found["oracle"]["provides"] == {"only": ["rolling without slip"]}
+    assert found["oracle"]["provides"] == {
+        "only": ["contact between bodies", "contacts that never slip (friction = inf)"]
+    }
     assert found["absent"]["status"] == "missing"
     assert "no_such_module_anywhere" in found["absent"]["message"]
     assert found["misspelt"]["status"] == "broken"
@@ -289,7 +291,7 @@ def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "a only (" in out
     rows = [line.split() for line in out.splitlines()]
     assert ["capability", "oracle"] in rows
-    assert ["rolling", "without", "slip", "a"] in rows
+    assert ["contact", "between", "bodies", "a"] in rows
 
 
 COMPARISON = """
@@ -713,7 +715,7 @@ def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
         code, out, err = proofroll(*arguments, *asked, "--out", str(tmp_path / "run.nc"))
         assert (code, err) == (0, "")
         assert ("q_WB" in read(tmp_path / "run.nc")) == bool(asked)
-        assert ("\nq_WB.w " in out) == bool(asked)
+        assert ("\nattitude.w " in out) == bool(asked)
 
 
 @pytest.mark.drill

@@ -24,7 +24,7 @@ from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.tradeoff.tradeoff import Extent, study_path
 
 Proofroll = Callable[..., tuple[int, str, str]]
-ENGINE = "exudyn[formulation=generic,preset=matched]"
+ENGINE = "exudyn[formulation=carrier,preset=matched]"
 
 
 @pytest.fixture(scope="session")
@@ -36,7 +36,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> TradeoffStudy:
     from proofroll.studies.tradeoff.tradeoff import tradeoff
 
     question = Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z")
-    engines = [ENGINE, "mujoco[formulation=free,preset=default]"]
+    engines = [ENGINE, "mujoco[formulation=chart,preset=default]"]
     extent = Extent(engines, over={"speed": [3, 5]}, rounds=2)
     found = tradeoff(question, Runner(Store(tmp_path_factory.mktemp("cases"))), extent)
     return tradeoff_study(found)
@@ -72,7 +72,7 @@ def test_curves_reach_from_broken_to_fine(measured: TradeoffStudy) -> None:
     assert steps == sorted(steps, reverse=True)
     errors = [point.error["z"] for point in curves["exudyn"] if point.status == "done"]
     assert errors[-1] < 1e-3 * errors[0]
-    assert min(point.error["z"] for point in curves["mujoco"] if point.status == "done") > 0.01
+    assert min(point.error["z"] for point in curves["mujoco"] if point.status == "done") > 0.003
 
 
 def test_every_point_has_a_cost_with_its_interval(measured: TradeoffStudy) -> None:
@@ -97,7 +97,7 @@ def test_budget_of_a_good_and_of_a_soft_model(measured: TradeoffStudy) -> None:
     assert good.order_low - 0.1 < 2 < good.order_high + 0.1
     assert good.order_from > good.order_to > 0
     assert good.model_form < 1e-8
-    assert soft.model_form > 0.01
+    assert soft.model_form > 0.003
     assert soft.fine == "model form"
 
 
@@ -140,7 +140,7 @@ def test_recommend_for_a_person(proofroll: Proofroll, folder: Path) -> None:
     code, out, _ = proofroll(*asked(folder))
     assert code == 0
     assert all(len(line) <= 100 for line in out.splitlines())
-    for words in ("use Exudyn generic matched, dt", "Cheaper ones fail", "speed 3 to 5", "nothing is known beyond"):
+    for words in ("use Exudyn carrier matched, dt", "Cheaper ones fail", "speed 3 to 5", "nothing is known beyond"):
         assert words in " ".join(out.split())
 
 
@@ -149,7 +149,7 @@ def test_a_tolerance_that_nothing_holds(proofroll: Proofroll, folder: Path) -> N
     code, out, _ = proofroll(*asked(folder, tolerance="1e-15 m"))
     assert code == 1
     assert "Nothing that was measured holds z" in out
-    assert "Closest: Exudyn generic" in out
+    assert "Closest: Exudyn carrier" in out
 
 
 @pytest.mark.parametrize(
@@ -237,13 +237,13 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
     assert "The Pareto front of the engines for z" in out
     assert "order (declared)" in out
     (drawn,) = (tmp_path / "tradeoff").glob("*.svg")
-    assert "Exudyn generic matched" in drawn.read_text()
+    assert "Exudyn carrier matched" in drawn.read_text()
     (timings,) = (tmp_path / "tradeoff").glob("*.pyperf.json")
     assert len(pyperf.BenchmarkSuite.load(str(timings)).get_benchmarks()) >= 6
 
     code, out, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given)
     assert (code, err) == (0, "")
-    assert "use Exudyn generic matched" in out
+    assert "use Exudyn carrier matched" in out
     code, _, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given[:4], *given[-2:])
     assert code == 2
     assert f"the stored curves are of {ENGINE}; choose among these" in err
@@ -278,6 +278,8 @@ def test_what_was_found_over_a_range(measured: TradeoffStudy, capsys: pytest.Cap
     assert lines[0].strip() == "Over speed 3 to 5: error of z [m]"
     assert "it fell" in " ".join(lines)
     for point in points[:-1]:
+        if any("z" not in corner.errors for corner in point.corners or []):
+            continue  # it has no result there either
         worst = max(point.corners or [], key=lambda corner: corner.errors["z"])
         expected = f"{labels.number(worst.errors['z'])} speed = {worst.parameters['speed']:g}"
         assert any(expected in " ".join(line.split()) for line in lines)
@@ -311,7 +313,7 @@ def test_onset_to_one_percent(proofroll: Proofroll, tmp_path: Path) -> None:
         (["--quantity", "colour"], "quantity = 'colour'"),
         (["--quantity", "first_slip"], "--set mu_static="),
         (["--engine", "adams"], "engine = 'adams'"),
-        (["--engine", "exudyn[formulation=none]"], "exudyn has generic"),
+        (["--engine", "exudyn[formulation=none]"], "exudyn has carrier"),
         (["--quantity", "z", "--quantity", "colour"], "quantity = 'colour'"),
         (["--over", "speed"], "--over = 'speed'"),
         (["--over", "speed=2"], "parameter=low:high"),

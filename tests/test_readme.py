@@ -119,8 +119,11 @@ def test_a_picture_is_there(page: str, name: str) -> None:
     assert "<svg" in path.read_text(encoding="utf-8")[:2000]
 
 
+MARKS = {"agrees": "✓", "converges": "≈", "differs": "✗", "refused": "⊘"}
+
+
 def test_the_picture_of_the_report_is_that_of_the_table() -> None:
-    """The picture shows the rows of the paper's comparison with the verdicts of the table, in 300 kB at most."""
+    """The picture has the rows of the paper with verdicts that the table has for them, in 300 kB at most."""
     text = PAGE.read_text(encoding="utf-8")
     path = ROOT / "docs" / "report.png"
     assert "](docs/report.png)" in (ROOT / "README.md").read_text(encoding="utf-8")
@@ -128,7 +131,9 @@ def test_the_picture_of_the_report_is_that_of_the_table() -> None:
     shown = json.loads(Image.open(path).text["verdicts"])
     assert [engine for engine, _ in shown] == [row.engine for row in load_comparison("paper").rows]
     table = text.partition("<!-- verdicts:begin -->\n")[2].partition("<!-- verdicts:end -->")[0].splitlines()[2:]
-    assert [verdict for _, verdict in shown] == [line.split("|")[5].split()[1] for line in table]
+    for (engine, verdict), cell in zip(shown, (line.split("|")[5] for line in table), strict=True):
+        # a report shows fewer of the runs until all are made
+        assert verdict in cell or MARKS[verdict] in cell, engine
 
 
 def verdict_lines(text: str) -> list[list[str]]:
@@ -209,7 +214,7 @@ def test_the_stamp_of_the_verdict_table_follows_what_it_is_made_from(
         ("comparisons/paper.toml", "speed = [2, 4, 6]", "speed = [2, 4, 7]"),
         ("comparisons/paper.toml", "speed = [4]", "speed = [6]"),
         ("models/sphere_in_cylinder/scene.toml", "0.517", "0.518"),
-        ("models/sphere_in_cylinder/mujoco_free.xml", "timestep", "otherstep"),
+        ("models/sphere_in_cylinder/mujoco_chart.xml", "timestep", "otherstep"),
         ("constraints.txt", "exudyn==", "exudyn==9"),
     ):
         before = now()

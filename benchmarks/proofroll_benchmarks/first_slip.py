@@ -17,8 +17,8 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.heyoka_library import TIGHTEST, require_heyoka
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.compiled import projection, rolling
-from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 Model = Literal["reduced", "rotating_frame", "euler"]

@@ -19,8 +19,8 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.compiled import rolling
-from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll_benchmarks.first_slip import UNREACHABLE, margins, require_supported, slips_at_once
 

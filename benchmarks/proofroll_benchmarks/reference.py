@@ -17,7 +17,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.heyoka_library import require_heyoka
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate

@@ -131,7 +131,7 @@ def _kinds() -> Iterator[tuple[EngineFacts, bool]]:
         levels = described.levels
         for formulation, presets in described.presets.items():
             level = levels.get(formulation)
-            contact = level in {Level.CONTACT, Level.FACETS}
+            contact = level == Level.CONTACT
             for preset, settings in presets.items():
                 if settings.get("integrator") == "taylor":
                     continue

@@ -10,7 +10,7 @@ from annotated_types import Gt
 
 from proofroll.core.engine import whole_steps
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import ROLLS, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
@@ -38,8 +38,8 @@ class SemiImplicit:
         return "1.0"
 
     @classmethod
-    def build(cls, scene: Scene, settings: Settings) -> SemiImplicit:
-        return cls(rolling_ball(scene), settings.dt)
+    def build(cls, scene: Scene, settings: Settings) -> RunOnBody:
+        return on_body(cls(rolling_ball(scene), settings.dt), scene)
 
     def __init__(self, body: RollingBall, dt: float) -> None:
         self.body, self.dt, self.t = body, dt, 0.0

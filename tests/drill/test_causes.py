@@ -6,10 +6,10 @@ import dataclasses
 from typing import Any
 
 import pytest
+from placed_balls import placed, scene_with
 
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.mechanism.diagnosis.residuals import residuals_of
 from proofroll.files.scene_file import load_scene
 from proofroll_drill.mutants import mechanism_models as models
@@ -59,7 +59,7 @@ class SilentBall(Mutant):
 
     def misread(self, scene: Scene) -> Scene:
         """A little stiffer."""
-        ball = scene.elements[0].ball  # type: ignore[attr-defined]  # it is a ball
+        ball = placed(scene).ball  # type: ignore[attr-defined]  # it is a ball
         return scene_with(scene, ball=dataclasses.replace(ball, inertia_ratio=1.01 * ball.inertia_ratio))
 
     def built(self) -> Any:

@@ -160,7 +160,7 @@ def test_everybody_is_told_the_same_cause(
 def test_every_hypothesis_says_its_grounds() -> None:
     """Each hypothesis of each kind of element has a name of its own and says what it tests and why that is proof."""
     kinds = [kind for kind in load_element_kinds() if hasattr(kind, "hypotheses")]
-    assert {kind.name for kind in kinds} >= {"ball_on_surface", "mechanism"}
+    assert {kind.name for kind in kinds} >= {"mechanism"}
     for kind in kinds:
         names = [item.id for item in kind.hypotheses()]
         assert all(len(item.grounds) > 20 for item in kind.hypotheses())

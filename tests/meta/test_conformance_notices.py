@@ -19,6 +19,7 @@ from honest import Rolling
 from liars import of_mechanism
 from lies import gravity, heavier
 from nonconforming import FAILS, Damped, Drifting, Forgetful, Heavy, OneBuffer, OneForAll, Secretly, Views
+from placed_balls import placed, scene_with
 from single_precision import Single
 from tiny import Tiny, TinySettings
 
@@ -186,6 +187,12 @@ def moved_joint(scene: Scene) -> Scene:
     return of_mechanism(scene, joints=(*others, dataclasses.replace(last, **ends)))
 
 
+def larger(scene: Scene) -> Scene:
+    """The scene with a ball whose radius is a tenth larger."""
+    ball = placed(scene).ball
+    return scene_with(scene, ball=dataclasses.replace(ball, radius=1.1 * ball.radius))
+
+
 MODELS: Mapping[str, Callable[[Scene], Scene]] = {
     "none": lambda scene: scene,
     "gravity": gravity(1.1),
@@ -193,7 +200,9 @@ MODELS: Mapping[str, Callable[[Scene], Scene]] = {
     "inertia": heavier("inertia", 1.1),
     "centre": moved_centre,
     "joint": moved_joint,
-    "radius": heavier("radius", 1.1),
+    "radius": lambda scene: scene_with(
+        scene, ball=dataclasses.replace(ball := placed(scene).ball, radius=1.1 * ball.radius)
+    ),
 }
 
 

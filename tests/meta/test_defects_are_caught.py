@@ -19,10 +19,10 @@ from proofroll.studies.comparison.outcome import Outcome, Run
 OPEN = {
     "open_inertia": "inertia",
     "open_gravity": "gravity",
-    "open_radius": "ball radius",
+    "open_radius": "position",
     "open_mass": "mass",
     "open_resistance": "rolling resistance",
-    "open_friction": "F2",
+    "open_friction": "forces of contact",
 }
 # Defect that no number tells, but the first steps do -> the quantity that the certificate must name.
 FIRST = {"hidden_inertia": "acceleration of the first steps", "hidden_resistance": "acceleration of the first steps"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal
 
 from tiny import Tiny, TinySettings
 
@@ -13,6 +13,7 @@ from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunOnBody
 from proofroll.elements.ball_on_surface.model import ROLLS
 
 DISTRIBUTION = "aged"
@@ -58,7 +59,7 @@ class Aged(Tiny):
         return {"iterations": 100 if age() >= (2,) else 50, "gravity": -9.81}
 
     @classmethod
-    def build(cls, scene: Scene, settings: Any) -> Self:
+    def build(cls, scene: Scene, settings: Any) -> RunOnBody:
         """See :class:`proofroll.core.engine.Engine`; refuses walls before version 2."""
         if settings.formulation == "walls" and age() < (2,):
             raise Refused("walls came with version 2")

@@ -10,21 +10,22 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
+from placed_balls import gravity_of, placed, scene_with
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.projection import Projection
 
 
 def _ball(**factors: float) -> Callable[[Scene], Scene]:
     def change(scene: Scene) -> Scene:
-        ball = scene.elements[0].ball
+        ball = placed(scene).ball
         values = {name: getattr(ball, name) * factor for name, factor in factors.items()}
         return scene_with(scene, ball=dataclasses.replace(ball, **values))
 
@@ -32,13 +33,11 @@ def _ball(**factors: float) -> Callable[[Scene], Scene]:
 
 
 def _gravity(scene: Scene) -> Scene:
-    return scene_with(
-        scene, gravity=Gravity(scene.elements[0].gravity.magnitude * 1.001, scene.elements[0].gravity.direction)
-    )
+    return scene_with(scene, gravity=Gravity(gravity_of(scene).magnitude * 1.001, gravity_of(scene).direction))
 
 
 def _resistance(scene: Scene) -> Scene:
-    contact = dataclasses.replace(scene.elements[0].contact, rolling_resistance=0.0)
+    contact = dataclasses.replace(placed(scene).contact, rolling_resistance=0.0)
     return scene_with(scene, contact=contact)
 
 
@@ -97,16 +96,16 @@ class Broken:
         return "1"
 
     @classmethod
-    def build(cls, scene: Scene, settings: BrokenSettings) -> Self:
+    def build(cls, scene: Scene, settings: BrokenSettings) -> RunOnBody:
         """See :class:`proofroll.core.engine.Engine`."""
-        return cls(scene, settings)
+        return on_body(cls(scene, settings), scene)
 
     def __init__(self, scene: Scene, settings: BrokenSettings) -> None:
         kind, self.defect = settings.formulation.split("_")
         self.hidden = kind == "hidden"
         inner = Projection.settings(formulation="rotating_frame", rtol=settings.rtol)
-        self.wrong = Projection.build(BUILT[self.defect](scene), inner)
-        self.right = Projection.build(scene, inner)
+        self.wrong = Projection.build(BUILT[self.defect](scene), inner).own
+        self.right = Projection.build(scene, inner).own
         self.t = 0.0
 
     def advance(self, t: float) -> None:

@@ -10,19 +10,20 @@ import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
 from proofroll.core import certificate
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface import certificate as ball_certificate
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.model import ROLLS
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
+from proofroll.elements.mechanism.run import certificate as body_certificate
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
 _LEAKED: list[int] = []  # descriptors that an engine keeps
 
@@ -50,7 +51,7 @@ class Oracle:
     """Well-behaved engine that answers with the closed form."""
 
     name: ClassVar[str] = "oracle"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = {"only": frozenset({BallCapability.ROLLING})}
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"only": ROLLS - {MechanismCapability.TURNING_FRICTION}}
     settings: ClassVar[type[HostileSettings]] = HostileSettings
     presets: ClassVar[Mapping[str, Mapping[str, HostileSettings]]] = {"only": {"matched": HostileSettings()}}
 
@@ -60,9 +61,9 @@ class Oracle:
         return "1"
 
     @classmethod
-    def build(cls, scene: Scene, settings: HostileSettings) -> Self:  # noqa: ARG003 -- the protocol's signature
+    def build(cls, scene: Scene, settings: HostileSettings) -> RunOnBody:  # noqa: ARG003 -- the protocol's signature
         """See :class:`proofroll.core.engine.Engine`."""
-        return cls(scene)
+        return on_body(cls(scene), scene)
 
     def __init__(self, scene: Scene) -> None:
         self.body = rolling_ball(scene)
@@ -227,7 +228,7 @@ class Refuses(Oracle):
     name = "refuses"
 
     @classmethod
-    def build(cls, scene: Scene, settings: Any) -> Self:  # noqa: ARG003 -- the protocol's signature
+    def build(cls, scene: Scene, settings: Any) -> RunOnBody:  # noqa: ARG003 -- the protocol's signature
         """See :class:`proofroll.core.engine.Engine`."""
         raise Refused("no wheel, no ball")
 
@@ -251,7 +252,7 @@ class BlamesFile(Oracle):
     name = "blames_file"
 
     @classmethod
-    def build(cls, scene: Scene, settings: Any) -> Self:  # noqa: ARG003 -- the protocol's signature
+    def build(cls, scene: Scene, settings: Any) -> RunOnBody:  # noqa: ARG003 -- the protocol's signature
         """See :class:`proofroll.core.engine.Engine`."""
         try:
             raise OSError(24, "Too many open files")
@@ -309,7 +310,7 @@ class SignsForTheBall(Oracle):
     name = "signs_for_the_ball"
 
     def __init__(self, scene: Scene) -> None:
-        ball_certificate.certify = lambda *_: []  # type: ignore[assignment]  # that is the fault
+        body_certificate.certify = lambda *_: []  # type: ignore[assignment]  # that is the fault
         super().__init__(scene)
 
 

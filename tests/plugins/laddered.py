@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal
 
 from tiny import Tiny, TinySettings
 
@@ -12,7 +12,9 @@ from proofroll.core.engine import whole_steps
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability
+from proofroll.elements.ball_on_surface.as_body import RunOnBody
+from proofroll.elements.ball_on_surface.model import ROLLS
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
 # Time at which the wind starts [s].
 _CALM = 0.01
@@ -45,10 +47,10 @@ class Laddered(Tiny):
         Term("gale", ("heavier",), {"wind": "gale"}, {"wind": "none"}, "blows", rung=True),
         Term("storm", ("heavier",), {"wind": "storm"}, {"wind": "none"}, "blows it over", rung=True),
     )
-    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {"heavier": {BallCapability.ORIENTATION: "so it is"}}
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {"heavier": {MechanismCapability.ORIENTATION: "so it is"}}
 
     @classmethod
-    def build(cls, scene: Scene, settings: Any) -> Self:
+    def build(cls, scene: Scene, settings: Any) -> RunOnBody:
         """See :class:`proofroll.core.engine.Engine`; refuses a storm."""
         if settings.wind == "storm":
             raise Refused("no ball rolls in a storm")

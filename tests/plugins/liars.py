@@ -36,8 +36,9 @@ def _driven() -> Scene:
 def of_mechanism(scene: Scene, **parts: Any) -> Scene:
     """The scene with parts of its mechanism replaced."""
     (element,) = scene.elements
-    mechanism = dataclasses.replace(element.mechanism, **parts)  # type: ignore[attr-defined]  # it has one
-    return dataclasses.replace(scene, elements=(MechanismElement(mechanism),))
+    assert isinstance(element, MechanismElement)
+    mechanism = dataclasses.replace(element.mechanism, **parts)
+    return dataclasses.replace(scene, elements=(dataclasses.replace(element, mechanism=mechanism),))
 
 
 _SCENES: Mapping[str, tuple[Callable[[], Scene], float]] = {

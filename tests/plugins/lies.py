@@ -11,37 +11,27 @@ from liars import ALL, AT_ONCE, BALLS, EVERY, MECHANISMS, Lie, Moment, of_mechan
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.events import Event
-from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
-from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
+from proofroll.elements.mechanism.run.element import the_mechanism
 
 
 def gravity(magnitude: float) -> Callable[[Scene], Scene]:
     """Change of a scene: gravity times a factor."""
 
     def model(scene: Scene) -> Scene:
-        (element,) = scene.elements
-        if isinstance(element, MechanismElement):
-            return of_mechanism(scene, gravity=magnitude * np.asarray(element.mechanism.gravity))
-        old = element.gravity  # type: ignore[attr-defined]  # a ball has it
-        return scene_with(scene, gravity=Gravity(magnitude * old.magnitude, old.direction))
+        return of_mechanism(scene, gravity=magnitude * np.asarray(the_mechanism(scene).mechanism.gravity))
 
     return model
 
 
 def heavier(part: str, factor: float) -> Callable[[Scene], Scene]:
-    """Change of a scene: a number (``mass``, ``inertia``) of the ball or of the first body times a factor."""
+    """Change of a scene: a number (``mass``, ``inertia``) of the first body times a factor."""
 
     def model(scene: Scene) -> Scene:
-        (element,) = scene.elements
-        if isinstance(element, MechanismElement):
-            first, *others = element.mechanism.bodies
-            more = dataclasses.replace(first, **{part: factor * np.asarray(getattr(first, part))})
-            return of_mechanism(scene, bodies=(more, *others))
-        ball = element.ball  # type: ignore[attr-defined]  # a ball is one
-        part_of = "inertia_ratio" if part == "inertia" else part
-        return scene_with(scene, ball=dataclasses.replace(ball, **{part_of: factor * getattr(ball, part_of)}))
+        first, *others = the_mechanism(scene).mechanism.bodies
+        more = dataclasses.replace(first, **{part: factor * np.asarray(getattr(first, part))})
+        return of_mechanism(scene, bodies=(more, *others))
 
     return model
 
@@ -92,7 +82,7 @@ def _times() -> Iterator[Lie]:
     yield Lie("every other sample repeated", ALL, _PLACES, lambda m: m.at(int(m.t / EVERY / 2 + 1e-9) * 2 * EVERY))
     yield Lie("back again from the middle on", ALL, _PLACES, lambda m: m.at(min(m.t, m.until - m.t)))
     yield Lie("right on the grid alone", ALL, _PLACES, _off_grid(lambda m: m.at(m.t - 0.002)))
-    yield Lie("two steps late and places 1 % too large", ALL, _PLACES, _late_and_larger)
+    yield Lie("two steps late and places 1 % too large", ALL, _PLACES, _late_and_larger, ("late",))
 
 
 def _places() -> Iterator[Lie]:
@@ -161,23 +151,30 @@ def _orientations() -> Iterator[Lie]:
 
 
 def _forces_of_balls() -> Iterator[Lie]:
-    yield Lie("forces x 100", BALLS, _FORCES, lambda m: {"force": 100 * m.right.force}, _FACTOR)
-    yield Lie("forces x 1.02", BALLS, _FORCES, lambda m: {"force": 1.02 * m.right.force}, _FACTOR)
-    yield Lie("forces x 100 between samples", BALLS, _FORCES, _off_grid(lambda m: {"force": 100 * m.right.force}))
-    yield Lie("forces of nothing", BALLS, _FORCES, lambda m: {"force": 0 * m.right.force}, _OMITTED)
-    yield Lie("forces on the wall", BALLS, _FORCES, lambda m: {"force": -m.right.force}, _SIGN)
-    yield Lie("forces of the start", BALLS, _FORCES, lambda m: {"force": m.at(0.0).force})
-    yield Lie("forces 3 ms late", BALLS, _FORCES, lambda m: {"force": m.at(m.t - 0.003).force}, ("late",))
-    yield Lie("forces without friction", BALLS, _FORCES, lambda m: {"force": _normal(m)}, ("friction",))
+    yield Lie("forces x 100", BALLS, _FORCES, lambda m: {"contact_force": 100 * m.right.contact_force}, _FACTOR)
+    yield Lie("forces x 1.02", BALLS, _FORCES, lambda m: {"contact_force": 1.02 * m.right.contact_force}, _FACTOR)
+    yield Lie(
+        "forces x 100 between samples",
+        BALLS,
+        _FORCES,
+        _off_grid(lambda m: {"contact_force": 100 * m.right.contact_force}),
+    )
+    yield Lie("forces of nothing", BALLS, _FORCES, lambda m: {"contact_force": 0 * m.right.contact_force}, _OMITTED)
+    yield Lie("forces on the wall", BALLS, _FORCES, lambda m: {"contact_force": -m.right.contact_force}, _SIGN)
+    yield Lie("forces of the start", BALLS, _FORCES, lambda m: {"contact_force": m.at(0.0).contact_force})
+    yield Lie(
+        "forces 3 ms late", BALLS, _FORCES, lambda m: {"contact_force": m.at(m.t - 0.003).contact_force}, ("late",)
+    )
+    yield Lie("forces without friction", BALLS, _FORCES, lambda m: {"contact_force": _normal(m)}, ("friction",))
     yield Lie(
         "forces in body axes",
         ("rolls",),
         _FORCES,
-        lambda m: {"force": m.turns.inv().apply(m.right.force)},
+        lambda m: {"contact_force": m.turns.inv().apply(m.right.contact_force)},
         ("body axes",),
     )
-    yield Lie("forces left out later", BALLS, ("this trajectory has",), lambda _: {"force": None})
-    yield Lie("no forces", BALLS, ("this trajectory has",), lambda _: {"force": None}, begins=0.0)
+    yield Lie("forces left out later", BALLS, ("this trajectory has",), lambda _: {"contact_force": None})
+    yield Lie("no forces", BALLS, ("this trajectory has",), lambda _: {"contact_force": None}, begins=0.0)
 
 
 def _reactions_of_joints() -> Iterator[Lie]:
@@ -386,7 +383,7 @@ def _small() -> Iterator[Lie]:
     yield Lie("single precision", ALL, (), _single)
     yield Lie("single precision from the start", ALL, _MODEL, _single, begins=0.0)
     yield Lie("1e-9 of its size further", ALL, (), lambda m: {"p_WB": m.right.p_WB + 1e-9 * m.length})
-    yield Lie("forces x (1 + 1e-9)", BALLS, (), lambda m: {"force": (1 + 1e-9) * m.right.force})
+    yield Lie("forces x (1 + 1e-9)", BALLS, (), lambda m: {"contact_force": (1 + 1e-9) * m.right.contact_force})
     yield Lie("1 ns late", ALL, (), lambda m: m.at(m.t - 1e-9))
 
 
@@ -559,9 +556,8 @@ def _single(m: Moment) -> dict[str, Any]:
 
 
 def _normal(m: Moment) -> Any:
-    body = m.scene.elements[0].rolling  # type: ignore[attr-defined]  # a ball rolls
-    e1 = body.surface.normal(m.right.p_WB)
-    return (m.right.force @ e1) * e1
+    e1 = rolling_ball(m.scene).surface.normal(np.reshape(m.right.p_WB, 3))
+    return (m.right.contact_force @ e1)[:, None] * e1
 
 
 def _in_body_axes(m: Moment) -> Any:
@@ -573,10 +569,6 @@ def _in_body_axes(m: Moment) -> Any:
 
 def halve_in_place(scene: Scene) -> Scene:
     """Halves gravity in the given scene object itself, though it is frozen."""
-    (element,) = scene.elements
-    if isinstance(element, MechanismElement):
-        object.__setattr__(element.mechanism, "gravity", 0.5 * np.asarray(element.mechanism.gravity))
-        return of_mechanism(scene)
-    old = element.gravity  # type: ignore[attr-defined]  # a ball has it
-    object.__setattr__(old, "magnitude", 0.5 * old.magnitude)
-    return scene_with(scene, gravity=Gravity(old.magnitude, old.direction))
+    mechanism = the_mechanism(scene).mechanism
+    object.__setattr__(mechanism, "gravity", 0.5 * np.asarray(mechanism.gravity))
+    return of_mechanism(scene)

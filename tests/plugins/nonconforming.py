@@ -6,18 +6,19 @@ import dataclasses
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
+from placed_balls import gravity_of, placed, scene_with
 from tiny import Tiny, TinySettings
 
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.as_body import RunOnBody
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
 FAILS: dict[type[Tiny], str] = {}
 
@@ -58,7 +59,7 @@ class Versionless(Breaking, breaks="version_is_told"):
 class ProvidesText(Breaking, breaks="provides_capabilities"):
     """Declares a capability that does not exist."""
 
-    provides: ClassVar[Any] = frozenset({"rolling", BallCapability.ROLLING})
+    provides: ClassVar[Any] = frozenset({"rolling", MechanismCapability.UNBOUNDED_FRICTION})
 
 
 @dataclass
@@ -130,9 +131,9 @@ class Boastful(Breaking, breaks="provides_what_it_says"):
     """Declares rolling resistance, but refuses every scene with it."""
 
     @classmethod
-    def build(cls, scene: Scene, settings: Any) -> Self:
+    def build(cls, scene: Scene, settings: Any) -> RunOnBody:
         """Refuses scenes with rolling resistance."""
-        if BallCapability.ROLLING_RESISTANCE in scene.requires:
+        if MechanismCapability.TURNING_FRICTION in scene.requires:
             raise Refused("no resistance, after all")
         return super().build(scene, settings)
 
@@ -147,9 +148,9 @@ class Silent(Breaking, breaks="builds_or_refuses"):
     """Refuses scenes without a reason."""
 
     @classmethod
-    def build(cls, scene: Scene, settings: Any) -> Self:
+    def build(cls, scene: Scene, settings: Any) -> RunOnBody:
         """Refuses scenes without resistance to rolling with an empty text."""
-        if BallCapability.ROLLING_RESISTANCE not in scene.requires:
+        if MechanismCapability.TURNING_FRICTION not in scene.requires:
             raise Refused("")
         return super().build(scene, settings)
 
@@ -158,7 +159,7 @@ class Heavy(Breaking, breaks="certificate_holds"):
     """Builds a ball of twice the inertia."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
-        ball = scene.elements[0].ball
+        ball = placed(scene).ball
         heavy = dataclasses.replace(ball, inertia_ratio=2 * ball.inertia_ratio)
         super().__init__(scene_with(scene, ball=heavy), settings)
 
@@ -167,7 +168,7 @@ class Doubled(Heavy, breaks="certificate_holds"):
     """Builds a ball of twice the mass, and declares the mass as regularised."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
-        ball = scene.elements[0].ball
+        ball = placed(scene).ball
         Tiny.__init__(self, scene_with(scene, ball=dataclasses.replace(ball, mass=2 * ball.mass)), settings)
 
     def built(self) -> BallBuilt:
@@ -179,7 +180,7 @@ class Pulled(Breaking, breaks="certificate_holds"):
     """Builds 1.5 times the gravity, and declares gravity as regularised."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
-        gravity = dataclasses.replace(scene.elements[0].gravity, magnitude=1.5 * scene.elements[0].gravity.magnitude)
+        gravity = dataclasses.replace(gravity_of(scene), magnitude=1.5 * gravity_of(scene).magnitude)
         super().__init__(scene_with(scene, gravity=gravity), settings)
 
     def built(self) -> BallBuilt:
@@ -268,17 +269,17 @@ class Turning(Breaking, breaks="builds_only_what_is_required"):
     def built(self) -> BallBuilt:
         """Certificate data with the orientation among the terms."""
         right = super().built()
-        return dataclasses.replace(right, terms=(right.terms or frozenset()) | {BallCapability.ORIENTATION})
+        return dataclasses.replace(right, terms=(right.terms or frozenset()) | {MechanismCapability.ORIENTATION})
 
     def _told(self, right: BallSample) -> BallSample:
         return dataclasses.replace(right, q_WB=np.array([1.0, 0, 0, 0]))
 
 
 class Row(Breaking, breaks="samples_are_well_formed"):
-    """Reports positions of shape (1, 3)."""
+    """Reports positions of shape (3, 1)."""
 
     def _told(self, right: BallSample) -> BallSample:
-        return BallSample(right.p_WB[None], right.v_WB, right.w_WB)
+        return BallSample(right.p_WB[:, None], right.v_WB, right.w_WB)
 
 
 class Stretched(Breaking, breaks="samples_are_well_formed"):

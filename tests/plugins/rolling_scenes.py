@@ -8,7 +8,7 @@ from rolling_rows import RollingContact
 
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.elements.ball_on_surface.as_body import ball_of
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
@@ -29,18 +29,19 @@ def rolling_scene(scene: Scene) -> tuple[Mechanism, tuple[RollingContact, ...]]:
     contacts = []
     gravity = None
     for element in scene.elements:
-        if isinstance(element, MechanismElement):
+        ball = ball_of(element)
+        if ball is not None:
+            contacts.append(_contact(ball))
+            body, joint = _free(ball)
+            bodies.append(body)
+            joints.append(joint)
+            gravity = _vector(ball.gravity)
+        elif isinstance(element, MechanismElement):
             bodies += element.mechanism.bodies
             joints += element.mechanism.joints
             for name in others:
                 others[name] += getattr(element.mechanism, name)
             gravity = element.mechanism.gravity
-        elif isinstance(element, BallOnSurface):
-            contacts.append(_contact(element.rolling))
-            body, joint = _free(element.rolling)
-            bodies.append(body)
-            joints.append(joint)
-            gravity = _vector(element.rolling.gravity)
         else:
             raise Refused(f"{element.name} ({type(element).__name__}) has no rows in maximal coordinates")
     assert gravity is not None  # a scene has an element

@@ -5,19 +5,21 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Gt
+from placed_balls import placed
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
-from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability
+from proofroll.elements.ball_on_surface.model import ROLLS
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
 
 @dataclass(frozen=True)
@@ -53,14 +55,14 @@ class Tiny:
         return "1.0"
 
     @classmethod
-    def build(cls, scene: Scene, settings: Any) -> Self:
+    def build(cls, scene: Scene, settings: Any) -> RunOnBody:
         """See :class:`proofroll.core.engine.Engine`."""
-        return cls(scene, settings)
+        return on_body(cls(scene, settings), scene)
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         self.body, self.dt, self.t = rolling_ball(scene), settings.dt, 0.0
         self.resists = self.body.contact.rolling_resistance > 0
-        self.x = np.array([*self.body.u0, *self.body.udot0, scene.elements[0].start.spin])
+        self.x = np.array([*self.body.u0, *self.body.udot0, placed(scene).start.spin])
 
     def rates(self, x: FloatArray) -> FloatArray:
         """Rates ẋ of the state x = (u, u̇, ω1)."""
@@ -89,7 +91,7 @@ class Tiny:
             ball_radius=ball.radius,
             rolling_resistance=self.body.contact.rolling_resistance,
             acceleration=initial_response(self.body)[0],
-            terms=frozenset({BallCapability.ROLLING_RESISTANCE} if self.resists else ()),
+            terms=frozenset({MechanismCapability.TURNING_FRICTION} if self.resists else ()),
         )
 
 

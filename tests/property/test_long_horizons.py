@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from proofroll.core import heyoka_library as library
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.compiled import rolling
-from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.elements.mechanism.run.contacts.on_wall import energy
 from proofroll.files.scene_file import load_scene

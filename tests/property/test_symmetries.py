@@ -12,11 +12,11 @@ import xarray as xr
 from ball_scenes import rolled
 from hypothesis import given
 from hypothesis import strategies as st
+from placed_balls import of_ball, placed, run_of, scene_with
 
 from proofroll.core.certificate import certify, first_difference
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.dataset import columns
-from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.mechanism.run.contacts.audits import energy_balance
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
@@ -43,7 +43,7 @@ def solve(way: str, scene: Scene, until: float, samples: int = 3) -> xr.Dataset:
         body = rolling_ball(scene)
         motion = rolled(body, np.linspace(0, until, samples))
         parts = motion.p_WB, motion.v_WB, motion.w_WB
-        return columns(body, np.linspace(0, until, samples), *parts, force=motion.force).dataset()
+        return run_of(scene, np.linspace(0, until, samples), *parts, force=motion.force)
     return simulate(scene, way, until=until, every=until / (samples - 1))
 
 
@@ -55,7 +55,7 @@ def way(request: pytest.FixtureRequest) -> Any:
 
 def moved(scene: Scene, coordinates: tuple[float, float]) -> Scene:
     """The same scene with the ball starting somewhere else on the surface."""
-    start = dataclasses.replace(scene.elements[0].start, coordinates=coordinates)
+    start = dataclasses.replace(placed(scene).start, coordinates=coordinates)
     return scene_with(scene, start=start)
 
 
@@ -120,7 +120,7 @@ def test_one_run_in_two(way: str, motion: dict[str, float]) -> None:
     whole = solve(way, scene, 2 * UNTIL)
     middle = {name: float(whole[name][1]) for name in SIZES}
     start = dataclasses.replace(
-        scene.elements[0].start,
+        placed(scene).start,
         coordinates=(middle["gamma"], middle["z"]),
         velocity=(0.2 * middle["gamma_rate"], middle["z_rate"]),
         spin=middle["omega1"],
@@ -136,7 +136,7 @@ def test_reversal(way: str, motion: dict[str, float]) -> None:
     there = solve(way, scene, UNTIL)
     end = {name: float(there[name][-1]) for name in SIZES}
     start = dataclasses.replace(
-        scene.elements[0].start,
+        placed(scene).start,
         coordinates=(end["gamma"], end["z"]),
         velocity=(-0.2 * end["gamma_rate"], -end["z_rate"]),
         spin=-end["omega1"],
@@ -154,7 +154,7 @@ def test_energy_is_accounted_for(way: str, motion: dict[str, float]) -> None:
     kinetic = float(dataset["energy"][0])
     # a spline of degree 7 through 31 samples integrates the power to about 1e-9 of the work
     bound = 1e-9 if motion["rolling_resistance"] else 1e-11
-    assert np.max(np.abs(energy_balance(rolling_ball(scene), dataset))) < bound * kinetic
+    assert np.max(np.abs(energy_balance(rolling_ball(scene), of_ball(dataset)))) < bound * kinetic
 
 
 @given(motion=MOTIONS, radius=st.floats(0.005, 0.2), mass=st.floats(1e-3, 1e3), gravity=st.floats(0, 50))

@@ -60,5 +60,5 @@ def test_a_turned_mechanism_has_the_same_certificate(name: str, engine: str, for
         try:
             answers.append(first_difference(certify(build(case, engine, formulation=formulation), case)))
         except (Refused, Diverged) as refusal:  # a law of contact may have no answer at the start
-            answers.append(str(refusal))
+            answers.append(str(refusal).partition("; choose")[0])  # who could build it instead
     assert answers[1:] == answers[:1] * 2

@@ -32,14 +32,13 @@ OURS = "integrated by proofroll"
 @pytest.mark.parametrize(
     ("engine", "words"),
     [
-        ("pinocchio[formulation=free_flyer,preset=default]", OURS),
-        ("pinocchio[formulation=contact,preset=matched]", OURS),
-        ("exudyn[formulation=generic,preset=default]", "adaptive step"),
-        ("exudyn[formulation=generic,preset=matched]", ""),
-        ("exudyn[formulation=contact,preset=default]", ""),
+        ("pinocchio[formulation=composite,preset=default]", OURS),
+        ("pinocchio[formulation=impulses,preset=matched]", "integrated by proofroll around its contact solver"),
+        ("exudyn[formulation=carrier,preset=default]", "adaptive step"),
+        ("exudyn[formulation=carrier,preset=matched]", ""),
         ("exudyn[formulation=spheres,preset=matched]", "proofroll's own contact forces at the start"),
         ("exudyn[formulation=spheres,preset=default]", "own contact forces at the start"),
-        ("mujoco[formulation=free,preset=default]", ""),
+        ("mujoco[formulation=chart,preset=default]", ""),
     ],
 )
 def test_an_engine_says_what_is_not_its_own(engine: str, words: str) -> None:

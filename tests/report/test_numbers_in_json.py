@@ -57,7 +57,7 @@ def _numbers(text: str) -> list[str]:
 
 
 def _sizes(content: dict[str, Any]) -> NDArray[np.float64]:
-    """Sizes of all numbers in report.json: those in its sentences, errors relative to their scale, steps a period."""
+    """Sizes of all numbers in report.json: those in its sentences, errors in parts of scales, steps a period, ±."""
     table = content["table"]
     rows = [dict(zip(table["columns"], row, strict=True)) for row in table["data"]]
     values = [row[name] / row["scale"] for row in rows for name in ("error", "tolerance") if row["scale"] and row[name]]
@@ -68,6 +68,8 @@ def _values(value: Any) -> Iterator[float]:
     if isinstance(value, dict):
         if value.get("period") and value.get("largest_accurate"):  # as a stability map has them
             yield value["period"] / value["largest_accurate"]
+        if value.get("order_high") is not None and value.get("order_low") is not None:
+            yield (value["order_high"] - value["order_low"]) / 2
         value = list(value.values())
     if isinstance(value, list):
         for item in value:

@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import StoredTrajectory
@@ -39,7 +39,7 @@ SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02
 
 def sampled(dataset: Any) -> dict[str, Any]:
     """A dataset as the replay reads it from its file."""
-    return {str(name): variable.to_numpy() for name, variable in dataset.variables.items()}
+    return {str(name): variable.to_numpy() for name, variable in dataset.isel(body=0).variables.items()}
 
 
 def times_of(data: Any) -> Any:
@@ -132,10 +132,11 @@ def test_the_contact_changes_at_the_events_and_not_at_the_samples(rolling: Any) 
         "event_kind": np.array([b"slip", b"stick", b"lift_off", b"slip"]),
         "event_time": np.array([0.205, 0.211, 0.9, np.nan]),
     }
+    body = dataclasses.replace(body, contact=dataclasses.replace(body.contact, mu_static=0.3, mu_kinetic=0.3))
     found = poses(body, {**data, **events}, np.array([0.0, 0.204, 0.206, 0.212, 0.899, 0.901])).state
     assert found is not None
     assert found.tolist() == [STICKS, STICKS, SLIPS, STICKS, STICKS, AWAY]
-    assert poses(body, data, data["time"]).state is None
+    assert poses(rolling[0], data, data["time"]).state is None
 
 
 @pytest.mark.parametrize(("rate", "until"), [(0.0, 1.0), (160.0, 2.0), (240.0, 4.0), (1e4, 1.0)])
@@ -152,7 +153,7 @@ def test_a_run_that_ends_early_is_shown_until_then(rolling: Any) -> None:
     body, data = rolling
     times = times_of(data)
     for count in (1, 2, 30):
-        found = poses(body, {name: values[:count] for name, values in data.items()}, times)
+        found = poses(body, {name: values[:count] for name, values in data.items() if np.ndim(values)}, times)
         assert found.time[-1] <= data["time"][count - 1] + 1e-12
         assert len(found.p_WB) == found.time.size >= 1
 

@@ -18,10 +18,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
-from proofroll.elements.mechanism.run.element import MechanismElement
 
 GROUP = "proofroll.bare_loops"
 
@@ -57,11 +56,6 @@ def bare_loop(engine: str) -> EntryPoint:
         if point.name == engine:
             return point
     raise Refused(f"no bare loop is announced for {engine} (entry-point group {GROUP})")
-
-
-def is_mechanism(scene: Scene) -> bool:
-    """True for a scene of bodies and joints."""
-    return isinstance(scene.elements[0], MechanismElement)
 
 
 def in_vertical_cylinder(scene: Scene) -> RollingBall:

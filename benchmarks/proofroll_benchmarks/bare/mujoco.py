@@ -14,29 +14,24 @@ import mujoco
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.mujoco import Mujoco
 from proofroll.engines.mujoco.reproducer import stepped
-from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 
 _FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
-    """See :mod:`proofroll_benchmarks.bare`; all formulations without edits of the contact's reference acceleration."""
-    if is_mechanism(scene):
+    """See :mod:`proofroll_benchmarks.bare`."""
+    if settings.formulation != "chart":
         return Bare(_mechanism(scene, settings), 1e-12, "the same steps; sums are in another order")
     body = in_vertical_cylinder(scene)
-    if settings.curvature:
-        raise Refused("there is no bare loop with edits of the contact's reference acceleration")
     model, data = Mujoco.build(scene, settings).native
-    loop = {"chart": _chart, "free": _free, "facets": _facets}[settings.formulation]
-    run = loop(model, data, body, settings)
-    if settings.formulation == "facets":
-        return Bare(run, 1e-5, "the geometry is rounded otherwise, and each kick of an edge magnifies that")
+    run = _chart(model, data, body, settings)
     return Bare(run, 1e-9, "the geometry is rounded otherwise, which a stiff contact magnifies")
 
 
@@ -115,34 +110,6 @@ def _chart(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[
     return run
 
 
-def _free(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
-    ball, wall = model.body("ball").id, model.geom("wall").id
-    b, f = body.surface.length_scales[0] + body.ball.radius, body.contact.rolling_resistance
-    qpos, qvel, reaction = data.qpos, data.qvel, data.qfrc_constraint
-    plane, quaternion, facing, last = data.mocap_pos[0], data.mocap_quat[0], np.zeros(3), data.geom_xmat[wall]
-    resistance = _Resistance(f, data.xfrc_applied[ball, 3:])
-
-    def run(times: FloatArray) -> FloatArray:
-        if f:
-            resistance.start(data.userdata)
-        for steps in _counted(times, settings.dt):
-            for _ in range(steps):
-                x, y, z = qpos[:3].tolist()
-                r = math.sqrt(x * x + y * y)
-                ex, ey = x / r, y / r
-                plane[0], plane[1], plane[2] = b * ex, b * ey, z
-                facing[0], facing[1] = -ex, -ey
-                mujoco.mju_quatZ2Vec(quaternion, facing)
-                if f:
-                    N = float(reaction[:3].dot(last[2::3]))  # along the plane of the step before
-                    resistance.apply(data.time, N, (ex, ey), qvel[:3].tolist())
-                mujoco.mj_step(model, data)
-            _check(data)
-        return np.array(qpos[:3])
-
-    return run
-
-
 def _mechanism(scene: Scene, settings: Any) -> Callable[[FloatArray], FloatArray]:
     """``mj_step`` from sample to sample, without the sensors that only a sample asks for."""
     model, data = Mujoco.build(scene, settings).native
@@ -154,29 +121,5 @@ def _mechanism(scene: Scene, settings: Any) -> Callable[[FloatArray], FloatArray
             pass
         mujoco.mj_forward(model, data)
         return np.array(data.xpos[bodies])
-
-    return run
-
-
-def _facets(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
-    ball, f = model.body("ball").id, body.contact.rolling_resistance
-    qpos, qvel, reaction, torque = data.qpos, data.qvel, data.qfrc_constraint, data.xfrc_applied[ball, 3:]
-
-    def run(times: FloatArray) -> FloatArray:
-        for steps in _counted(times, settings.dt):
-            if not f:
-                mujoco.mj_step(model, data, nstep=steps)
-            else:
-                for _ in range(steps):
-                    x, y = qpos[:2].tolist()
-                    r = math.sqrt(x * x + y * y)
-                    ex, ey = x / r, y / r
-                    vx, vy, vz = qvel[:3].tolist()
-                    Nx, Ny = reaction[:2].tolist()
-                    scale = f * (Nx * ex + Ny * ey) / (math.sqrt(vx * vx + vy * vy + vz * vz) or 1.0)
-                    torque[0], torque[1], torque[2] = -scale * vz * ey, scale * vz * ex, scale * (vx * ey - vy * ex)
-                    mujoco.mj_step(model, data)
-            _check(data)
-        return np.array(qpos[:3])
 
     return run

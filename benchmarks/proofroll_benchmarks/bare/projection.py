@@ -21,13 +21,13 @@ from proofroll.engines.projection.ball.geometry import Uniform
 from proofroll.engines.projection.ball.method import ProjectedBall, start_and_scales
 from proofroll.engines.projection.ball.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates
-from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 from proofroll_benchmarks.bare.steps import dop853, rk4
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
     """See :mod:`proofroll_benchmarks.bare`."""
-    if is_mechanism(scene):
+    if settings.formulation not in {"euler", "rotating_frame"}:
         return _bodies(scene, settings)
     return Bare(_ball(in_vertical_cylinder(scene), settings), 1e-9, "angles are not brought back within a turn")
 

@@ -8,7 +8,7 @@ from unittest import SkipTest
 import numpy as np
 
 from proofroll.conformance.subject import Subject, UnlikeSceneError, bits, lacking_capabilities, require, scenes
-from proofroll.core.arrays import in_single_precision
+from proofroll.core.arrays import FloatArray, in_single_precision
 from proofroll.core.certificate import EXACT, ROUNDINGS, SAY_SINGLE, certify, first_difference
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import HasOptionalCapabilities
@@ -126,9 +126,13 @@ def samples_are_well_formed(subject: Subject) -> None:
             f"after a step all numbers of {name} have single precision (float32), though the settings say double or "
             f"nothing: {SAY_SINGLE}",
         )
-    for name in element.sample_type.widths:
-        lost = getattr(at_start, name) is not None and getattr(moved, name) is None
+    for name in (item.name for item in dataclasses.fields(at_start)):
+        lost = _is_there(getattr(at_start, name)) and not _is_there(getattr(moved, name))
         require(not lost, f"{name} is there at time 0, and not later; only time 0 may lack one")
+
+
+def _is_there(value: FloatArray | None) -> bool:
+    return value is not None and bool(np.all(np.isfinite(value)))
 
 
 def _well_formed(sample: Sample, element: Element, when: str) -> None:

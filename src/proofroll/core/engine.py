@@ -123,7 +123,6 @@ class Scheme(StrEnum):
     """Common integration rules with fixed steps, for the field ``scheme`` of settings; another rule may be any text."""
 
     SEMI_IMPLICIT_EULER = "semi-implicit Euler"
-    LEAPFROG = "leapfrog"
     RK4 = "classical Runge-Kutta"
 
 

@@ -43,7 +43,6 @@ class Level(StrEnum):
     PROJECTION = "projection DAE"
     CONSTRAINT = "engine constraint"
     CONTACT = "engine contact"
-    FACETS = "faceted wall"
 
 
 def by_hand(level: str | None) -> bool:

@@ -42,7 +42,7 @@ class SceneFile:
         dt: step that is short enough for engines with a fixed one [s]; recommended if a run with a longer one fails,
             and used by a first look.
         every: sampling interval [s] of a first look, where the usual one does not fit the step; None: the usual one.
-        files: models beside it in the formats of engines, e.g. ``mujoco_free.xml``, with the meshes that these read.
+        files: models beside it in the formats of engines, e.g. ``mujoco_chart.xml``, with the meshes that these read.
         tables: all others, which kinds of elements read.
     """
 

@@ -141,7 +141,7 @@ class MechanismTruth:
         Raises:
             InputError: ``parameter`` is not ``mu_static``, or the element is no ball in an upright cylinder.
         """
-        from proofroll.elements.ball_on_surface.of_body import ball_of
+        from proofroll.elements.ball_on_surface.as_body import ball_of
         from proofroll.truth.ball_on_surface.onset import edge_between
 
         ball = ball_of(element)
@@ -153,7 +153,7 @@ class MechanismTruth:
 
 def _with_onset(element: MechanismElement, dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with the conditioning of the first slip of a ball in an upright cylinder."""
-    from proofroll.elements.ball_on_surface.of_body import ball_of
+    from proofroll.elements.ball_on_surface.as_body import ball_of
     from proofroll.truth.ball_on_surface.onset import onset
 
     ball = ball_of(element)

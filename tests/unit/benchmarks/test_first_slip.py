@@ -12,7 +12,7 @@ from proofroll.core import heyoka_library as library
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Missing, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface.friction_curve import friction_curve
 from proofroll.truth.ball_on_surface.onset import first_slip as true_first_slip

@@ -66,19 +66,17 @@ def mixed(tmp_path: Path) -> Path:
 def test_a_scene_of_two_kinds_is_compared(
     tmp_path: Path, mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each formulation that is for one of the elements has a row, the other element in one that is for that."""
+    """Each formulation that is for both elements has a row."""
     monkeypatch.setattr(
         "proofroll.studies.comparison.default_comparison.engine_names", lambda: ["projection", "reduced"]
     )
     code, out, err = command_line("compare", str(mixed), "--out", str(tmp_path / "out"), "--json")
     assert code == 0, err
     found = {row["engine"]: row["verdict"] for row in json.loads(out)["rows"]}
-    assert found == {
-        f"projection[formulation={name}]": "agrees" for name in ("euler", "rotating_frame", "dependent")
-    }  # of a mechanism `reduced` has no equations
+    assert found == {"projection[formulation=dependent]": "agrees"}  # of a mechanism `reduced` has no equations
     monkeypatch.chdir(tmp_path)
     assert command_line("new", "comparison", "look", "--scene", str(mixed))[0] == 0
-    assert [row.engine for row in load_comparison("look.toml").rows] == ["projection[formulation=euler]"]
+    assert [row.engine for row in load_comparison("look.toml").rows] == ["projection[formulation=dependent]"]
 
 
 def test_why_nobody_can_is_said_engine_by_engine(
@@ -89,12 +87,16 @@ def test_why_nobody_can_is_said_engine_by_engine(
     code, _, err = command_line("compare", str(mixed))
     assert code == 2
     assert "no adapter that is installed here represents revolute joints" in err
-    provided = {"jointed": {"rods": ["revolute joints"]}, "rolling": {"ball": ["rolling without slip"]}}
+    provided = {
+        "jointed": {"rods": ["revolute joints"]},
+        "rolling": {"ball": ["contact between bodies", "contacts that never slip (friction = inf)"]},
+    }
     engines = [SimpleNamespace(name=name, provides=provides, made_for={}) for name, provides in provided.items()]
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison._installed", lambda *_: engines)
     code, _, err = command_line("compare", str(mixed))
     assert code == 2
-    said = "jointed has no formulation for ball (rolling without slip); rolling has no formulation for mechanism"
+    said = "jointed has no formulation for ball (contact between bodies, contacts that never slip (friction = inf)); "
+    said += "rolling has no formulation for mechanism"
     assert f"can represent all of the scene: {said} (revolute joints)" in err
 
 

@@ -28,8 +28,8 @@ def test_a_mechanism_with_other_numbers(proofroll: Proofroll, tmp_path: Path) ->
     ("words", "code", "said"),
     [
         (("pendulum", "{file}", "--engine", "projection"), 3, "projection: it writes no file"),
-        (("pendulum", "{file}", "--engine", "mujoco[formulation=free]"), 3, "needs revolute joints"),
-        (("turntable", "{file}", "--engine", "mujoco[formulation=chart]"), 3, "needs contact between bodies"),
+        (("pendulum", "{file}", "--engine", "mujoco[formulation=chart]"), 3, "needs revolute joints"),
+        (("turntable", "{file}", "--engine", "mujoco[formulation=joints]"), 3, "needs contact between bodies"),
         (("pendulum", "{file}", "--engine", "mujoco", "--set", "lenght=1"), 2, "length"),
         (("no_such_scene", "{file}", "--engine", "mujoco"), 2, "no_such_scene"),
         (("pendulum", "{file}/in/a/file", "--engine", "mujoco"), 2, "long.xml"),

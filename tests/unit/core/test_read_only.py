@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +15,8 @@ from proofroll.core.arrays import read_only
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, rolling_ball
+from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
@@ -78,11 +79,12 @@ class Bending(Tiny):
     """Halves gravity in the scene that it is given, whatever stands in the way, and says that this is the scene."""
 
     @classmethod
-    def build(cls, scene: Scene, settings: Any) -> Self:
+    def build(cls, scene: Scene, settings: Any) -> RunOnBody:
         """Not the scene."""
-        gravity = rolling_ball(scene).gravity
-        gravity.flags.writeable = True
-        gravity *= 0.5
+        on_wall = the_mechanism(scene).on_wall
+        assert on_wall is not None
+        on_wall.gravity.flags.writeable = True
+        on_wall.gravity[:] *= 0.5
         return super().build(scene, settings)
 
 

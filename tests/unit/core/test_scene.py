@@ -9,13 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from placed_balls import placed, scene_with
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
+from proofroll.elements.ball_on_surface.model import ROLLS
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.on_wall import slip_velocity
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 from proofroll.files.data_folders import data_folder
@@ -50,7 +52,7 @@ def test_start_has_no_slip_and_the_given_spin(scene: Scene) -> None:
     body = rolling_ball(scene)
     e1 = body.surface.normal(body.p0)
     assert slip_velocity(body.ball.radius, e1, body.v0, body.w0) == pytest.approx(0.0, abs=1e-14)
-    assert body.w0 @ e1 == pytest.approx(scene.elements[0].start.spin, abs=1e-13)
+    assert body.w0 @ e1 == pytest.approx(placed(scene).start.spin, abs=1e-13)
     assert body.surface.gap(body.p0) == pytest.approx(0.0, abs=1e-16)
 
 
@@ -70,13 +72,17 @@ def test_gravity_direction_has_any_length() -> None:
 @pytest.mark.parametrize(
     ("scene_name", "parameters", "needs"),
     [
-        ("sphere_in_cylinder", {}, {BallCapability.ROLLING}),
-        ("sphere_in_cylinder", {"mu_static": math.inf}, {BallCapability.ROLLING}),
-        ("sphere_in_cylinder", {"rolling_resistance": 1e-9}, {*BallCapability} - {BallCapability.ORIENTATION}),
+        ("sphere_in_cylinder", {}, ROLLS - {MechanismCapability.TURNING_FRICTION}),
+        ("sphere_in_cylinder", {"mu_static": math.inf}, ROLLS - {MechanismCapability.TURNING_FRICTION}),
+        (
+            "sphere_in_cylinder",
+            {"rolling_resistance": 1e-9},
+            ROLLS,
+        ),
     ],
 )
 def test_requires_no_more_than_the_scene_needs(
-    scene_name: str, parameters: dict[str, float], needs: set[BallCapability]
+    scene_name: str, parameters: dict[str, float], needs: frozenset[str]
 ) -> None:
     """A scene requires exactly what its numbers make necessary."""
     assert load_scene(scene_name, **parameters).requires == needs
@@ -113,7 +119,7 @@ def test_two_balls_are_refused_by_name() -> None:
     """What represents one ball on one surface refuses a scene of two, and names what the scene holds."""
     scene = load_scene("sphere_in_cylinder")
     (one,) = scene.elements
-    other = dataclasses.replace(one, ball=dataclasses.replace(one.ball, name="other"))
+    (other,) = scene_with(scene, ball=dataclasses.replace(placed(scene).ball, name="other")).elements
     with pytest.raises(Refused, match=rf"one ball in an upright cylinder.*{one.name}, other"):
         rolling_ball(dataclasses.replace(scene, elements=(one, other)))
 
@@ -124,7 +130,7 @@ def test_elements_have_names_of_their_own() -> None:
     with pytest.raises(InputError, match="two elements have this name"):
         dataclasses.replace(scene, elements=scene.elements * 2)
     (one,) = scene.elements
-    dotted = dataclasses.replace(one, ball=dataclasses.replace(one.ball, name=f"my.{one.name}"))
+    (dotted,) = scene_with(scene, ball=dataclasses.replace(placed(scene).ball, name=f"my.{one.name}")).elements
     assert dataclasses.replace(scene, elements=(dotted,)).elements == (dotted,)
     with pytest.raises(InputError, match="name the element without"):
         dataclasses.replace(scene, elements=(one, dotted))
@@ -135,10 +141,10 @@ def test_elements_have_names_of_their_own() -> None:
 def test_orientation_is_required_only_if_asked_for() -> None:
     """Asking adds the orientation to what is required and to the digest; a scene that asks nothing keeps its digest."""
     plain, asking = load_scene("sphere_in_cylinder"), load_scene("sphere_in_cylinder", asks=("orientation",))
-    assert asking.requires - plain.requires == {BallCapability.ORIENTATION}
+    assert asking.requires - plain.requires == {MechanismCapability.ORIENTATION}
     assert asking.digest != plain.digest
     # Another digest than this would leave every stored result of the scene behind.
-    assert dataclasses.replace(plain, files=()).digest == "6c267d2f3e7001a5"
+    assert dataclasses.replace(plain, files=()).digest == "1b31d20c8ff3ac77"
 
 
 @pytest.mark.parametrize(("asks", "value"), [(("colour",), "colour"), ("orientations", "orientations"), (3, 3)])
@@ -203,6 +209,6 @@ def test_what_lies_beside_a_scene_and_is_no_model_is_no_matter(tmp_path: Path) -
     assert scene.digest == before
     engine = EngineFacts("projection", "1", "code", {})
     sent = _files(case_of(str(folder), scene, (), engine, 1.0, 0.1))
-    assert sorted(sent) == ["mujoco_chart.xml", "mujoco_facets.xml", "mujoco_free.xml", "scene.toml"]
-    (folder / "mujoco_free.xml").write_text("<mujoco/>")
+    assert sorted(sent) == ["mujoco_chart.xml", "scene.toml"]
+    (folder / "mujoco_chart.xml").write_text("<mujoco/>")
     assert load_scene(str(folder)).digest != before

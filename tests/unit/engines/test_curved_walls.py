@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from balls_as_bodies import as_bodies
 
 import proofroll
 from proofroll.core.errors import Refused
@@ -11,6 +10,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.files.scene_file import load_scene
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_a_ball_slides_on_each_wall_as_its_truth_says(engine: str, kind: str) ->
 )
 def test_pinocchios_midpoint_is_of_second_order_on_curved_walls(name: str, resistance: float, error: float) -> None:
     """Half the step gives a quarter of the error: the wall turns within a step (J̇v), and so does what rolls."""
-    scene, grid = as_bodies(name, rolling_resistance=resistance), {"until": 0.4, "every": 0.04}
+    scene, grid = load_scene(name, rolling_resistance=resistance), {"until": 0.4, "every": 0.04}
     right = proofroll.simulate(scene, "truth", **grid)["p_WB"].values
     settings = [f"pinocchio[formulation=impulses,preset=tuned,dt={dt}]" for dt in (4e-3, 2e-3)]
     far, near = (abs(proofroll.simulate(scene, setting, **grid)["p_WB"].values - right).max() for setting in settings)

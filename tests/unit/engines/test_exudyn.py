@@ -6,19 +6,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from placed_balls import placed, scene_with
+from true_runs import true_run
 
 from proofroll import load_scene
 from proofroll.core.certificate import certify
-from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.errors import Diverged, InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.running.simulation import build, simulate
 
 pytest.importorskip("exudyn")
 
-FORMULATIONS = ("generic", "carrier", "rolling_disc")
+FORMULATIONS = ("carrier", "rolling_disc")
 UNTIL = 0.5
 
 
@@ -27,33 +28,21 @@ def cylinder(**parameters: float) -> Scene:
     return load_scene("sphere_in_cylinder", **{"speed": 4, **parameters})
 
 
-def test_generic_reaches_the_truth_with_small_steps() -> None:
-    """At dt = 1e-4 s minimal coordinates leave 2e-7 m, the trapezoidal rule's own error, over 2 s."""
-    scene = cylinder()
-    run = simulate(scene, "exudyn", until=2, every=0.1, formulation="generic", dt=1e-4)
-    truth = simulate(scene, "truth", until=2, every=0.1)
-    # Tight, for it is the rule's own error at this step, which no processor changes: twice as much is another rule.
-    assert float(np.abs(run.z - truth.z).max()) < 2e-7
-
-
 def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis, and gravity along it, leaning by ``tilt`` [rad]."""
     scene = load_scene("sphere_in_cylinder", **parameters)
     gravity = Gravity(9.81, (-math.sin(tilt), 0.0, -math.cos(tilt)))
-    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt), gravity=gravity)
+    return scene_with(scene, surface=dataclasses.replace(placed(scene).surface, tilt=tilt), gravity=gravity)
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_tilted_cylinder(formulation: str) -> None:
-    """With the axis tilted, and gravity along it, the energy stays and all agree."""
+    """With the axis tilted, and gravity along it, the energy stays, and the path is the true one."""
     scene = leaning_cylinder(0.3)
     assert all(line.holds for line in certify(build(scene, "exudyn", formulation=formulation), scene))
-    run, reference = (
-        simulate(scene, "exudyn", until=UNTIL, every=0.1, formulation=name, dt=5e-4)
-        for name in (formulation, "generic")
-    )
+    run = simulate(scene, "exudyn", until=UNTIL, every=0.1, formulation=formulation, dt=5e-4)
     assert float(np.abs(run.energy - run.energy[0]).max()) < 2e-3
-    assert float(np.abs(run.p_WB - reference.p_WB).max()) < 1e-3
+    assert float(np.abs(run.p_WB - true_run(scene, UNTIL, 0.1).p_WB).max()) < 1e-3
 
 
 def test_carrier_weighs_nothing() -> None:
@@ -94,23 +83,20 @@ def test_default_preset_is_the_engines_default(formulation: str) -> None:
     [
         ({"dt": 0}, "dt"),
         ({"dt": "fast"}, "dt"),
-        ({"formulation": "mesh"}, "choose one of generic, carrier, rolling_disc"),
-        ({"formulation": "generic", "preset": "tuned"}, "generic has default, matched"),
+        ({"formulation": "mesh"}, "choose one of carrier, rolling_disc"),
+        ({"formulation": "rolling_disc", "preset": "tuned"}, "rolling_disc has default, matched"),
         ({"spectral_radius": 1.5}, "spectral_radius"),
         ({"integrator": "euler"}, "integrator"),
         ({"newton_tolerance": 2}, "newton_tolerance"),
         ({"step": 1e-3}, "no such setting"),
-        ({"formulation": "generic", "stiffness": 5}, "stiffness = 5.*generic does not use it; set formulation=contact"),
-        ({"formulation": "generic", "grip": 10}, "grip = 10.*generic does not use it"),
+        ({"stiffness": 5}, "stiffness = 5.*carrier does not use it; set formulation=spheres"),
         ({"formulation": "carrier", "friction_zone": 1e-5}, "carrier does not use it"),
         ({"formulation": "rolling_disc", "halvings": 0}, "rolling_disc does not use it"),
         ({"spectral_radius": 0.9}, "trapezoidal rule has no damping; set integrator=generalized_alpha"),
-        ({"formulation": "contact", "spectral_radius": 0.9}, "trapezoidal rule has no damping"),
-        ({"formulation": "contact", "stiffness": None}, "formulation=contact needs a number"),
-        ({"formulation": "contact", "stiffness": 0}, "stiffness"),
-        ({"formulation": "contact", "friction_zone": -1}, "friction_zone"),
-        ({"formulation": "contact", "grip": 0}, "grip"),
-        ({"formulation": "contact", "halvings": -1}, "halvings"),
+        ({"formulation": "spheres", "stiffness": None}, "formulation=spheres needs a number"),
+        ({"formulation": "spheres", "stiffness": 0}, "stiffness"),
+        ({"formulation": "spheres", "friction_zone": -1}, "friction_zone"),
+        ({"formulation": "spheres", "halvings": -1}, "halvings"),
     ],
 )
 def test_wrong_settings_give_one_clear_line(options: dict[str, Any], words: str) -> None:
@@ -151,7 +137,7 @@ def test_timeout_of_the_engine_is_noticed() -> None:
     """Exudyn reports success when its own timeout stops it; here it is a divergence with a sentence."""
     import exudyn
 
-    engine = build(cylinder(), "exudyn", formulation="generic", dt=1e-4)
+    engine = build(cylinder(), "exudyn", formulation="carrier", dt=1e-4)
     exudyn.special.solver.timeout = 1e-4
     try:
         with pytest.raises(Diverged, match="timeout"):
@@ -181,7 +167,7 @@ def test_silent(capfd: pytest.CaptureFixture[str]) -> None:
     assert out + err == ""
 
 
-@pytest.mark.parametrize("formulation", ["generic", "carrier", "rolling_disc"])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_size_does_not_matter(formulation: str, size: float) -> None:
     """With all lengths scaled, and the speed as the root of that, the height scales along: nothing has a size."""
@@ -196,10 +182,3 @@ def test_size_does_not_matter(formulation: str, size: float) -> None:
         return float(run["z"][-1]) / factor
 
     assert height(size) == pytest.approx(height(1.0), rel=1e-4)
-
-
-def test_a_contact_too_soft_for_its_load() -> None:
-    """A load that would press the ball into the wall by its radius is refused, not left to crash."""
-    heavy = load_scene("sphere_in_cylinder", mass=1e6)
-    with pytest.raises(Refused, match="larger stiffness"):
-        build(heavy, "exudyn", formulation="contact")

@@ -1,11 +1,9 @@
 """Bodies that touch in Exudyn: penalty contacts of spheres, pressed in from the start."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from proofroll.core.errors import InputError, Refused
+from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
@@ -84,9 +82,3 @@ def test_shapes_and_impacts_that_exudyn_lacks_are_refused(geometry, pair, said):
     """Corners, ellipsoids and restitution are refused, each with its reason."""
     with pytest.raises(Refused, match=said):
         EXUDYN.build(touching(FLOOR, geometry, pairs=(Pair("p", ("g", "floor"), 0.3, **pair),), height=1.0), MATCHED)
-
-
-def test_spheres_have_no_grip():
-    """What never slips creeps within the friction zone: a number that stands for its friction is one line."""
-    with pytest.raises(InputError, match="exudyn: grip"):
-        replace(MATCHED, grip=10.0)

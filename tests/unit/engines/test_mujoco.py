@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from placed_balls import placed, scene_with
 from true_runs import true_run
 
 from proofroll.conformance.motion import order_is_as_declared
@@ -21,10 +21,9 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
-from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.elements.mechanism.run.sampling import MechanismSample
 from proofroll.engines.mujoco import Mujoco, mjspec
-from proofroll.engines.mujoco.settings import OF_MECHANISMS, ORDER_OF_TURNING, PRESETS
+from proofroll.engines.mujoco.settings import ORDER_OF_TURNING, PRESETS
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
 from proofroll.running.identity import used
@@ -33,19 +32,14 @@ from proofroll.running.simulation import build, simulate
 
 SCENES = scenes()
 CYLINDER = "sphere_in_cylinder"
-MODELS = [
-    (formulation, preset)
-    for formulation, presets in PRESETS.items()
-    if formulation not in OF_MECHANISMS
-    for preset in presets
-]
+MODELS = [("chart", preset) for preset in PRESETS["chart"]]
 
 
 def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis, and gravity along it, leaning by ``tilt`` [rad]."""
     scene = load_scene(CYLINDER, **parameters)
     gravity = Gravity(9.81, (-math.sin(tilt), 0.0, -math.cos(tilt)))
-    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt), gravity=gravity)
+    return scene_with(scene, surface=dataclasses.replace(placed(scene).surface, tilt=tilt), gravity=gravity)
 
 
 @functools.cache
@@ -62,9 +56,10 @@ def error(scene: str, engine: str, variable: str, *, until: float = 1.0, signed:
     return difference if signed else float(np.max(np.abs(difference)))
 
 
-def numbers(sample: BallSample) -> np.ndarray:
-    """Everything in a sample as one row."""
-    return np.concatenate([sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB, sample.force])
+def numbers(sample: MechanismSample) -> np.ndarray:
+    """Everything of a ball in a sample as one row."""
+    parts = [sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB, sample.contact_force]
+    return np.concatenate([np.ravel(part) for part in parts])
 
 
 @pytest.mark.parametrize(
@@ -84,7 +79,7 @@ def test_order_hangs_on_the_scene(model: tuple[str, str], scene: Scene, order: i
 
 
 # z's range is 0.12 m. Each bound is about 1.5 times what MuJoCo 4.0 gives, so that a change of the method is seen.
-@pytest.mark.parametrize("engine", ["formulation=chart,dt=5e-4", "formulation=free,preset=tuned,dt=5e-4"])
+@pytest.mark.parametrize("engine", ["formulation=chart,dt=5e-4", "formulation=geoms,preset=tuned,dt=5e-4"])
 def test_reactions_are_the_truths(engine: str) -> None:
     """N, F2 and F3 as MuJoCo computed them agree with the truth within 0.15 % of the normal force (41 N)."""
     # F3 of the chart carries b = 1/dt times the slip that is left, an error of first order: 6 mN at this step.
@@ -102,51 +97,24 @@ def test_reactions_are_the_truths(engine: str) -> None:
         ({"axial_speed": 0.3, "radial_spin": 5.0, "rolling_resistance": 5e-4}, 2e-4),
     ],
 )
-@pytest.mark.parametrize("engine", ["formulation=chart", "formulation=free,preset=tuned"])
+@pytest.mark.parametrize("engine", ["formulation=chart", "formulation=geoms,preset=tuned"])
 def test_other_motions_in_the_cylinder(engine: str, parameters: dict[str, float], bound: float) -> None:
     """Fast, backwards and spinning starts are as accurate as the plain one."""
     assert error(CYLINDER, engine, "z", **parameters) < bound
 
 
-def test_limit_of_small_steps_of_the_documented_model() -> None:
-    """The free ball with documented options is off by centimetres, but its limit of small steps is the truth."""
-    h4, h2, h1 = (error(CYLINDER, f"formulation=free,dt={dt:g}", "z", signed=True) for dt in (4e-4, 2e-4, 1e-4))
-    first_order_removed = (2 * h2 - h4, 2 * h1 - h2)
-    limit = (4 * first_order_removed[1] - first_order_removed[0]) / 3
-    assert np.max(np.abs(h1)) > 1e-3
-    assert np.max(np.abs(limit)) < 3e-5
-
-
 def test_default_contact_is_wrong_at_every_step() -> None:
-    """With MuJoCo's default contact the ball is off by decimetres if free, by centimetres on joints, at every step."""
+    """With MuJoCo's default contact the ball on joints is off by centimetres at every step."""
     for dt in (2e-3, 5e-4):
-        assert 0.1 < error(CYLINDER, f"formulation=free,preset=default,dt={dt:g}", "z", until=2.0) < 0.4
         assert 0.01 < error(CYLINDER, f"formulation=chart,preset=default,dt={dt:g}", "z", until=2.0) < 0.04
 
 
-@pytest.mark.parametrize("formulation", ["chart", "free"])
-def test_default_contact_is_mujocos(formulation: str) -> None:
+def test_default_contact_is_mujocos() -> None:
     """Where the settings leave the contact to MuJoCo, its own numbers are in the model, whatever the file says."""
     bare = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
-    contact = build(load_scene(CYLINDER), f"mujoco[formulation={formulation},preset=default]")._evaluated().contact[0]
+    contact = build(load_scene(CYLINDER), "mujoco[preset=default]")._evaluated().contact[0]
     np.testing.assert_array_equal(contact.solref, bare.geom_solref[0])
     np.testing.assert_array_equal(contact.solimp, bare.geom_solimp[0])
-
-
-def test_damping_of_the_slip_is_an_option_of_the_pair() -> None:
-    """With friction_damping the contact is MuJoCo's pair with that damping; without, there is no pair."""
-    damped = build(load_scene(CYLINDER), "mujoco[formulation=free,dt=1e-3,friction_damping=1.9]")
-    contacts = damped._evaluated().contact
-    assert len(contacts) == damped._model.npair == 1
-    np.testing.assert_allclose(contacts[0].solreffriction, [-1.0, -1900.0])
-    np.testing.assert_allclose(contacts[0].solref, [2e-3, 1.0])
-    assert build(load_scene(CYLINDER), "mujoco[formulation=free]")._model.npair == 0
-    assert all(settings.friction_damping is None for presets in PRESETS.values() for settings in presets.values())
-
-
-def test_facets_are_useless_and_say_so_by_their_numbers() -> None:
-    """The ring of boxes loses most of the energy: a row of the report, not a model."""
-    assert error(CYLINDER, "formulation=facets", "energy", until=2.0) > 1.0
 
 
 @pytest.mark.parametrize(
@@ -173,7 +141,7 @@ def mutated(mutation: str, parameters: dict[str, float]) -> Scene:
     """The scene in the cylinder with one thing wrong."""
     if mutation == "inertia x2":
         scene = load_scene(CYLINDER, **parameters)
-        return scene_with(scene, ball=dataclasses.replace(scene.elements[0].ball, inertia_ratio=0.8))
+        return scene_with(scene, ball=dataclasses.replace(placed(scene).ball, inertia_ratio=0.8))
     name, factor = {
         "gravity x1.1": ("gravity", 1.1),
         "f x2": ("rolling_resistance", 2.0),
@@ -185,10 +153,10 @@ def mutated(mutation: str, parameters: dict[str, float]) -> Scene:
 @pytest.mark.parametrize(
     ("mutation", "read", "moving"),
     [
-        ("inertia x2", "inertia", {"acceleration", "F3"}),
-        ("gravity x1.1", "gravity", {"acceleration", "F3"}),
-        ("f x2", "rolling resistance", {"acceleration", "angular acceleration", "F2"}),
-        ("f dropped", "rolling resistance", {"acceleration", "angular acceleration", "F2"}),
+        ("inertia x2", "inertia", {"acceleration", "forces of contact"}),
+        ("gravity x1.1", "gravity", {"acceleration", "forces of contact"}),
+        ("f x2", "rolling resistance", {"acceleration", "angular acceleration", "forces of contact"}),
+        ("f dropped", "rolling resistance", {"acceleration", "angular acceleration", "forces of contact"}),
     ],
 )
 @pytest.mark.parametrize(("formulation", "preset"), MODELS)
@@ -214,14 +182,11 @@ def test_what_is_read_back_is_the_engines(formulation: str, preset: str) -> None
     built._model.geom_friction[:, 0] = 0.5
     built._formulation.resistance = dataclasses.replace(built._formulation.resistance, f=1e-4)
     failed = {line.quantity for line in certify(built, scene) if not line.holds}
-    assert {"1 / static friction", "rolling resistance"} <= failed
-    built._model.geom_size[built._geom, 0] *= 1.05
-    if formulation != "chart":  # whose depth is that of its joint: the ball's size is in the contact alone
-        assert "gap in the engine" in {line.quantity for line in certify(built, scene) if not line.holds}
+    assert {"inverse friction", "rolling resistance"} <= failed
 
 
 @pytest.mark.parametrize("parameters", [{"gravity": 0.0}, {"speed": 0.8}])
-@pytest.mark.parametrize(("formulation", "preset"), [model for model in MODELS if model[0] != "facets"])
+@pytest.mark.parametrize(("formulation", "preset"), MODELS)
 def test_resistance_is_read_back_before_there_is_a_load(
     formulation: str, preset: str, parameters: dict[str, float]
 ) -> None:
@@ -233,16 +198,7 @@ def test_resistance_is_read_back_before_there_is_a_load(
     assert "rolling resistance" in {line.quantity for line in dropped if not line.holds}
 
 
-def test_tolerances_that_check_nothing_say_so() -> None:
-    """A tolerance of 1 or more on forces at time 0 belongs to a free ball on an unloaded wall alone."""
-    for formulation, preset in MODELS:
-        built = build(load_scene(CYLINDER), f"mujoco[formulation={formulation},preset={preset}]").built()
-        loose = built.regularised["N"].tolerance >= 1
-        assert loose == ("not checked" in built.regularised["N"].because)
-        assert loose == (preset == "default" and formulation != "chart")
-
-
-@pytest.mark.parametrize("engine", ["formulation=chart", "formulation=free,preset=tuned"])
+@pytest.mark.parametrize("engine", ["formulation=chart", "formulation=geoms,preset=tuned"])
 def test_tilted_cylinder_through_the_same_code(engine: str) -> None:
     """A cylinder whose axis leans is built and run by the same adapter from the same file."""
     leaning = leaning_cylinder(0.3, rolling_resistance=5e-4)
@@ -253,25 +209,11 @@ def test_tilted_cylinder_through_the_same_code(engine: str) -> None:
     assert float(np.max(np.abs(run.z - true.z))) < 1e-4
 
 
-def test_leaning_ring_of_boxes_stands_where_the_wall_is() -> None:
-    """Each box of the facets touches the wall from outside, whatever the wall's tilt."""
-    leaning = leaning_cylinder(0.3)
-    model = build(leaning, "mujoco[formulation=facets]")._model
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    boxes = [index for index in range(model.ngeom) if model.geom_type[index] == mujoco.mjtGeom.mjGEOM_BOX]
-    faces = np.array([data.geom_xpos[i] - model.geom_size[i, 0] * data.geom_xmat[i, 0::3] for i in boxes])
-    assert np.max(np.abs(rolling_ball(leaning).wall.gap(faces))) < 1e-12
-    angles = np.sort(rolling_ball(leaning).wall.locate(faces)[:, 0])
-    np.testing.assert_allclose(np.diff(angles), 2 * np.pi / len(boxes), rtol=1e-9)
-
-
-@pytest.mark.parametrize(("formulation", "preset"), [("chart", "matched"), ("free", "default"), ("facets", "default")])
-def test_numbers_in_the_files_are_the_scenes(formulation: str, preset: str) -> None:
+def test_numbers_in_the_file_are_the_scenes() -> None:
     """The MJCF file, opened alone, is the model that the adapter builds from the scene's defaults."""
     loaded = load_scene(CYLINDER)
-    alone = mujoco.MjModel.from_xml_path(str(loaded.folder / f"mujoco_{formulation}.xml"))
-    engine = build(loaded, f"mujoco[formulation={formulation},preset={preset}]")
+    alone = mujoco.MjModel.from_xml_path(str(loaded.folder / "mujoco_chart.xml"))
+    engine = build(loaded, "mujoco[formulation=chart,preset=matched]")
     ours = engine._model
     compared = 0
     for owner, other in ((alone, ours), (alone.opt, ours.opt)):
@@ -287,12 +229,11 @@ def test_numbers_in_the_files_are_the_scenes(formulation: str, preset: str) -> N
     np.testing.assert_allclose(alone.key_qvel[0], engine._data.qvel, rtol=1e-6, atol=1e-4)
 
 
-@pytest.mark.parametrize("formulation", ["chart", "free"])
-def test_callbacks_of_others_are_forgotten_and_ours_do_not_stay(formulation: str) -> None:
+def test_callbacks_of_others_are_forgotten_and_ours_do_not_stay() -> None:
     """Callbacks are global in MuJoCo: one that somebody left changes nothing, and after a run there is none."""
 
     def end() -> np.ndarray:
-        engine = build(load_scene(CYLINDER, **ROLLING), f"mujoco[formulation={formulation}]")
+        engine = build(load_scene(CYLINDER, **ROLLING), "mujoco[formulation=chart]")
         engine.advance(0.05)
         return numbers(engine.sample())
 
@@ -310,17 +251,12 @@ def test_callbacks_of_others_are_forgotten_and_ours_do_not_stay(formulation: str
         ("time_constant=1", "time_constant"),
         ("impedance=1", "impedance"),
         ("impedance=1e-300", "impedance"),
-        ("formulation=free,preset=tuned,impedance=0.5", "impedance"),
-        ("formulation=free,preset=tuned,impedance=0.4", "impedance"),
-        ("friction_damping=1.9", "friction_damping"),
-        ("formulation=free,friction_damping=2", "friction_damping"),
-        ("formulation=free,friction_damping=1.9,cone=pyramidal,friction=1", "friction_damping"),
-        ("formulation=free,preset=tuned,friction_damping=1.9", "friction_damping"),
-        ("formulation=facets,preset=tuned", "preset"),
+        ("formulation=geoms,preset=tuned,impedance=0.5", "impedance"),
+        ("formulation=geoms,preset=tuned,impedance=0.4", "impedance"),
         ("curvature=true", "curvature"),
-        ("formulation=free,curvature=true,integrator=RK4", "integrator"),
-        ("formulation=free,preset=tuned,cone=pyramidal,friction=1", "cone"),
-        ("formulation=free,cone=pyramidal", "friction"),
+        ("formulation=geoms,curvature=true,integrator=RK4", "integrator"),
+        ("formulation=geoms,preset=tuned,cone=pyramidal", "cone"),
+        ("cone=pyramidal", "friction"),
         ("cone_correction=true", "cone_correction"),
         ("preset=tuned", "preset"),
     ],
@@ -333,33 +269,17 @@ def test_wrong_settings_give_one_clear_line(engine: str, field: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("engine", ["preset=tuned,impedance=0.505", "preset=tuned,impedance=0.7", "impedance=1e-4"])
+@pytest.mark.parametrize("engine", ["impedance=0.505", "impedance=1e-4"])
 def test_soft_contact_starts_as_the_scene_says(engine: str) -> None:
     """Up to the least impedance that is allowed the start converges, and lies as deep as is declared."""
     scene = load_scene(CYLINDER, **ROLLING)
-    assert first_difference(certify(build(scene, f"mujoco[formulation=free,{engine}]"), scene)) is None
-
-
-def test_ring_that_is_too_short_is_refused_or_left() -> None:
-    """A ball that would roll beyond the ring of boxes is refused; one that falls out of it ends the run."""
-    with pytest.raises(Refused, match=r"ends 5 m.*7\.85 m"):
-        build(load_scene(CYLINDER, speed=0.5), "mujoco[formulation=facets]")
-    falls = simulate(load_scene(CYLINDER, speed=0.7), "mujoco[formulation=facets]", until=3.0, every=0.1)
-    assert falls.status == "diverged"
-    assert "left the ring" in falls.message
-    assert float(falls.z.min()) > -5.0
+    assert first_difference(certify(build(scene, f"mujoco[{engine}]"), scene)) is None
 
 
 def test_step_that_misses_the_samples_is_named() -> None:
     """A step that does not divide the interval between samples is an error about dt."""
     with pytest.raises(InputError, match="dt"):
         build(load_scene(CYLINDER), "mujoco[dt=3e-4]").advance(0.01)
-
-
-def test_scene_without_a_model_is_refused_with_the_reason() -> None:
-    """A ring of boxes needs a file; the refusal names the one that is not there."""
-    with pytest.raises(Refused, match=r"mujoco_facets\.xml"):
-        build(dataclasses.replace(load_scene(CYLINDER), folder=Path()), "mujoco[formulation=facets]")
 
 
 def test_file_of_another_surface_is_refused(tmp_path) -> None:
@@ -382,7 +302,7 @@ def test_file_of_another_surface_is_refused(tmp_path) -> None:
 def test_contact_too_soft_to_start_is_refused() -> None:
     """Where the settled depth would exceed the ball's radius the engine refuses instead of starting inside out."""
     with pytest.raises(Refused, match="soft"):
-        build(load_scene(CYLINDER, speed=60.0), "mujoco[formulation=free,dt=1e-2]")
+        build(load_scene(CYLINDER, speed=60.0), "mujoco[dt=1e-2,impedance=0.01]")
 
 
 @pytest.mark.parametrize("value", [np.nan, 1e12])
@@ -418,7 +338,7 @@ def test_a_mechanism_as_a_spec_and_as_a_file(name):
     assert np.array_equal(own.key_qpos[0], run._data.qpos)
     with pytest.raises(InputError, match="steps"):
         mjspec(scene, steps=3)
-    with pytest.raises(InputError, match="choose one of chart, free, facets, joints, geoms"):
+    with pytest.raises(InputError, match="choose one of chart, joints, geoms"):
         mjspec(scene, formulation="none")
     assert len(mjspec(load_scene("sled"), formulation="geoms").geoms) > len(mjspec(load_scene("pendulum")).geoms)
 
@@ -464,4 +384,4 @@ def test_a_mechanism_lists_no_settings_of_contact():
     assert {"integrator", "time_constant"} <= set(told)
     assert resolve_settings(Mujoco, told) == settings
     assert "cone" in used(PRESETS["geoms"]["matched"])
-    assert "condim" in used(PRESETS["free"]["matched"])
+    assert "condim" in used(PRESETS["chart"]["matched"])

@@ -343,10 +343,10 @@ def test_the_armature_of_damping_is_the_implicit_step():
 
 
 def test_the_armature_of_damping_needs_euler_and_joints():
-    """Other integrators are refused, for they damp by themselves, and so is a ball, which has no dampers."""
+    """Other integrators are refused, for they damp by themselves, and so is the chart, which has no dampers."""
     for settings, said in (
         (preset("tuned", integrator="implicitfast", cone_correction=False), "needs integrator=Euler"),
-        (replace(MUJOCO.presets["free"]["tuned"], damping_armature=True), "a ball has no joints"),
+        (replace(MUJOCO.presets["chart"]["matched"], damping_armature=True), "chart does not use it"),
     ):
         with pytest.raises(InputError, match=said):
             MUJOCO.build(

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from balls_as_bodies import as_bodies
 
 import proofroll
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.core.plugins import load_engine
+from proofroll.files.scene_file import load_scene
 
 A, G, F = 0.025, 9.81, 5e-4  # radius of the ball [m], gravity [m/s²], and the usual lever of the resistance [m]
 ROLLS = 1.4  # a solid ball's mass and what its turning adds, in masses
@@ -20,7 +20,7 @@ GEOMS = ["mujoco[formulation=geoms,preset=matched]", "mujoco[formulation=geoms,p
 
 def run(name: str, engine: str, until: float, every: float, **parameters: Any) -> tuple[np.ndarray, np.ndarray]:
     """Places [m] and velocities [m/s] of a ball read as a body, (time, 3)."""
-    motion = proofroll.simulate(as_bodies(name, **parameters), engine, until=until, every=every)
+    motion = proofroll.simulate(load_scene(name, **parameters), engine, until=until, every=every)
     return motion["p_WB"].values[:, 0], motion["v_WB"].values[:, 0]
 
 
@@ -49,7 +49,7 @@ def test_a_ball_rolls_down_by_what_resistance_leaves(engine: str) -> None:
 def test_what_slips_is_resisted_too() -> None:
     """A ball that slides and begins to turn has the moment while it slips, as its truth has."""
     parameters = {"rolling_resistance": 2e-3}
-    scene = as_bodies("slide_to_roll", **parameters)
+    scene = load_scene("slide_to_roll", **parameters)
     found = proofroll.simulate(scene, GEOMS[1], until=0.2, every=0.05)
     true = proofroll.simulate(scene, "truth", until=0.2, every=0.05)
     for field, largest in (("v_WB", 1e-3), ("w_WB", 0.25)):  # a step of friction: 2e-3 m/s and 0.2 rad/s
@@ -59,7 +59,7 @@ def test_what_slips_is_resisted_too() -> None:
 
 def test_a_bowl_keeps_second_order() -> None:
     """Half the step has a quarter of the error with curvature and resistance."""
-    scene, grid = as_bodies("bowl", rolling_resistance=1e-3), {"until": 0.2, "every": 0.04}
+    scene, grid = load_scene("bowl", rolling_resistance=1e-3), {"until": 0.2, "every": 0.04}
     right = proofroll.simulate(scene, "truth", **grid)["p_WB"].values
     errors = [
         np.abs(proofroll.simulate(scene, f"{GEOMS[1][:-1]},dt={dt}]", **grid)["p_WB"].values - right).max()
@@ -72,7 +72,7 @@ def test_a_bowl_keeps_second_order() -> None:
 @pytest.mark.drill
 def test_the_articles_ball_slips_when_its_truth_does() -> None:
     """With resistance and friction of 0.35 the ball in the cylinder slips at 1.72018 s, by its truth."""
-    scene = as_bodies("sphere_in_cylinder", speed=4, mu_static=0.35, rolling_resistance=F)
+    scene = load_scene("sphere_in_cylinder", speed=4, mu_static=0.35, rolling_resistance=F)
     (slip,) = events_of(proofroll.simulate(scene, GEOMS[1], until=1.8, every=0.02))
     assert slip.time == pytest.approx(1.720183, abs=2e-3)
 
@@ -80,6 +80,6 @@ def test_the_articles_ball_slips_when_its_truth_does() -> None:
 def test_no_mjcf_has_the_torque() -> None:
     """The model alone would roll on, so that it is not given away."""
     engine = load_engine("mujoco")
-    built = engine.build(as_bodies("rolling_stop"), engine.presets["geoms"]["matched"])
+    built = engine.build(load_scene("rolling_stop"), engine.presets["geoms"]["matched"])
     with pytest.raises(Refused, match="rolling resistance"):
         built.spec()

@@ -15,6 +15,7 @@ from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
 from proofroll.truth.natural_units import Units
 from proofroll_drill.published import true_values
 
@@ -225,3 +226,15 @@ def test_a_start_with_laws_of_joints_is_certified(name: str, preset: str) -> Non
     run = PINOCCHIO.build(scene, PRESETS[preset])
     lines = element.certify(run.built(), run.sample())
     assert [line for line in lines if not line.holds] == []
+
+
+def test_a_fast_ball_on_a_curved_wall_keeps_its_rolling_resistance():
+    """Where the wall turns away faster than gravity pulls, a step's approach is no impact, which has no such moment."""
+    scene = load_scene("sphere_in_cylinder", speed=8.0, rolling_resistance=5e-4)
+    run, true = (
+        simulate(scene, engine, until=0.2, every=0.1)
+        for engine in ("pinocchio[formulation=impulses,preset=tuned]", "truth")
+    )
+    lost = float(true.energy[0] - true.energy[-1])
+    assert lost > 1.0
+    assert float(run.energy[0] - run.energy[-1]) == pytest.approx(lost, rel=1e-2)

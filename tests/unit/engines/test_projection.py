@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from placed_balls import compared
 from true_runs import true_run
 
 import proofroll
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.plugins import resolve_settings
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.ball.orientation import EulerAngles
 from proofroll.running.simulation import build, simulate
@@ -29,7 +30,7 @@ def errors(scene, engine, until=2.0, every=0.1, **settings):
     found = simulate(scene, engine, until=until, every=every, **settings)
     assert found.status == "done", found.message
     true = true_run(scene, until, every)
-    return {name: float(np.max(np.abs(found[name] - true[name]))) for name in true.data_vars}
+    return {name: float(np.max(np.abs(found[name] - true[name]))) for name in compared(true, found)}
 
 
 @pytest.mark.parametrize("engine", EXACT)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import proofroll
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.projection.ball.geometry import GeneralSurface, Uniform, matrix

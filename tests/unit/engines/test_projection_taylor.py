@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from placed_balls import placed, scene_with
 from true_runs import true_run
 
 from proofroll.core import heyoka_library as library
@@ -15,7 +16,6 @@ from proofroll.core.errors import Missing
 from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.engines.projection import Projection
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
@@ -30,7 +30,7 @@ SCENES: dict[str, Scene] = {
     # the singularity of the angles stays about the world's vertical
     "tilted": scene_with(
         RESISTING,
-        surface=dataclasses.replace(RESISTING.elements[0].surface, tilt=0.3),
+        surface=dataclasses.replace(placed(RESISTING).surface, tilt=0.3),
         gravity=Gravity(9.81, (-math.sin(0.3), 0.0, -math.cos(0.3))),
     ),
 }
@@ -54,8 +54,8 @@ def test_same_answers_as_numpy(scene: Scene, formulation: str) -> None:
     angles = build(scene, "projection", formulation=formulation)._angles
     difference[angles] = np.remainder(difference[angles] + np.pi, 2 * np.pi) - np.pi  # whole turns say nothing
     assert np.max(np.abs(difference) / np.maximum(1.0, np.abs(expected))) < 2e-11
-    assert sample.force is not None
-    assert np.max(np.abs(sample.force - other.force)) < 1e-10
+    assert sample.contact_force is not None
+    assert np.max(np.abs(sample.contact_force - other.contact_force)) < 1e-10
     assert np.max(np.abs(sample.p_WB - other.p_WB)) < 1e-12
     assert (sample.q_WB is None) == (formulation == "rotating_frame")
 

@@ -76,8 +76,8 @@ def test_a_program_has_constant_forces() -> None:
     ("engine", "name", "formulation", "words"),
     [
         ("exudyn", "saturated_servo", "redundant", "are functions"),
-        ("exudyn", "sphere_in_cylinder", "generic", "proofroll's"),
-        ("mujoco", "sphere_in_cylinder", "free", "proofroll's"),
+        ("exudyn", "sphere_in_cylinder", "carrier", "proofroll's"),
+        ("mujoco", "sphere_in_cylinder", "chart", "proofroll's"),
     ],
 )
 def test_what_has_no_program(engine: str, name: str, formulation: str, words: str) -> None:

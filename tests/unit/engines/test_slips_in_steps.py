@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 import pytest
-from balls_as_bodies import as_bodies
 from scipy.optimize import brentq
 
 import proofroll
@@ -16,6 +15,7 @@ from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.files.scene_file import load_scene
 
 STEP = 1e-3
 ENGINES = [
@@ -32,7 +32,7 @@ SLIPS = 0.176668  # s; of the ball, by its truth
 
 def ball() -> tuple[Scene, tuple[float, ...]]:
     """A ball that rolls around in the cylinder with little friction, and the time at which it slips."""
-    return as_bodies("sphere_in_cylinder", speed=4, rolling_resistance=0, mu_static=0.15), (SLIPS,)
+    return load_scene("sphere_in_cylinder", speed=4, rolling_resistance=0, mu_static=0.15), (SLIPS,)
 
 
 @pytest.mark.drill
@@ -97,5 +97,5 @@ def test_a_slip_between_two_samples_is_seen(engine: str) -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_unbounded_friction_never_slips(engine: str) -> None:
     """A ball that rolls in the cylinder creeps in steps of first order, and has no event."""
-    scene = as_bodies("sphere_in_cylinder", speed=4, rolling_resistance=0)
+    scene = load_scene("sphere_in_cylinder", speed=4, rolling_resistance=0)
     assert events_of(proofroll.simulate(scene, engine, until=0.1, every=0.02)) == []

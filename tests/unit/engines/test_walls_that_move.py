@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from balls_as_bodies import as_bodies
 
 import proofroll
 from proofroll.core.scene import Scene
@@ -14,6 +13,7 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.files.scene_file import load_scene
 
 RADIUS, MASS = 0.025, 0.5
 BALL = Body("ball", MASS, inertia=(0.4 * MASS * RADIUS**2,) * 3)
@@ -106,7 +106,7 @@ def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
 @pytest.mark.parametrize("preset", ["matched", "tuned"])
 def test_pinocchio_tells_the_friction_of_a_driven_table_at_the_start(preset: str) -> None:
     """Forces at the start belong to the motion's place at the start, also where steps take all at their middle."""
-    scene, grid = as_bodies("turntable"), {"until": 0.02, "every": 0.01}
+    scene, grid = load_scene("turntable"), {"until": 0.02, "every": 0.01}
     run = proofroll.simulate(scene, f"pinocchio[formulation=impulses,preset={preset}]", **grid)
     right = proofroll.simulate(scene, "truth", **grid)
     for force in ("F2", "F3"):
@@ -115,7 +115,7 @@ def test_pinocchio_tells_the_friction_of_a_driven_table_at_the_start(preset: str
 
 def test_exudyns_triangle_of_a_turning_plane_does_not_press_by_round_off() -> None:
     """It is small and stays under the ball; Newton's method did not converge with corners a kilometre off."""
-    scene, grid = as_bodies("turntable"), {"until": 0.1, "every": 0.05}
+    scene, grid = load_scene("turntable"), {"until": 0.1, "every": 0.05}
     run = proofroll.simulate(scene, "exudyn[formulation=spheres,dt=1e-3]", **grid)
     right = proofroll.simulate(scene, "truth", **grid)
     assert run.attrs["status"] == "done"
@@ -141,7 +141,7 @@ def test_exudyns_triangle_of_a_moving_plane_follows_a_sphere_that_goes_far() -> 
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
 def test_the_projection_solver_rolls_a_ball_on_a_driven_table(tilt: float) -> None:
     """Path, forces and slip on a plane that a motion turns are the truth's to round-off."""
-    scene, grid = as_bodies("turntable", tilt=tilt), {"until": 0.1, "every": 0.05}
+    scene, grid = load_scene("turntable", tilt=tilt), {"until": 0.1, "every": 0.05}
     run, right = (proofroll.simulate(scene, engine, **grid) for engine in ("projection", "truth"))
     for field in ("p_WB", "v_WB", "F2", "F3", "N"):
         assert abs(run[field].values - right[field].values).max() < 2e-13  # 2e-14 is seen

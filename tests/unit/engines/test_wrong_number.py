@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from functools import cache
 
 import pytest
+from placed_balls import gravity_of, placed, scene_with
 
 from proofroll.core.certificate import certify
 from proofroll.core.errors import Missing
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import scene_with
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
 
@@ -30,11 +30,11 @@ CHANGES: Mapping[str, tuple[Mapping[str, float], str]] = {
     "f doubled": ({"rolling_resistance": 2.0}, "rolling resistance"),
     "f dropped": ({"rolling_resistance": 0.0}, "rolling resistance"),
 }
-DYNAMICS = {"acceleration", "angular acceleration", "N", "F2", "F3"}
+NEEDED = {MechanismCapability.UNBOUNDED_FRICTION, MechanismCapability.TURNING_FRICTION}
 
 
 def models() -> list[object]:
-    """Engine, formulation and its first preset of each that builds balls; Pinocchio's contact with each of its solvers.
+    """Engine, formulation and its first preset of each that builds balls.
 
     Presets differ in how a ball moves on, not in how it is built and read back; that their certificates hold is a check
     of conformance.
@@ -47,19 +47,14 @@ def models() -> list[object]:
             found.append(pytest.param(name, id=name, marks=pytest.mark.skip(reason=str(reason))))
             continue
         for formulation, presets in engine.presets.items():
-            if BallCapability.ROLLING in engine.provides[formulation]:
+            if engine.provides[formulation] >= NEEDED:
                 found.append(f"{name}[formulation={formulation},preset={next(iter(presets))}]")
-    admm = [
-        f"{each},solver=admm]"
-        for each in (str(item).removesuffix("]") for item in found)
-        if "pinocchio[formulation=contact" in each
-    ]
-    return found + admm
+    return found
 
 
 def multiplied(scene: Scene, parameters: Mapping[str, float]) -> Scene:
     """The scene with some of its numbers multiplied."""
-    ball, contact, gravity = scene.elements[0].ball, scene.elements[0].contact, scene.elements[0].gravity
+    ball, contact, gravity = placed(scene).ball, placed(scene).contact, gravity_of(scene)
     for name, factor in parameters.items():
         if name == "gravity":
             gravity = dataclasses.replace(gravity, magnitude=factor * gravity.magnitude)
@@ -85,9 +80,5 @@ def test_the_certificate_notices(engine: str, name: str, change: str) -> None:
     assert failing_when_sound(engine, name) == []
     failing = {line.quantity for line in certify(build(multiplied(scene, parameters), engine), scene) if not line.holds}
     assert quantity in failing
-    if "contact,preset=default" in engine and "pinocchio" in engine:
-        # The exception: the wall is a plane there for the length of a step and does not press yet at time 0, so
-        # that friction, resistance and what the ball opposes to them act in part only.
-        assert failing & DYNAMICS
-    else:
+    if "spheres" not in engine and "impulses" not in engine:  # which tell no acceleration at time 0
         assert {"acceleration", "angular acceleration"} <= failing

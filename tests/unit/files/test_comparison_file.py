@@ -34,7 +34,7 @@ engine = "projection"
 tolerance = "tight"
 
 [[rows]]
-engine = "mujoco[formulation=free]"
+engine = "mujoco[formulation=chart]"
 tolerance = "tight"
 expect = "converges"
 expect_for = { N = ["agrees", "converges"], F2 = "differs" }
@@ -213,8 +213,8 @@ def test_tolerances_of_another_form(text: object) -> None:
         ('N = "0.1 %"', 'first_slip = "1 %"', ["tolerances.tight: first_slip = '%'", "no size of its own", "in s"]),
         ('bound = { F3 = "2 %" }', 'bound = { event_times = "2 %" }', ["rows.1: event_times = '%'", "in s"]),
         ("speed = [2, 4]", f"speed = {list(range(1, 9000))}", ["claim.toml: vary", "more than 10000 points"]),
-        ("mujoco[formulation=free]", "adams[dt=1]", ["rows.1.engine = 'adams[dt=1]'", "no such engine", "mujoco"]),
-        ("mujoco[formulation=free]", "mujoco[formulation]", ["rows.1.engine", "write key=value"]),
+        ("mujoco[formulation=chart]", "adams[dt=1]", ["rows.1.engine = 'adams[dt=1]'", "no such engine", "mujoco"]),
+        ("mujoco[formulation=chart]", "mujoco[formulation]", ["rows.1.engine", "write key=value"]),
         ('title = "A claim"', f"title = {'[' * 2000}", ["claim.toml", "nested more than 16 deep"]),
         ("[vary]", f"[{'.'.join('v' * 3000)}]\n[vary]", ["claim.toml", "nested more than 16 deep"]),
         ("every = 0.01", "every = 2", ["every = 2", "further apart than the run is long, 1 s"]),

@@ -16,7 +16,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.kind import BallOnSurfaceKind
 from proofroll.files import scene_file
 from proofroll.files.data_folders import data_folder

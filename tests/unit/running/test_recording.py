@@ -47,7 +47,6 @@ def test_record(sphere: Scene) -> None:
         (NotANumber, 2, ["v_WB", "not finite", "0.1 s"]),
         (GivesUp, 2, ["step size fell to nothing at 0.1 s"]),
         (Misshapen, 2, ["w_WB", "(2,) instead of (3,)", "0.1 s"]),
-        (type("Infinite", (Misshapen,), {"wrong": {"force": np.full(3, np.inf)}}), 2, ["force", "not finite"]),
         (type("Five", (Misshapen,), {"wrong": {"q_WB": np.zeros(5)}}), 2, ["q_WB", "(5,) instead of (4,)"]),
         (type("Long", (Misshapen,), {"wrong": {"q_WB": np.array([1.01, 0, 0, 0])}}), 2, ["q_WB has length 1.01 at"]),
         (type("Zero", (Misshapen,), {"wrong": {"q_WB": np.zeros(4)}}), 2, ["q_WB has length 0 at 0.1 s"]),
@@ -94,8 +93,8 @@ def test_every_sample_is_taken_once_per_advance(sphere: Scene) -> None:
 def test_an_orientation_that_was_asked_for() -> None:
     """An engine that was asked for the orientation and does not give it has failed, and one sentence says so."""
     asking = load_scene("sphere_in_cylinder", asks=("orientation",))
-    recording = record(Oracle(asking), asking, time_grid(0.1, 0.05))
-    assert recording.failure == "the engine does not give the ball's orientation"
+    recording = record(Oracle.build(asking, HostileSettings()), asking, time_grid(0.1, 0.05))
+    assert recording.failure == "the engine does not give the orientation of the bodies"
 
 
 def test_times_off_the_grid() -> None:
@@ -126,4 +125,4 @@ def test_where_nothing_can_lift_the_ball_a_pull_is_no_lift_off(sphere: Scene) ->
     recording = record(Pulls.build(sphere, HostileSettings()), sphere, time_grid(0.5, 0.1))
     assert (recording.failure, recording.ended) == (None, None)
     assert recording.dataset.sizes["time"] == 6
-    assert recording.dataset.attrs["smallest_N"] < 0
+    assert recording.dataset["N"].min() < 0

@@ -48,7 +48,7 @@ OUTCOMES = {
     "moves_the_bar": (Status.CRASHED, "changed proofroll.core.certificate.EXACT in its process"),
     "signs_for_the_ball": (
         Status.CRASHED,
-        "changed proofroll.elements.ball_on_surface.certificate.certify in its process",
+        "changed proofroll.elements.mechanism.run.certificate.certify in its process",
     ),
 }
 
@@ -192,7 +192,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path, make_case: MakeCase) -> None
     """A full disk ends the run with one line; what fits is stored, and running all again loses nothing."""
     cases = [dataclasses.asdict(make_case("oracle", parameters={"speed": speed})) for speed in (3.0, 4.0, 5.0)]
     (tmp_path / "disk").mkdir()
-    mount = 'mount -t tmpfs -o size=32k tmpfs "$1" && shift && exec "$@"'
+    mount = 'mount -t tmpfs -o size=64k tmpfs "$1" && shift && exec "$@"'
     command = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", mount, "sh", str(tmp_path / "disk")]
     if not shutil.which("unshare") or subprocess.run([*command, "true"], check=False, capture_output=True).returncode:
         pytest.skip("this system lets nobody mount a small disk")
@@ -257,14 +257,16 @@ def test_capabilities_are_checked_before_anything_is_built(tmp_path: Path, make_
     case = make_case("oracle", parameters={"rolling_resistance": 1e-4})
     result = run_one(case, tmp_path / "run.npz")
     assert result.status is Status.REFUSED
-    assert result.message.startswith("needs rolling resistance; no formulation of oracle has")
+    assert result.message.startswith(
+        "needs friction of contacts against rolling and spinning; no formulation of oracle has"
+    )
 
 
 def test_describe() -> None:
     """An engine is described by itself, from a process of its own."""
     found = describe("oracle")
     assert found.version == "1"
-    assert found.provides == {"only": ["rolling without slip"]}
+    assert found.provides == {"only": ["contact between bodies", "contacts that never slip (friction = inf)"]}
     assert found.presets == {"only": {"matched": {"formulation": "only", "preset": "matched", "dt": 1e-2}}}
     assert found.summary.startswith("Well-behaved")
 

@@ -63,7 +63,7 @@ BETWEEN: list[tuple[str, str, Change]] = [
     ("double_pendulum", "positions", lambda s: replace(s, p_WB=np.asarray(s.p_WB) + 0.1)),
     ("double_pendulum", "forces", lambda s: replace(s, joint_force=100 * np.asarray(s.joint_force))),
     ("sphere_in_cylinder", "z", lambda s: replace(s, p_WB=s.p_WB + np.array([0, 0, 0.1]))),
-    ("sphere_in_cylinder", "N", lambda s: replace(s, force=100 * np.asarray(s.force))),
+    ("sphere_in_cylinder", "N", lambda s: replace(s, contact_force=100 * np.asarray(s.contact_force))),
 ]
 
 

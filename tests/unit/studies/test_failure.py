@@ -9,17 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from placed_balls import run_of
 
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.dataset import columns
-from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.natural_scales import natural_time
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
 from proofroll.studies.failure import LOST_PHASE, Yardstick, meanings, run_outcome
 
 SCENE = load_scene("sphere_in_cylinder")
-TIMES = np.linspace(0.0, 3 * natural_time(rolling_ball(SCENE)), 25)
+TIMES = np.linspace(0.0, 3 * SCENE.elements[0].natural_time, 25)
 DONE = Result(Status.DONE, "reached the end")
 LATE = (np.arange(len(TIMES)) >= 12)[:, None]
 
@@ -32,19 +31,19 @@ def true() -> Any:
 
 def p_WB() -> Any:
     """Its places [m]."""
-    return true()["p_WB"].to_numpy()
+    return true()["p_WB"].to_numpy()[:, 0]
 
 
 def v_WB() -> Any:
     """Its velocities [m/s]."""
-    return true()["v_WB"].to_numpy()
+    return true()["v_WB"].to_numpy()[:, 0]
 
 
 def run(p: Any = None, v: Any = None, w: Any = None, upto: int = 25) -> Any:
     """A trajectory of these states, or of the truth's."""
     given = {"p_WB": p, "v_WB": v, "w_WB": w}
-    states = (true()[name].to_numpy() if value is None else value for name, value in given.items())
-    return columns(rolling_ball(SCENE), TIMES[:upto], *(state[:upto] for state in states)).dataset()
+    states = (true()[name].to_numpy()[:, 0] if value is None else value for name, value in given.items())
+    return run_of(SCENE, TIMES[:upto], *(state[:upto] for state in states))
 
 
 def drifting(speed: float) -> Any:
@@ -56,7 +55,7 @@ def drifting(speed: float) -> Any:
 def slower(factor: float) -> Any:
     """The truth with its clock going slower."""
     other = truth(SCENE, TIMES * factor)
-    return run(*(other[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB")))
+    return run(*(other[name].to_numpy()[:, 0] for name in ("p_WB", "v_WB", "w_WB")))
 
 
 def test_the_truth_is_accurate() -> None:
@@ -147,7 +146,7 @@ def test_every_kind_has_a_meaning() -> None:
 
 def test_the_natural_time() -> None:
     """It is the period 2π/(√(2/7) V0/c) of z."""
-    assert natural_time(rolling_ball(SCENE)) == pytest.approx(2 * math.pi / (math.sqrt(2 / 7) * 20.0))
+    assert SCENE.elements[0].natural_time == pytest.approx(2 * math.pi / (math.sqrt(2 / 7) * 20.0))
 
 
 @pytest.mark.parametrize(("after", "failure"), [(1.0, None), (-0.002, None), (-0.2, "reversed")])
@@ -155,7 +154,7 @@ def test_resistance_does_not_drive_a_ball_back(after: float, failure: str | None
     """A ball that resistance drives back has been reversed; the little that a step goes too far is none."""
     scene = load_scene("sphere_in_cylinder", rolling_resistance=5e-4)
     known = truth(scene, TIMES)
-    run = known.assign(v_WB=known["v_WB"] * np.where(LATE, after, 1.0))
+    run = known.assign(v_WB=known["v_WB"] * np.where(LATE[:, None], after, 1.0))
     outcome = run_outcome(DONE, run, Yardstick.of(scene, known))
     assert (outcome.failure, outcome.stable, outcome.silent) == (failure, failure is None, failure is not None)
 

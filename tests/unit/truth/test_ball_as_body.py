@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from balls_as_bodies import as_bodies
 from closed_balls import FORMS
 
 from proofroll.core.events import events_of
 from proofroll.core.truth import truth
+from proofroll.files.scene_file import load_scene
 
 FIELDS = ("p_WB", "v_WB", "w_WB")
 ROUND_OFF = 1e-12  # s: least distance of the brackets of two events that counts
@@ -36,7 +36,7 @@ CLOSED = [case for case in FROZEN if case["scene"] in FORMS and FORMS[case["scen
 @pytest.mark.parametrize("case", CASES)
 def test_a_ball_read_as_a_body_moves_as_its_frozen_values_say(case: dict[str, Any]) -> None:
     """Position, velocity, spin and events agree within the sum of both error bars, and no bar is wide."""
-    found = truth(as_bodies(case["scene"], **case["parameters"]), np.array([0.0, *case["times"]]))
+    found = truth(load_scene(case["scene"], **case["parameters"]), np.array([0.0, *case["times"]]))
     for field in FIELDS:
         values, bar = found[field].sel(body="ball").to_numpy()[1:], float(found[field].attrs["error_bar"])
         apart, frozen = np.abs(values - np.array(case[field])).max(), case["bars"][field]

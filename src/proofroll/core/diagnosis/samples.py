@@ -212,7 +212,7 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
     )
     def test(evidence: Evidence) -> Iterator[Cause]:
         pair = run_and_truth(evidence)
-        if pair is None or "q_WB" not in pair[0]:
+        if pair is None or any("q_WB" not in run for run in pair):
             return
         reported, true = pair[0]["q_WB"].to_numpy(), true_ones(evidence)
         if reported.shape != true.shape or moves_otherwise(evidence, "q_WB"):

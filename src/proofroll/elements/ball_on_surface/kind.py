@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
@@ -15,14 +14,11 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, units_of, validated
-from proofroll.elements.ball_on_surface.element import BallOnSurface, rolls_evenly, scene_with
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, surface_kinds
 from proofroll.elements.mechanism.run.balls import BallTables, PlacedBall, ball_as_body, placed_balls
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 
 if TYPE_CHECKING:
-    from proofroll.core.diagnosis import Hypothesis
-
     AnySurface = Any
 else:
     AnySurface = Union[surface_kinds()]  # noqa: UP007 -- of a tuple
@@ -47,61 +43,31 @@ class BallOnSurfaceKind:
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[Element]:
-        """Elements of a file: one for each contact, with the ball, the surface and the start that it names."""
-        elements = list[Element]()
-        for placed in _placed(tables, numbers, where):
-            ball, surface, contact, start, _ = placed
-            if rolls_evenly(surface, contact, start, gravity.vector):
-                elements.append(
-                    BallOnSurface(ball=ball, surface=surface, contact=contact, start=start, gravity=gravity)
-                )
-            else:
-                elements.append(ball_as_body(placed, gravity, where))
-        return elements
+        """See :func:`proofroll.elements.mechanism.run.balls.ball_as_body`: a mechanism for each contact."""
+        return [ball_as_body(placed, gravity, where) for placed in _placed(tables, numbers, where)]
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
-        """Scenes without zero or symmetric values: smooth motions first, the most demanding first among them."""
-        from proofroll.files.scene_file import load_scene
-
-        cylinder = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
-        return {
-            "cylinder-resisting": load_scene("sphere_in_cylinder", **cylinder, rolling_resistance=5e-4),
-            "cylinder": load_scene("sphere_in_cylinder", **cylinder),
-            "cylinder-oriented": load_scene("sphere_in_cylinder", **cylinder, asks=("orientation",)),
-        }
+        """None: a ball is a mechanism, and :class:`.MechanismKind` has them."""
+        return {}
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
         """Scenes turned about the axis, spinning; slow, fast."""
-        scenes = BallOnSurfaceKind.conformance_scenes()
-        return {
-            "slow": _moving(scenes["cylinder-resisting"], -1.0, velocity=(1.2, 0.2), spin=5.0),
-            "fast": _moving(scenes["cylinder"], 2.0, velocity=(4.5, -0.7)),
-        }
-
-    @staticmethod
-    def hypotheses() -> Sequence[Hypothesis]:
-        """See :class:`proofroll.core.diagnosis.ExplainsRuns`."""
-        from proofroll.elements.ball_on_surface.diagnosis import HYPOTHESES
-
-        return HYPOTHESES
+        slow = InitialMotion("ball", (-1.0, 0.1), (1.2, 0.2), spin=5.0)
+        fast = InitialMotion("ball", (2.0, 0.1), (4.5, -0.7), spin=12.0)
+        return {"slow": _rolling(slow, 5e-4), "fast": _rolling(fast, 0.0)}
 
 
-def _moving(scene: Scene, gamma: float, **motion: Any) -> Scene:
-    """Copy of a scene that starts with this motion at the angle ``gamma`` [rad]."""
-    (element,) = scene.elements
-    assert isinstance(element, BallOnSurface)
-    return scene_with(scene, start=dataclasses.replace(element.start, coordinates=(gamma, 0.1), **motion))
-
-
-class BallsAsBodies(BallOnSurfaceKind):
-    """The same tables read as mechanisms, one for each ball: the kind to announce once engines have all walls."""
-
-    @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[Element]:
-        """See :func:`proofroll.elements.mechanism.run.balls.ball_as_body`."""
-        return [ball_as_body(placed, gravity, where) for placed in _placed(tables, numbers, where)]
+def _rolling(start: InitialMotion, rolling_resistance: float) -> Scene:
+    """Scene of a ball that rolls in an upright cylinder [SI]."""
+    placed = PlacedBall(
+        Ball("ball", radius=0.025, mass=0.517),
+        Cylinder("wall", radius=0.225),
+        Contact("ball", "wall", rolling_resistance=rolling_resistance),
+        start,
+    )
+    return Scene("rolling_ball", "", (ball_as_body(placed, Gravity(9.81), "scene"),))
 
 
 def _placed(tables: Mapping[str, Any], numbers: Parameters, where: str) -> list[PlacedBall]:

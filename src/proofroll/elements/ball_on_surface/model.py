@@ -1,30 +1,23 @@
-"""A ball on its surface in the form that engines use, and the capabilities that it may need."""
+"""A ball on its wall in the form that its own formulations use, and what they provide."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import ClassVar
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment
 from proofroll.elements.mechanism.scene.balls import Ball, Contact
 
-
-class BallCapability(StrEnum):
-    """Capability that a ball on a surface may need of a formulation; the value is a text for a person."""
-
-    ROLLING = "rolling without slip"
-    ROLLING_RESISTANCE = "rolling resistance"
-    ORIENTATION = "the ball's orientation"
-
-
-ROLLS: frozenset[str] = frozenset({BallCapability.ROLLING, BallCapability.ROLLING_RESISTANCE})
-ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability)
+_CAPABILITY = MechanismCapability
+# What a formulation of one ball provides that rolls in an upright cylinder, without and with its orientation.
+ROLLS: frozenset[str] = frozenset({_CAPABILITY.CONTACT, _CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION})
+ALL_OF_A_BALL: frozenset[str] = ROLLS | {_CAPABILITY.ORIENTATION}
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Regularised, Sample
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +39,10 @@ class BallBuilt:
         angular_acceleration: of the ball at time 0 in the world [rad/s²], shape (3,).
         terms: optional terms in the built model: rolling resistance, orientation.
         regularised: names of certificate quantities (``gap``, ``slip``, ``spin``, ``acceleration``, ``N``, ``F2``, …)
-            that the model softens, with tolerance and reason, up to the caps of :data:`certificate.CAPS`: mass,
-            inertia, gravity, radius and position along the wall are never soft. Tolerances of acceleration, N, F2 and
-            F3 are relative to :func:`mechanics.natural_acceleration`. A tolerance of ``1 / static friction``, for an
-            engine that needs a number where the scene has no bound, is one of 1/mu.
+            that the model softens, with tolerance and reason; mass, inertia, gravity, radius and position along the
+            wall are never soft. Tolerances of acceleration, N, F2 and F3 are relative to
+            :func:`mechanics.natural_acceleration`. A tolerance of ``1 / static friction``, for an engine that needs a
+            number where the scene has no bound, is one of 1/mu.
     """
 
     mass: float | None = None
@@ -64,5 +64,6 @@ def terms_held(*, resists: object, turns: object = False) -> frozenset[str]:
 
     ``resists``: rolling resistance; ``turns``: orientation of the ball.
     """
-    required = {"ROLLING_RESISTANCE": resists, "ORIENTATION": turns}
-    return frozenset(BallCapability[name] for name, is_there in required.items() if is_there)
+    capability = MechanismCapability
+    there = {capability.TURNING_FRICTION: bool(resists), capability.ORIENTATION: bool(turns)}
+    return frozenset(need for need, is_there in there.items() if is_there)

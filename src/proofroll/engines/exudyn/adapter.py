@@ -1,11 +1,8 @@
 """Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
 
-It has no joint for a sphere on a curved wall. Four formulations of one are built from its items: :mod:`generic`,
-:mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all but the first
-the ball is a rigid body; its orientation is always in the model, as Euler parameters of its node.
-
 Mechanisms are bodies in redundant coordinates (:mod:`redundant`), with contacts of spheres (:mod:`spheres`) or discs
-that roll (:mod:`discs`), or its kinematic tree (:mod:`tree`).
+that roll (:mod:`discs`), or its kinematic tree (:mod:`tree`). It has no joint for a sphere that rolls on a curved wall:
+:mod:`carrier` and :mod:`rolling_disc` build one from its items.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +12,7 @@ from typing import Any, ClassVar
 from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.exudyn.ball import formulations as ball
@@ -59,7 +56,6 @@ class Exudyn:
         "discs": frozenset({MechanismCapability.UNBOUNDED_FRICTION}),
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        **ball.LACKING,
         "redundant": redundant.LACKING,
         "spheres": spheres.LACKING,
         "discs": discs.LACKING,
@@ -68,10 +64,8 @@ class Exudyn:
     settings: ClassVar[type[ExudynSettings]] = ExudynSettings
     presets: ClassVar[Mapping[str, Mapping[str, ExudynSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
-        "generic": Level.CONSTRAINT,
         "carrier": Level.CONSTRAINT,
         "rolling_disc": Level.CONSTRAINT,
-        "contact": Level.CONTACT,
         "redundant": Level.CONSTRAINT,
         "spheres": Level.CONTACT,
         "discs": Level.CONSTRAINT,
@@ -80,14 +74,14 @@ class Exudyn:
     terms: ClassVar[Sequence[Term]] = (
         Term(
             name="new Jacobian at every step",
-            formulations=("carrier", "rolling_disc", "contact", "redundant", "spheres", "discs"),
+            formulations=("carrier", "rolling_disc", "redundant", "spheres", "discs"),
             on={"jacobian": "step"},
             off={"jacobian": "reused"},
             because="lets Newton's method end after two or three iterations where an old Jacobian needs seven",
         ),
         Term(
             name="halving of steps",
-            formulations=("contact", "spheres"),
+            formulations=("spheres",),
             on={"halvings": 10},
             off={"halvings": 0},
             because="goes on where Newton's method fails at the edge of the friction zone",
@@ -135,7 +129,7 @@ class Exudyn:
         return defaults
 
     @classmethod
-    def build(cls, scene: Scene, settings: ExudynSettings) -> ExudynModel:
+    def build(cls, scene: Scene, settings: ExudynSettings) -> ExudynModel | RunOnBody:
         """See :class:`proofroll.core.engine.Engine`; builds a run of the formulation."""
         if settings.formulation in _WITH_FRAMES and not hasattr(exu, "HT"):
             raise Refused(
@@ -144,7 +138,7 @@ class Exudyn:
         if settings.formulation in OF_MECHANISMS:
             return OF_MECHANISMS[settings.formulation](scene, settings)
         require_provided(cls, settings.formulation, scene)
-        return ball.RUNS[settings.formulation](rolling_ball(scene), settings)
+        return on_body(ball.RUNS[settings.formulation](rolling_ball(scene), settings), scene)
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:

@@ -72,7 +72,6 @@ class Integration:
 
     Attributes:
         t: present time [s].
-        complaint: reason for which a user function of the system ended the run.
     """
 
     def __init__(
@@ -98,7 +97,6 @@ class Integration:
         self._again: Callable[[float], Integration] = lambda t: Integration(
             system, settings, at=t, dependent=dependent, mass=mass, moved=moved
         )
-        self.complaint: str | None = None
         self.dt = settings.dt
         self.system = system
         self.options = simulation_settings(settings, dependent=dependent, mass=mass)
@@ -150,8 +148,6 @@ class Integration:
         reached = self.solver.it.currentTime
         if self.solver.output.simulationStoppedByUserFunction:
             self.t = reached
-            if self.complaint:
-                raise Diverged(f"{self.complaint} at {reached:g} s")
             return
         # It also reports success when it stopped early, e.g. because exudyn.special.solver.timeout was reached.
         if not done or abs(reached - t) > 0.5 * self.dt:

@@ -15,12 +15,11 @@ class ExudynSettings:
     """Settings of Exudyn: model of the scene and integration. A setting that would do nothing is None.
 
     Attributes:
-        formulation: ``generic`` (minimal coordinates and multipliers), ``carrier`` (rigid ball on a massless carrier,
-            built-in joints only), ``rolling_disc`` (the engine's rolling-disc joint, re-aimed at every iterate) or
-            ``contact`` (its contact with a hollow sphere that follows the ball; penalty and regularised friction); of
-            mechanisms: ``redundant`` (bodies in redundant coordinates, joints as constraints), ``spheres`` (the same
-            with its penalty contacts of spheres), ``discs`` (with its rolling-disc joint for circles on planes) or
-            ``tree`` (its kinematic tree in joint coordinates).
+        formulation: of a ball that rolls in a cylinder: ``carrier`` (rigid ball on a massless carrier, built-in joints
+            only) or ``rolling_disc`` (the engine's rolling-disc joint, re-aimed at every iterate); of mechanisms:
+            ``redundant`` (bodies in redundant coordinates, joints as constraints), ``spheres`` (the same with its
+            penalty contacts of spheres), ``discs`` (with its rolling-disc joint for circles on planes) or ``tree`` (its
+            kinematic tree in joint coordinates).
         preset: name of the preset that supplies the other values.
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
@@ -32,26 +31,22 @@ class ExudynSettings:
             ignore it and ``jacobian``.
         jacobian: ``reused`` while Newton's method contracts, or computed anew at every ``step``.
         halvings: number of times a step is halved where Newton's method fails, before the run ends. With 0, and in
-            formulations other than ``contact`` and ``spheres``, all steps are dt.
-        stiffness: stiffness of the normal force [N/m]; this and the next: ``contact`` and ``spheres`` only.
-        friction_zone: slip velocity up to which friction is proportional to it [m/s].
-        grip: coefficient that stands for unbounded friction [1]; the ball creeps by friction_zone |F| / (grip N).
-            ``contact`` only; ``spheres`` have 100, with a friction_zone as much wider.
+            formulations other than ``spheres``, all steps are dt.
+        stiffness: stiffness of the normal force [N/m]; this and the next: ``spheres`` only.
+        friction_zone: slip velocity up to which friction is proportional to it [m/s]. For unbounded friction there is a
+            coefficient of 100, with a zone as much wider.
     """
 
-    formulation: Literal["generic", "carrier", "rolling_disc", "contact", "redundant", "spheres", "discs", "tree"] = (
-        "generic"
-    )
+    formulation: Literal["carrier", "rolling_disc", "redundant", "spheres", "discs", "tree"] = "carrier"
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-4
     integrator: Literal["generalized_alpha", "trapezoidal_index2", "rk44", "rk67"] = "trapezoidal_index2"
     spectral_radius: Annotated[float, Interval(ge=0, le=1)] | None = None
-    newton_tolerance: Annotated[float, Interval(gt=0, lt=1)] = 1e-11
+    newton_tolerance: Annotated[float, Interval(gt=0, lt=1)] = 1e-10
     jacobian: Literal["reused", "step"] = "step"
     halvings: Annotated[int, Interval(ge=0, le=20)] | None = None
     stiffness: Annotated[float, Gt(0)] | None = None
     friction_zone: Annotated[float, Gt(0)] | None = None
-    grip: Annotated[float, Gt(0)] | None = None
 
     resolution: ClassVar[str] = "dt"
 
@@ -74,9 +69,9 @@ class ExudynSettings:
             self._has_no("spectral_radius", "the trapezoidal rule has no damping; set integrator=generalized_alpha")
         if self.integrator in EXPLICIT:
             self._has_no("spectral_radius", "explicit integrators have no damping; leave it out")
-        for name in CONTACT_ONLY["contact"]:
-            if name not in CONTACT_ONLY.get(self.formulation, ()):
-                self._has_no(name, f"{self.formulation} does not use it; set formulation=contact")
+        for name in _OF_CONTACT:
+            if self.formulation != "spheres":
+                self._has_no(name, f"{self.formulation} does not use it; set formulation=spheres")
             elif getattr(self, name) is None:
                 raise InputError(f"exudyn: {name}", None, f"formulation={self.formulation} needs a number")
 
@@ -90,29 +85,22 @@ class ExudynSettings:
         object.__setattr__(self, name, None)
 
     @property
-    def penalty(self) -> tuple[float, float, float]:
-        """Stiffness [N/m], friction zone [m/s] and grip [1] of the contact; grip 0 for ``spheres``, which have none."""
+    def penalty(self) -> tuple[float, float]:
+        """Stiffness [N/m] and friction zone [m/s] of the contact."""
         assert self.stiffness is not None  # see __post_init__, here and below
         assert self.friction_zone is not None
-        return self.stiffness, self.friction_zone, self.grip or 0.0
+        return self.stiffness, self.friction_zone
 
 
 # Explicit integrators, and their order.
 EXPLICIT = {"rk44": 4, "rk67": 6}
-# Settings that belong to formulations with a penalty contact only.
-CONTACT_ONLY: Mapping[str, tuple[str, ...]] = {
-    "contact": ("halvings", "stiffness", "friction_zone", "grip"),
-    "spheres": ("halvings", "stiffness", "friction_zone"),
-}
-
-
-# More than any scene needs to roll; the larger it is, the steeper friction rises inside its zone.
-GRIP = 10.0
+# Settings of the penalty contact.
+_OF_CONTACT = ("halvings", "stiffness", "friction_zone")
 
 # ``default`` is Exudyn's own choice of integrator, damping and Newton options at a common step of 1e-3 s. Exudyn's own
 # step, a hundredth of the simulated time, would be 1e-2 s for one second, in which the ball turns by 1.6 rad. So
-# ``default`` shows those options, not a script that sets no step. Of the formulations for balls, only ``contact`` has
-# Exudyn's adaptive step: see ``simulation_settings``.
+# ``default`` shows those options, not a script that sets no step. Only ``spheres`` have Exudyn's adaptive step: see
+# ``simulation_settings``.
 # The tolerance of 1e-8 matters: with rolling resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise of
 # 0.3 N in the carrier's F2. With rigid bodies, ρ = 0.9 stops being stable where the ball turns by more than about 0.3
 # rad per step.
@@ -133,11 +121,6 @@ _DAMPED: Mapping[str, Any] = {
     "newton_tolerance": 1e-10,
     "jacobian": "step",
 }
-# The trapezoidal rule is the one that does not chatter at the edge of the zone. Newton's method cannot always pass that
-# edge within a step, which is then halved. Round-off, magnified by the contact, is larger than what a tighter tolerance
-# would ask for.
-_FINE: Mapping[str, Any] = {**_VELOCITIES, "dt": 1e-4, "jacobian": "step"}
-_STIFF: Mapping[str, Any] = {**_FINE, **_PENALTY, "friction_zone": 1e-5, "grip": GRIP}
 
 PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
     formulation: {
@@ -145,16 +128,10 @@ PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
         for preset, values in presets.items()
     }
     for formulation, presets in dict[str, dict[str, Mapping[str, Any]]](
-        generic={
-            "default": _OWN,
-            # Constant constraint matrix: the undamped trapezoidal rule is exact in the constraints, and its multipliers
-            # start consistent, so that they do not ring. The Jacobian barely changes.
-            "matched": {**_FINE, "newton_tolerance": 1e-11, "jacobian": "reused"},
-        },
         carrier={
             "default": _OWN,
             # A new Jacobian at every step costs less than the seven iterations per step that an old one needs.
-            "matched": {**_FINE, "newton_tolerance": 1e-10},
+            "matched": {**_VELOCITIES, "dt": 1e-4, "jacobian": "step", "newton_tolerance": 1e-10},
             # Index 3 keeps the gap closed to round-off (index 2 lets it open by 1e-7 m), slips less and is a little
             # more accurate without rolling resistance. ρ = 0.8 damps the multipliers enough to stay stable up to half a
             # radian of spin per step (0.9: up to 0.3) at the price of a tenth more energy error; 0.6 costs twice the
@@ -167,14 +144,6 @@ PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
             # step: the damping of generalized-alpha keeps them quiet (ρ as above), the trapezoidal rule lets them ring
             # (F2 is off by 1e-3 N instead of 2e-5 N, and z by twice as much).
             "matched": _DAMPED,
-        },
-        contact={
-            # The ball creeps by up to 1e-3 m/s, and at a grazing onset the damped integrator leaves the zone too late.
-            "default": {**_OWN, **_PENALTY, "grip": GRIP},
-            # A hundredth of the default's creep.
-            "matched": {**_STIFF, "stiffness": 1e7},
-            # Stiffer: as N falls, the ball comes out of the wall by N/k, and its angle runs away by N/(k c) of its way.
-            "tuned": {**_STIFF, "stiffness": 1e8},
         },
         redundant={
             "default": _OWN,

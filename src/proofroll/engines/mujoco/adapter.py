@@ -10,6 +10,7 @@ from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.mujoco.ball import run as ball
@@ -45,8 +46,6 @@ class Mujoco:
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
         "chart": Level.CONTACT,
-        "free": Level.CONTACT,
-        "facets": Level.FACETS,
         "joints": Level.CONSTRAINT,
         "geoms": Level.CONTACT,
     }
@@ -79,12 +78,12 @@ class Mujoco:
         return defaults | {f"geom {name}": np.asarray(getattr(model, f"geom_{name}")[0]).tolist() for name in geom}
 
     @classmethod
-    def build(cls, scene: Scene, settings: MujocoSettings) -> ball.MujocoBall | MujocoMechanism:
+    def build(cls, scene: Scene, settings: MujocoSettings) -> RunOnBody | MujocoMechanism:
         """See :class:`proofroll.core.engine.Engine`; ``joints`` and ``geoms`` build a run of a mechanism."""
         if settings.formulation in _MECHANISMS:
             return _MECHANISMS[settings.formulation](scene, settings)
         require_provided(cls, settings.formulation, scene)
-        return ball.MujocoBall.of(scene, settings)
+        return on_body(ball.MujocoBall.of(scene, settings), scene)
 
     @classmethod
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:

@@ -1,18 +1,17 @@
 """Settings of MuJoCo, the presets of each formulation, and the terms of its model that a setting switches."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import mujoco
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le
 from pydantic import BeforeValidator
 
 from proofroll.core.engine import Scheme
 from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import InputError, Refused, refuse_first
 from proofroll.core.plugins import release
-from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.run.capabilities import ALL_LOOPS, MechanismCapability
 
 # MuJoCo's defaults: step [s], friction, solref [s], solimp (dmin, dmax).
@@ -37,15 +36,13 @@ POSITIONS_TIME_CONSTANT = 2.25
 # contact by the square of the coefficient: at 100 the ball flies through the wall without a warning.
 UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
-# Settings of a contact; the formulation ``joints`` has none of them.
-_OF_CONTACT = ("cone", "friction", "friction_damping", "start", "curvature", "condim")
-# Settings of mechanisms alone; formulations of mechanisms, and those of the settings above that each has.
-_OF_JOINTS = ("damping_armature",)
-_OF_GEOMS = ("cone_correction",)
-OF_MECHANISMS: Mapping[str, tuple[str, ...]] = {
-    "joints": _OF_JOINTS,
-    "geoms": (*_OF_JOINTS, *_OF_GEOMS, "cone", "curvature"),
+# Settings that not every formulation has, by formulation.
+_OWN: Mapping[str, tuple[str, ...]] = {
+    "chart": ("cone", "friction", "start", "condim"),
+    "joints": ("damping_armature",),
+    "geoms": ("damping_armature", "cone_correction", "cone", "curvature"),
 }
+_SOME = tuple(dict.fromkeys(name for names in _OWN.values() for name in names))
 
 
 def _digits_as_number(value: object) -> object:
@@ -58,11 +55,10 @@ class MujocoSettings:
     """Formulation, time step and the options of contact that matter for rolling.
 
     Attributes:
-        formulation: ``free``: a free ball and a plane that is re-posed tangent to the wall before each step;
-            ``chart``: the ball on joints that follow the surface's coordinates, with the same plane re-posed at each
-            evaluation of the forces; ``facets``: a free ball in a ring of boxes; ``joints``: a mechanism of MuJoCo's
-            joints, tendons and equality constraints, which has no contact and none of its options; ``geoms``: the same
-            with contacts between bodies.
+        formulation: ``chart``: a ball on joints that follow the cylinder's coordinates, and a plane that is re-posed
+            tangent to the wall at each evaluation of the forces; ``joints``: a mechanism of MuJoCo's joints, tendons
+            and equality constraints, which has no contact and none of its options; ``geoms``: the same with contacts
+            between bodies.
         preset: source of the other values.
         dt: step [s].
         integrator: MuJoCo's name of it.
@@ -72,14 +68,10 @@ class MujocoSettings:
         impedance: constant constraint impedance (``solimp``); 1 would be a rigid contact; None: MuJoCo's default,
             0.9 to 0.95 growing with depth.
         friction: coefficient that stands for unbounded friction [1]; with less than the scene needs, the ball slips.
-        friction_damping: of the slip, in units of 1/dt (``solreffriction`` of a contact pair in its direct format);
-            None: as in the normal direction. An Euler step moves the ball with the velocity at its end, along the wall
-            at its beginning, which makes it creep; at a damping of 2/dt, the limit of stability, that creep cancels the
-            creep from the missing J̇v (``free`` only).
         start: ``touching``: at depth zero, where a soft contact is not loaded yet; ``settled``: at the depth at which
             the contact already bends the path as the wall does.
         curvature: True if the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
-            out (``free``, and ``geoms`` on curved walls).
+            out (``geoms`` on curved walls).
         cone_correction: True if the adapter takes from the contacts' reference accelerations the lift that MuJoCo's
             convex cone gives to what slips, and the lift by the missing J̇v (``geoms``).
         condim: dimensions of the contact's friction: 3 slides; 4 also resists turning about the normal, 6 also rolling,
@@ -88,7 +80,7 @@ class MujocoSettings:
             implicit damping: the same step without contact, and contacts see it (``joints``, ``geoms``).
     """
 
-    formulation: Literal["free", "chart", "facets", "joints", "geoms"] = "chart"
+    formulation: Literal["chart", "joints", "geoms"] = "chart"
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-3
     integrator: Literal["Euler", "RK4", "implicitfast"] = "RK4"
@@ -96,7 +88,6 @@ class MujocoSettings:
     time_constant: Annotated[float, Ge(SHORTEST_TIME_CONSTANT)] | None = SHORTEST_TIME_CONSTANT
     impedance: Annotated[float, Ge(SMALLEST_IMPEDANCE), Le(LARGEST_IMPEDANCE)] | None = LARGEST_IMPEDANCE
     friction: Annotated[float, Gt(0)] = UNBOUNDED_FRICTION
-    friction_damping: Annotated[float, Gt(0), Lt(2)] | None = None
     start: Literal["touching", "settled"] = "settled"
     curvature: bool = False
     cone_correction: bool = False
@@ -111,27 +102,24 @@ class MujocoSettings:
     @property
     def unused(self) -> tuple[str, ...]:
         """See :class:`proofroll.core.engine.Settings`."""
-        fields_of = OF_MECHANISMS.get(self.formulation, _OF_CONTACT)
-        return tuple(name for name in (*_OF_CONTACT, *_OF_JOINTS, *_OF_GEOMS) if name not in fields_of)
+        return tuple(name for name in _SOME if name not in _OWN[self.formulation])
 
     @property
     def order(self) -> int | None:
         """Measured order of convergence; :func:`lowered` has the capabilities of a scene that lower it.
 
         Of mechanisms it is 4 with RK4. A chart with a fixed time constant is a smooth spring, and its limit no hard
-        contact: RK4 has its order for turning bodies there. Other charts, and contacts with J̇v, have 2; all else has 1.
+        contact: RK4 has its order for turning bodies there. Other charts have 2.
         """
-        if self.formulation in OF_MECHANISMS:
+        if self.formulation != "chart":
             return 4 if self.integrator == "RK4" else 1
-        if self.time_constant is None and self.formulation == "chart":
+        if self.time_constant is None:
             return ORDER_OF_TURNING if self.integrator == "RK4" else 1
-        return 2 if self.curvature or self.formulation == "chart" else 1
+        return 2
 
     @property
     def scheme(self) -> Scheme | str:
         """See :class:`proofroll.core.engine.Settings`; Euler and implicitfast move positions with the new velocity."""
-        if self.curvature and self.formulation == "free":
-            return Scheme.LEAPFROG
         return {"RK4": Scheme.RK4, "Euler": Scheme.SEMI_IMPLICIT_EULER}.get(self.integrator, self.integrator)
 
     @property
@@ -200,8 +188,8 @@ def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     Soft constraints (every loop, dry friction) leave velocities of first order. The torque of rolling resistance uses a
     normal force that is extrapolated linearly in time.
     """
-    if settings.formulation not in OF_MECHANISMS:
-        return {BallCapability.ROLLING_RESISTANCE: 2}
+    if settings.formulation == "chart":
+        return {MechanismCapability.TURNING_FRICTION: 2}
     turning: dict[str, int] = dict.fromkeys((MechanismCapability.SPHERICAL, MechanismCapability.FREE), ORDER_OF_TURNING)
     return turning | dict.fromkeys((*ALL_LOOPS, *_FIRST_ORDER), 1)
 
@@ -212,18 +200,19 @@ def check(settings: MujocoSettings) -> None:
     Raises:
         InputError: the first such combination.
     """
-    of_mechanism = settings.formulation in OF_MECHANISMS
-    rules = _rules_of_mechanism(settings) if of_mechanism else _rules_of_contact(settings)
-    refuse_first("mujoco", settings, rules)
+    refuse_first("mujoco", settings, _rules(settings))
     if settings.own_share >= 1:
         # MuJoCo's damping would supply all of J̇v or more of it: nothing is left to add.
         advice = f"curvature=true needs impedance times time_constant above 1, not {1 / settings.own_share:.4g}"
         raise InputError("mujoco: impedance", settings.impedances[1], advice)
 
 
-def _rules_of_mechanism(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
+def _rules(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
     plain, formulation = MujocoSettings(settings.formulation), settings.formulation
     reason = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
+    soft = settings.cone == "pyramidal" and settings.friction > LARGEST_PYRAMIDAL_FRICTION and formulation == "chart"
+    advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
+    yield soft, "friction", advice
     for name in settings.unused:
         yield getattr(settings, name) != getattr(plain, name), name, f"{reason}; leave it out"
     # The other integrators have the implicit damping of their own, or none.
@@ -233,31 +222,6 @@ def _rules_of_mechanism(settings: MujocoSettings) -> Iterator[tuple[bool, str, s
         # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
         yield settings.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"
         yield settings.cone == "pyramidal", "cone", "cone_correction=true of a mechanism needs cone=elliptic"
-    yield from _rules_of_curvature(settings)
-
-
-def _rules_of_contact(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
-    formulation, curvature, is_free = settings.formulation, settings.curvature, settings.formulation == "free"
-    pyramidal, unused = settings.cone == "pyramidal", f"{formulation} does not use it; set formulation=free"
-    soft = pyramidal and settings.friction > LARGEST_PYRAMIDAL_FRICTION
-    advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
-    yield soft, "friction", advice
-    yield settings.cone_correction, "cone_correction", "a ball that rolls does not slip; leave it out"
-    yield settings.damping_armature, "damping_armature", "a ball has no joints with dampers; leave it out"
-    if settings.friction_damping is not None:
-        # MuJoCo asks no contact filter about a pair, so the chart's plane would stay; facets has a pair for each box.
-        yield not is_free, "friction_damping", unused
-        # MuJoCo ignores it with a pyramidal cone, whose rows mix normal and friction.
-        yield pyramidal, "friction_damping", "it needs cone=elliptic"
-        # The part of J̇v that the adapter adds is computed with the damping of the normal direction.
-        yield curvature, "friction_damping", "curvature=true sets this for the slip; leave it out"
-    if settings.condim > SLIDES:
-        yield curvature, "condim", "curvature=true is made for sliding alone; set condim=3"
-    yield curvature and not is_free, "curvature", unused
-    yield from _rules_of_curvature(settings)
-
-
-def _rules_of_curvature(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
     if settings.curvature:
         yield settings.integrator != "Euler", "integrator", "curvature=true needs integrator=Euler"
         # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
@@ -273,41 +237,22 @@ def check_restitution(settings: MujocoSettings) -> None:
         )
 
 
-def _obvious(formulation: Literal["chart", "free", "facets"]) -> MujocoSettings:
-    """Settings of a model whose author leaves every option at MuJoCo's default."""
-    return MujocoSettings(
-        formulation,
-        "default",
-        dt=DEFAULT_STEP,
-        integrator="Euler",
-        cone="pyramidal",
-        time_constant=None,
-        impedance=None,
-        friction=DEFAULT_FRICTION,
-        start="touching",
-    )
-
-
 PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
     "chart": {
         # Coordinates and integrator belong to the formulation; only the contact has MuJoCo's defaults.
-        "default": replace(_obvious("chart"), integrator="RK4"),
+        "default": MujocoSettings(
+            "chart",
+            "default",
+            dt=DEFAULT_STEP,
+            cone="pyramidal",
+            time_constant=None,
+            impedance=None,
+            friction=DEFAULT_FRICTION,
+            start="touching",
+        ),
         # In these coordinates J̇v vanishes, so documented options are also the best known ones.
         "matched": MujocoSettings("chart", "matched"),
     },
-    "free": {
-        "default": _obvious("free"),
-        # The shortest time constant and the largest impedance that MuJoCo allows, the options that its documentation
-        # names for a hard contact. What is left is the missing J̇v: V²/c in the normal direction sinks the ball,
-        # a ω1 V/c lets it creep, both in proportion to the time constant and so to dt. friction_damping, documented
-        # too but for contact pairs alone, reduces the creep; it is an option, not part of this preset.
-        "matched": MujocoSettings("free", "matched", integrator="Euler"),
-        # J̇v is put where MuJoCo would have computed it: an edit of mjData.efc_aref that its manual does not describe.
-        "tuned": MujocoSettings("free", "tuned", integrator="Euler", curvature=True),
-    },
-    # Better options do not rescue it, since each edge between two boxes is a kick: 0.3 m off instead of 1.2 m in 2 s,
-    # whatever the step. It shows what the obvious wall costs.
-    "facets": {"default": _obvious("facets")},
     "joints": {
         # Loops are springs of 0.02 s, whatever the step.
         "default": MujocoSettings(
@@ -344,7 +289,7 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
 TERMS = (
     Term(
         name="friction against turning (condim 4)",
-        formulations=("chart", "free"),
+        formulations=("chart",),
         on={"condim": TURNS},
         off={"condim": SLIDES},
         because="resists the spin about the normal, which decides the ball's motion on a curved wall",
@@ -352,7 +297,7 @@ TERMS = (
     ),
     Term(
         name="friction against turning and rolling (condim 6)",
-        formulations=("chart", "free"),
+        formulations=("chart",),
         on={"condim": ROLLS},
         off={"condim": SLIDES},
         because="looks like rolling resistance, but sliding, turning and rolling share one cone",
@@ -360,23 +305,9 @@ TERMS = (
     ),
     Term(
         name="settled start",
-        formulations=("chart", "free"),
+        formulations=("chart",),
         on={"start": "settled"},
         off={"start": "touching"},
         because="starts the soft contact at the depth at which it already bends the path as the wall does",
-    ),
-    Term(
-        name="curvature (J̇v)",
-        formulations=("free",),
-        on={"curvature": True},
-        off={"curvature": False},
-        because="adds to the contact's rows the turning of the normal, which MuJoCo leaves out",
-    ),
-    Term(
-        name="damping of the slip",
-        formulations=("free",),
-        on={"friction_damping": 1.9},
-        off={"friction_damping": None},
-        because="lets the creep of the step cancel that of the missing J̇v",
     ),
 )

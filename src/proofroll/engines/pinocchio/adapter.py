@@ -9,6 +9,7 @@ from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunOnBody
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.pinocchio.ball import formulations as ball
@@ -19,7 +20,7 @@ from proofroll.engines.pinocchio.smooth import constraint_dynamics, joint_tree
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
 
 # Before 4.0 the constraints had other signatures and other results.
-_OF_PINOCCHIO_4 = {"contact", "constraint_dynamics", "impulses"}
+_OF_PINOCCHIO_4 = {"constraint_dynamics", "impulses"}
 
 
 class Pinocchio:
@@ -48,8 +49,6 @@ class Pinocchio:
     presets: ClassVar[Mapping[str, Mapping[str, PinocchioSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
         "composite": Level.CONSTRAINT,
-        "free_flyer": Level.CONSTRAINT,
-        "contact": Level.CONTACT,
         "null_space": Level.CONSTRAINT,
         "constraint_dynamics": Level.CONSTRAINT,
         "impulses": Level.CONTACT,
@@ -57,7 +56,7 @@ class Pinocchio:
     terms: ClassVar[Sequence[Term]] = (
         Term(
             name="orientation",
-            formulations=("composite", "free_flyer"),
+            formulations=("composite",),
             on={"orientation": True},
             off={"orientation": False},
             because="turns the ball's own axes; its inertia is the same about all of them, so the motion does not "
@@ -65,20 +64,12 @@ class Pinocchio:
         ),
         Term(
             name="projection",
-            formulations=("composite", "free_flyer", "null_space", "constraint_dynamics"),
+            formulations=("composite", "null_space", "constraint_dynamics"),
             on={"projection": True},
             off={"projection": False},
             because="puts the state back on the constraints after each step",
         ),
-        Term(
-            name="turning of the plane",
-            formulations=("contact",),
-            on={"integrator": "leapfrog"},
-            off={"integrator": "semi_implicit_euler"},
-            because="gives the solver the rate at which the contact's plane turns during a step",
-        ),
     )
-    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = ball.INHERENT
 
     @staticmethod
     def caveat(settings: PinocchioSettings) -> str:
@@ -104,7 +95,7 @@ class Pinocchio:
         return defaults | {"gravity": pin.Model().gravity.linear.tolist()}
 
     @classmethod
-    def build(cls, scene: Scene, settings: PinocchioSettings) -> ball.BallRun | MechanismRun:
+    def build(cls, scene: Scene, settings: PinocchioSettings) -> RunOnBody | MechanismRun:
         """See :class:`proofroll.core.engine.Engine`; returns a run of the formulation."""
         if settings.formulation in _OF_PINOCCHIO_4 and release(cls.version()) < (4,):
             raise Refused(f"{settings.formulation} needs the constraints of pinocchio 4.0, and this is {cls.version()}")

@@ -9,13 +9,11 @@ from annotated_types import Ge, Gt
 from proofroll.core.dop853 import TIGHTEST
 from proofroll.core.engine import Scheme
 from proofroll.core.errors import refuse_first
-from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
-_ORDERS = {"semi_implicit_euler": 1, "midpoint": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
+_ORDERS = {"semi_implicit_euler": 1, "midpoint": 1, "rk4": 2, "rk4_dexpinv": 4}
 _SCHEMES = {
     "semi_implicit_euler": Scheme.SEMI_IMPLICIT_EULER,
-    "leapfrog": Scheme.LEAPFROG,
     "rk4": Scheme.RK4,
 }
 # Formulations of mechanisms, with their integrators.
@@ -24,8 +22,6 @@ OF_MECHANISMS = {
     "constraint_dynamics": ("rk4", "dop853"),
     "impulses": ("semi_implicit_euler", "midpoint"),
 }
-_OF_CONTACT = ("semi_implicit_euler", "leapfrog")
-_WITH_SOLVER = ("contact", "impulses")
 
 
 @dataclass(frozen=True)
@@ -33,38 +29,32 @@ class PinocchioSettings:
     """Settings of the Pinocchio adapter.
 
     Attributes:
-        formulation: ``composite`` (joints about and along the cylinder's axis, so the ball cannot leave it, and two
-            rows of rolling), ``free_flyer`` (six freedoms, one row for the surface and two of rolling) or ``contact``
-            (a free ball against a plane posed anew in each step, by Pinocchio's solver of contact with friction); of
-            mechanisms: ``null_space`` (joint tree, loops by projection on the null space of their rows),
-            ``constraint_dynamics`` (loops as Pinocchio's own rigid constraints) or ``impulses`` (a tree whose bodies
-            touch, by Pinocchio's solver of contact with friction).
+        formulation: of a ball that rolls in a cylinder ``composite`` (joints about and along its axis, so the ball
+            cannot leave it, and two rows of rolling); of mechanisms ``null_space`` (joint tree, loops by projection on
+            the null space of their rows), ``constraint_dynamics`` (loops as Pinocchio's own rigid constraints) or
+            ``impulses`` (a tree whose bodies touch, by Pinocchio's solver of contact with friction).
         preset: source of the other values.
         integrator: ``semi_implicit_euler`` and ``rk4`` as they are usually written with ``pin.integrate``;
-            ``rk4_dexpinv`` the same with the missing term of rotations; ``dop853`` adaptive, order 8. ``contact`` has
-            ``semi_implicit_euler`` and ``leapfrog``, whose velocities are half a step ahead of the positions;
-            ``impulses`` has ``semi_implicit_euler`` and Moreau's ``midpoint``, with all terms at half a step.
+            ``rk4_dexpinv`` the same with the missing term of rotations; ``dop853`` adaptive, order 8. ``impulses`` has
+            ``semi_implicit_euler`` and Moreau's ``midpoint``, with all terms at half a step.
         dt: step [s]; None with ``dop853``.
         rtol: relative tolerance [1] of ``dop853``; None with the others.
         orientation: integrate the orientation of the ball; None: if the scene asks for it. Its inertia is the same
             about every axis, so the motion does not depend on it, and without it the fast turning needs no small steps.
-            ``contact`` always turns the ball: its spherical joint is part of the state.
             Mechanisms always have it.
-        projection: put the state back on the constraints after each step; not in ``contact``, where the solver does.
-        solver: of ``contact`` and ``impulses``: projected Gauss-Seidel or alternating directions (ADMM), which diverges
-            in wide cones: ``impulses`` gives it each cone no wider than its impulse asks for; None with the others.
-        solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [1]; of
-            ``impulses``: of both, relative to speeds and impulses of the step [1]; None with the others.
+        projection: put the state back on the constraints after each step; not in ``impulses``, where the solver does.
+        solver: of ``impulses``: projected Gauss-Seidel or alternating directions (ADMM), which diverges in wide cones
+            and is given each cone no wider than its impulse asks for; None with the others.
+        solver_tolerance: of ``impulses``: feasibility and complementarity, relative to speeds and impulses of the step
+            [1]; None with the others.
         convex: of ``impulses``: whether the solver leaves De Saxcé's term out, so that what slips parts.
         proximal: of ``constraint_dynamics``: the term μ that makes dependent rows solvable, taken back by iteration;
             None with the others.
     """
 
-    formulation: Literal["composite", "free_flyer", "contact", "null_space", "constraint_dynamics", "impulses"] = (
-        "composite"
-    )
+    formulation: Literal["composite", "null_space", "constraint_dynamics", "impulses"] = "composite"
     preset: Literal["default", "matched", "tuned"] = "matched"
-    integrator: Literal["semi_implicit_euler", "midpoint", "leapfrog", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
+    integrator: Literal["semi_implicit_euler", "midpoint", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
     dt: Annotated[float, Gt(0)] | None = None
     rtol: Annotated[float, Ge(TIGHTEST)] | None = 1e-13
     orientation: bool | None = None
@@ -84,20 +74,16 @@ class PinocchioSettings:
         refuse_first("pinocchio", self, self._rules())
 
     def _rules(self) -> Iterator[tuple[bool, str, str]]:
-        contact, integrator = self.formulation == "contact", self.integrator
-        solves, of_mechanisms = self.formulation in _WITH_SOLVER, OF_MECHANISMS.get(self.formulation)
+        integrator, of_mechanisms = self.integrator, OF_MECHANISMS.get(self.formulation)
+        solves = self.formulation == "impulses"
         for name in ("solver", "solver_tolerance"):
             is_set = getattr(self, name) is not None
-            advice = f"{self.formulation} has no contact solver; leave it out, or take formulation=contact"
+            advice = f"{self.formulation} has no contact solver; leave it out, or take formulation=impulses"
             yield is_set and not solves, name, advice
             yield solves and not is_set, name, f"{self.formulation} needs one; its presets have one"
-        yield self.convex and self.formulation != "impulses", "convex", "only impulses has it; leave it out"
-        if contact:
-            yield integrator not in _OF_CONTACT, "integrator", f"contact has {' and '.join(_OF_CONTACT)}"
-            yield self.orientation is False, "orientation", "contact always turns the ball; leave it out"
-        elif of_mechanisms is None:
-            only = {"leapfrog": "contact", "midpoint": "impulses"}.get(integrator)
-            yield only is not None, "integrator", f"only {only} has it"
+        yield self.convex and not solves, "convex", "only impulses has it; leave it out"
+        if of_mechanisms is None:
+            yield integrator == "midpoint", "integrator", "only impulses has it"
         yield solves and self.projection, "projection", "the solver corrects the contacts; leave it out"
         if of_mechanisms is not None:
             advice = "a mechanism always has its orientations; leave it out"
@@ -146,7 +132,7 @@ def lowered(settings: PinocchioSettings) -> Mapping[str, int]:
     return (
         {MechanismCapability.SATURATION: 1}
         if settings.formulation in OF_MECHANISMS
-        else {BallCapability.ORIENTATION: _ORDERS["rk4"]}
+        else {MechanismCapability.ORIENTATION: _ORDERS["rk4"]}
     )
 
 
@@ -166,7 +152,6 @@ _BALL: Mapping[str, Mapping[str, Any]] = {
     # tightest useful tolerance: a tighter one takes a tenth more time and gains no digit
     "tuned": {},
 }
-_PGS: Mapping[str, Any] = {**_FREE, "solver": "pgs"}
 _ADMM: Mapping[str, Any] = {**_FREE, "integrator": "semi_implicit_euler", "solver": "admm"}
 _PROXIMAL: Mapping[str, Any] = {"proximal": PROXIMAL}
 
@@ -177,13 +162,6 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
     }
     for formulation, presets in dict[str, Mapping[str, Mapping[str, Any]]](
         composite=_BALL,
-        free_flyer=_BALL,
-        contact={
-            # the obvious first model: the plane at the ball's position when the step begins, the solver's tolerance
-            "default": {**_PGS, "integrator": "semi_implicit_euler", "solver_tolerance": 1e-6},
-            # the same contact, with the plane's turning during a step taken into account, solved to round-off
-            "matched": {**_PGS, "integrator": "leapfrog", "solver_tolerance": 1e-12},
-        },
         impulses={
             # the obvious first model: contacts at the bodies' positions when the step begins, the solver's tolerance
             "default": {**_ADMM, "solver_tolerance": 1e-6},

@@ -7,6 +7,7 @@ import proofroll
 from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.heyoka_library import with_heyoka
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunOnBody
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.engines.projection.ball import run as ball
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
@@ -53,7 +54,7 @@ class Projection:
         return with_heyoka(proofroll.__version__)
 
     @classmethod
-    def build(cls, scene: Scene, settings: ProjectionSettings) -> ball.ProjectionBall | ProjectionMechanism:
+    def build(cls, scene: Scene, settings: ProjectionSettings) -> RunOnBody | ProjectionMechanism:
         """See :class:`proofroll.core.engine.Engine`; ``dependent`` gives a run of a mechanism."""
         if settings.formulation == "dependent":
             return ProjectionMechanism(scene, settings)

@@ -16,15 +16,17 @@ from proofroll.core.errors import Diverged, Refused, refuse_first
 from proofroll.core.heyoka_library import TIGHTEST, require_heyoka, with_heyoka
 from proofroll.core.integrators import DormandPrince853
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
 from proofroll.elements.ball_on_surface.compiled.rolling import parameters, reduced
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
-from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ROLLS, RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form, placed, reduced_rates, start
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 
 # Least step as a part of the interval to the next sample; a shorter one means divergence.
 _STUCK = 1e-12
@@ -263,11 +265,11 @@ class Reduced:
     witness: ClassVar[bool] = True
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "equations": ROLLS,
-        "closed_form": ROLLS - {BallCapability.ROLLING_RESISTANCE},
+        "closed_form": ROLLS - {MechanismCapability.TURNING_FRICTION},
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "closed_form": {
-            BallCapability.ROLLING_RESISTANCE: "there is no closed form with rolling resistance; "
+            MechanismCapability.TURNING_FRICTION: "there is no closed form with rolling resistance; "
             "take formulation=equations"
         }
     }
@@ -281,15 +283,20 @@ class Reduced:
     terms: ClassVar[Sequence[Term]] = ()  # a minimal model has no optional terms
 
     @staticmethod
+    def family(_: ReducedSettings) -> Mapping[str, str]:
+        """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
+        return of_contact(Family.HARD)
+
+    @staticmethod
     def version() -> str:
         """Version of proofroll, whose part the equations are; with that of heyoka where it is installed."""
         return with_heyoka(proofroll.__version__)
 
     @classmethod
-    def build(cls, scene: Scene, settings: ReducedSettings) -> ReducedModel:
+    def build(cls, scene: Scene, settings: ReducedSettings) -> RunOnBody:
         """See :class:`proofroll.core.engine.Engine`; builds a run of one of the three models."""
         require_provided(cls, settings.formulation, scene)
         body = rolling_ball(scene)
         if settings.rtol is None:
-            return ClosedFormModel(body)
-        return (Compiled if settings.integrator == "taylor" else Integrated)(body, settings.rtol)
+            return on_body(ClosedFormModel(body), scene)
+        return on_body((Compiled if settings.integrator == "taylor" else Integrated)(body, settings.rtol), scene)

@@ -9,25 +9,26 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll_drill.mutants.base import STEP, Honest, Mutant
+from proofroll_drill.placed_balls import gravity_of, placed, scene_with
 
 RESISTED = ("sphere_in_cylinder", {"rolling_resistance": 5e-4})
 
 
-def _ball(scene: Scene, **numbers: float) -> Scene:
-    return scene_with(scene, ball=dataclasses.replace(scene.elements[0].ball, **numbers))  # type: ignore[attr-defined]
+def _ball(scene: Scene, **numbers: Any) -> Scene:
+    return scene_with(scene, ball=dataclasses.replace(placed(scene).ball, **numbers))
 
 
-def _contact(scene: Scene, **numbers: float) -> Scene:
-    return scene_with(scene, contact=dataclasses.replace(scene.elements[0].contact, **numbers))  # type: ignore[attr-defined]
+def _contact(scene: Scene, **numbers: Any) -> Scene:
+    return scene_with(scene, contact=dataclasses.replace(placed(scene).contact, **numbers))
 
 
 def _gravity(scene: Scene, **numbers: Any) -> Scene:
-    return scene_with(scene, gravity=dataclasses.replace(scene.elements[0].gravity, **numbers))  # type: ignore[attr-defined]
+    return scene_with(scene, gravity=dataclasses.replace(gravity_of(scene), **numbers))
 
 
 class ThinShell(Mutant):
@@ -71,7 +72,7 @@ class GravityHalved(Mutant):
 
     def misread(self, scene: Scene) -> Scene:
         """Half."""
-        return _gravity(scene, magnitude=0.5 * scene.elements[0].gravity.magnitude)  # type: ignore[attr-defined]
+        return _gravity(scene, magnitude=0.5 * gravity_of(scene).magnitude)
 
 
 class GravityUp(Mutant):
@@ -93,7 +94,7 @@ class MassTwice(Mutant):
 
     def misread(self, scene: Scene) -> Scene:
         """Twice, with the inertia per mass of the scene."""
-        return _ball(scene, mass=2 * scene.elements[0].ball.mass)  # type: ignore[attr-defined]
+        return _ball(scene, mass=2 * placed(scene).ball.mass)
 
 
 class Unresisted(Mutant):

@@ -7,15 +7,21 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body
 from proofroll.elements.ball_on_surface.sampling import BallBuilt
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.settings import ProjectionSettings
 
 STEP = 2e-3
+
+
+def own(run: Any) -> Any:
+    """The run itself, of a ball's the one in its own terms."""
+    return run.own if isinstance(run, RunOnBody) else run
 
 
 class Mutant:
@@ -41,6 +47,7 @@ class Mutant:
     every: ClassVar[float] = 0.01
     step: ClassVar[float] = STEP
     asks: ClassVar[tuple[str, ...]] = ()
+    of_ball = False
 
     @staticmethod
     def version() -> str:
@@ -48,14 +55,17 @@ class Mutant:
         return "1.0"
 
     @classmethod
-    def build(cls, scene: Scene, settings: Any) -> Self:
+    def build(cls, scene: Scene, settings: Any) -> Any:
         """See :class:`proofroll.core.engine.Engine`."""
-        return cls(scene, settings)
+        made = cls(scene, settings)
+        return on_body(made, scene) if made.of_ball else made
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         self.element: Any = scene.elements[0]
-        self.claimed: Any = Projection.build(scene, settings)
-        self.inner: Any = Projection.build(self.misread(scene), settings)
+        claimed = Projection.build(scene, settings)
+        self.of_ball = isinstance(claimed, RunOnBody)
+        self.claimed: Any = own(claimed)
+        self.inner: Any = own(Projection.build(self.misread(scene), settings))
         self.t = 0.0
 
     def misread(self, scene: Scene) -> Scene:
@@ -81,7 +91,7 @@ class Mutant:
 
     def events(self) -> list[Event]:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return list(self.inner.events())
+        return list(self.inner.events()) if hasattr(self.inner, "events") else []
 
     def built(self) -> BallBuilt | Any:
         """Model as given by the scene; its start is read back."""
@@ -107,7 +117,7 @@ class OneStepBehind(Mutant):
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)
-        self.behind: Any = Projection.build(scene, settings)
+        self.behind: Any = own(Projection.build(scene, settings))
 
     def advance(self, t: float) -> None:
         """Both."""

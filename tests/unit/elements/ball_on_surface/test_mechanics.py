@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response, newton_euler
 from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates
 from proofroll.elements.mechanism.run.contacts.on_wall import energy, resistance_moment, slip_velocity

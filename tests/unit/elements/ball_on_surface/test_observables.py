@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 import xarray as xr
 from ball_scenes import rolled
+from placed_balls import of_ball, run_of, sample_of
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.columns import Columns
 from proofroll.core.dataset import from_samples, observe, off_grid_apart, scales
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grid
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.dataset import columns
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.elements.mechanism.run.contacts.audits import energy_balance, force_audit, rate_audit
 from proofroll.files.scene_file import load_scene
 
@@ -32,9 +32,7 @@ def case() -> tuple[Scene, xr.Dataset]:
     """A run with resistance, general initial motion and nothing wrong."""
     scene = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=5e-4)
     motion = rolled(rolling_ball(scene), TIMES)
-    return scene, columns(
-        rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force
-    ).dataset()
+    return scene, run_of(scene, TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
 
 
 def largest(values: np.ndarray) -> float:
@@ -47,20 +45,22 @@ def test_energy_balance_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     scene, dataset = case
     lost = float(dataset["energy"][0] - dataset["energy"][-1])
     assert lost > 0.1
-    assert largest(energy_balance(rolling_ball(scene), dataset)) < 1e-9 * lost
+    assert largest(energy_balance(rolling_ball(scene), of_ball(dataset))) < 1e-9 * lost
 
 
 def test_energy_balance_sees_lost_energy(case: tuple[Scene, xr.Dataset]) -> None:
     """Energy that vanishes, and a resistance twice too strong or absent, show in the balance by their size."""
     scene, dataset = case
     leak = dataset.assign(energy=dataset["energy"] - 1e-4 * dataset["time"])
-    assert energy_balance(rolling_ball(scene), leak)[-1] == pytest.approx(-1e-4 * (TIMES[-1] - TIMES[1]), rel=1e-4)
+    assert energy_balance(rolling_ball(scene), of_ball(leak))[-1] == pytest.approx(
+        -1e-4 * (TIMES[-1] - TIMES[1]), rel=1e-4
+    )
     lost = float(dataset["energy"][1] - dataset["energy"][-1])
     other = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=1e-3)
-    assert energy_balance(rolling_ball(other), dataset)[-1] == pytest.approx(lost, rel=1e-6)
+    assert energy_balance(rolling_ball(other), of_ball(dataset))[-1] == pytest.approx(lost, rel=1e-6)
     without = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0)
     whole = float(dataset["energy"][0] - dataset["energy"][-1])  # nothing takes power there: no force counts
-    assert energy_balance(rolling_ball(without), dataset)[-1] == pytest.approx(-whole, rel=1e-6)
+    assert energy_balance(rolling_ball(without), of_ball(dataset))[-1] == pytest.approx(-whole, rel=1e-6)
 
 
 def test_energy_balance_does_not_rest_on_forces_at_the_start(case: tuple[Scene, xr.Dataset]) -> None:
@@ -69,13 +69,13 @@ def test_energy_balance_does_not_rest_on_forces_at_the_start(case: tuple[Scene, 
     late = dataset.copy(deep=True)
     for name in ("N", "F2", "F3"):
         late[name].to_numpy()[0] = 0.0
-    assert largest(energy_balance(rolling_ball(scene), late)) < 1e-9 * float(dataset["energy"][0])
+    assert largest(energy_balance(rolling_ball(scene), of_ball(late))) < 1e-9 * float(dataset["energy"][0])
 
 
 def test_force_audit_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     """Forces recomputed from a right motion are those that were reported, within 1e-6 of the normal force."""
     scene, dataset = case
-    audit = force_audit(rolling_ball(scene), dataset)
+    audit = force_audit(rolling_ball(scene), of_ball(dataset))
     assert len(audit) == len(TIMES) - 10
     assert largest(audit) < 1e-6 * float(dataset["N"].max())
 
@@ -85,9 +85,9 @@ def test_force_audit_sees_a_wrong_force(case: tuple[Scene, xr.Dataset], name: st
     """A force that does not belong to the motion shows by its size, whichever component it is."""
     scene, dataset = case
     wrong = dataset.assign({name: dataset[name] + 0.01})
-    assert force_audit(rolling_ball(scene), wrong) == pytest.approx(0.01, abs=1e-4)
+    assert force_audit(rolling_ball(scene), of_ball(wrong)) == pytest.approx(0.01, abs=1e-4)
     reversed_sign = dataset.assign({name: -dataset[name]})
-    assert largest(force_audit(rolling_ball(scene), reversed_sign)) == pytest.approx(
+    assert largest(force_audit(rolling_ball(scene), of_ball(reversed_sign))) == pytest.approx(
         2 * largest(dataset[name][5:-5]), rel=1e-3
     )
 
@@ -96,21 +96,21 @@ def test_force_audit_sees_a_wrong_mass(case: tuple[Scene, xr.Dataset]) -> None:
     """Reported forces of a ball twice as heavy do not fit the motion of this one."""
     scene, dataset = case
     heavy = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=5e-4, mass=1.034)
-    assert largest(force_audit(rolling_ball(heavy), dataset)) > 0.9 * float(dataset["N"].min())
+    assert largest(force_audit(rolling_ball(heavy), of_ball(dataset))) > 0.9 * float(dataset["N"].min())
     assert rolling_ball(scene).ball.mass == 0.517
 
 
 def test_rate_audit_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     """Velocities of a right motion are the rates of its positions, to what the splines leave."""
     scene, dataset = case
-    assert largest(rate_audit(rolling_ball(scene), dataset)) < 1e-8
+    assert largest(rate_audit(rolling_ball(scene), of_ball(dataset))) < 1e-8
 
 
 def test_rate_audit_sees_a_velocity_of_its_own(case: tuple[Scene, xr.Dataset]) -> None:
     """A velocity that is not the rate of the position shows by its size, also where it is constant."""
     scene, dataset = case
     drifting = dataset.assign(v_WB=dataset["v_WB"] + xr.DataArray([0, 0, 0.01], dims="xyz"))
-    assert rate_audit(rolling_ball(scene), drifting) == pytest.approx(0.01, rel=1e-4)
+    assert rate_audit(rolling_ball(scene), of_ball(drifting)) == pytest.approx(0.01, rel=1e-4)
 
 
 def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
@@ -119,12 +119,12 @@ def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
 
     def with_beat(size: float) -> xr.Dataset:
         beat = xr.zeros_like(dataset["between.p_WB"])
-        beat[:, 2] = size * np.sin(200 * np.pi * dataset["between"])
+        beat[..., 2] = size * np.sin(200 * np.pi * dataset["between"])
         return dataset.assign({"between.p_WB": dataset["between.p_WB"] + beat})
 
     # Near what is seen, 4.5e-8 with every kind of arithmetic that was tried: the error of the interpolation.
-    assert largest(rate_audit(rolling_ball(scene), with_beat(0.0))) < 1e-7
-    assert largest(rate_audit(rolling_ball(scene), with_beat(1e-5))) > 1e-5 / 0.005 / 2
+    assert largest(rate_audit(rolling_ball(scene), of_ball(with_beat(0.0)))) < 1e-7
+    assert largest(rate_audit(rolling_ball(scene), of_ball(with_beat(1e-5)))) > 1e-5 / 0.005 / 2
 
 
 @cache
@@ -135,8 +135,8 @@ def off_the_grid() -> tuple[Scene, xr.Dataset]:
     times = np.union1d(TIMES, between)
     motion, true = rolled(rolling_ball(scene), times), truth(scene, times)
     parts = motion.p_WB, motion.v_WB, motion.w_WB
-    made = columns(rolling_ball(scene), times, *parts, force=motion.force, q_WB=true["q_WB"].to_numpy())
-    return scene, off_grid_apart(scene, made, TIMES, between).dataset()
+    made = run_of(scene, times, *parts, force=motion.force, q_WB=true["q_WB"].to_numpy())
+    return scene, off_grid_apart(scene, Columns.of(made), TIMES, between).dataset()
 
 
 LIES: dict[str, tuple[str, Callable[[xr.DataArray], xr.DataArray]]] = {
@@ -170,12 +170,8 @@ def test_rate_audit_sees_an_orientation_of_its_own() -> None:
         between = reduce(lambda whole, k: turns[k::40] * whole, range(1, 40), turns[::40])
         found = list(accumulate(between, lambda attitude, turn: turn * attitude, initial=Rotation.identity()))
         q = np.array([one.as_quat(scalar_first=True) for one in found])
-        return largest(
-            rate_audit(
-                rolling_ball(scene),
-                columns(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, q_WB=q).dataset(),
-            )
-        )
+        run = run_of(scene, TIMES, motion.p_WB, motion.v_WB, motion.w_WB, q_WB=q)
+        return largest(rate_audit(rolling_ball(scene), of_ball(run)))
 
     turning = 0.025 * largest(np.linalg.norm(motion.w_WB, axis=1))
     assert audited(1.0) < 1e-5 * turning
@@ -186,17 +182,17 @@ def test_absent_forces_at_time_0_are_left_out(case: tuple[Scene, xr.Dataset]) ->
     """An engine without a force at time 0 alone has the same audits from the first sample on, and its work counts."""
     scene, whole = case
     motion = rolled(rolling_ball(scene), TIMES)
-    samples = [BallSample(p, v, w, force=f) for p, v, w, f in zip(*vars_of(motion), strict=True)]
-    samples[0] = dataclasses.replace(samples[0], force=None)
+    samples = [sample_of(p, v, w, force=f) for p, v, w, f in zip(*vars_of(motion), strict=True)]
+    samples[0] = dataclasses.replace(samples[0], contact_force=np.full((1, 3), np.nan))
     dataset = from_samples(scene, TIMES, samples)
     assert np.isnan(dataset["N"][0])
     assert dataset["N"].to_numpy()[1:] == pytest.approx(whole["N"].to_numpy()[1:], rel=1e-14)
     lost = float(whole["energy"][0] - whole["energy"][-1])
-    balance = energy_balance(rolling_ball(scene), dataset)
+    balance = energy_balance(rolling_ball(scene), of_ball(dataset))
     assert len(balance) == len(TIMES) - 1
     assert largest(balance) < 1e-9 * lost
-    assert largest(force_audit(rolling_ball(scene), dataset)) < 1e-6 * float(whole["N"].max())
-    samples[1] = dataclasses.replace(samples[1], force=None)
+    assert largest(force_audit(rolling_ball(scene), of_ball(dataset))) < 1e-6 * float(whole["N"].max())
+    samples[1] = dataclasses.replace(samples[1], contact_force=np.full((1, 3), np.nan))
     assert "N" not in from_samples(scene, TIMES, samples), "only time 0 may lack a force"
 
 
@@ -238,9 +234,9 @@ def test_slip_is_the_length_of_the_slip_velocity(case: tuple[Scene, xr.Dataset])
     """Slip counts in both directions."""
     scene, dataset = case
     body = rolling_ball(scene)
-    p, v, w = (dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
+    p, v, w = (of_ball(dataset)[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
     frame = body.surface.frame(np.stack([dataset[name] for name in body.surface.coordinates], axis=-1))
-    slipping = columns(body, TIMES, p, v + 0.3 * frame[..., 1] - 0.4 * frame[..., 2], w).dataset()
+    slipping = run_of(scene, TIMES, p, v + 0.3 * frame[..., 1] - 0.4 * frame[..., 2], w)
     assert observe(scene, slipping)["slip"] == pytest.approx(0.5, abs=1e-12)
 
 
@@ -253,7 +249,7 @@ def test_scales(case: tuple[Scene, xr.Dataset]) -> None:
     assert set(observe(scene, dataset)) <= set(sizes)
     resting = load_scene("sphere_in_cylinder", speed=1e-9, gravity=0.0)
     body, still = rolling_ball(resting), np.zeros((3, 3))
-    dataset = columns(body, TIMES[:3], body.p0 + still, still, still, force=still).dataset()
+    dataset = run_of(resting, TIMES[:3], body.p0 + still, still, still, force=still)
     assert all(size > 0 for size in scales(resting, dataset).values())
 
 
@@ -261,7 +257,7 @@ def test_scales_have_floors() -> None:
     """A range of round-off is no size: where nothing moves, a scale is a hundredth of what is natural for the ball."""
     scene = load_scene("sphere_in_cylinder")
     body, motion = rolling_ball(scene), rolled(rolling_ball(scene), TIMES)
-    dataset = columns(body, TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force).dataset()
+    dataset = run_of(scene, TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
     dataset["z"] = 3.5e-17 * np.sin(dataset["time"])
     dataset["N"], dataset["needed_friction"] = 0 * dataset["N"], np.nan * dataset["N"]
     sizes = scales(scene, dataset)

@@ -5,14 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
+from placed_balls import of_ball, placed, run_of, sample_of, scene_with
 
 from proofroll.core.dataset import from_samples
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.dataset import columns
-from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
-from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
 
 
@@ -20,7 +19,7 @@ def exact(scene: Scene, times: np.ndarray) -> xr.Dataset:
     """The closed form alone, which costs nothing."""
     motion = closed_form(rolling_ball(scene), times)
     assert motion is not None
-    return columns(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force).dataset()
+    return run_of(scene, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
 
 
 @pytest.mark.parametrize("every", [0.01, 0.25, 0.7, 1.3])
@@ -35,7 +34,7 @@ def test_angle_is_unwrapped(every: float, speed: float) -> None:
 def test_angle_starts_on_the_branch_of_the_scene() -> None:
     """An initial γ beyond half a turn stays what it is."""
     scene = load_scene("sphere_in_cylinder")
-    start = dataclasses.replace(scene.elements[0].start, coordinates=(40.0, 0.1))
+    start = dataclasses.replace(placed(scene).start, coordinates=(40.0, 0.1))
     found = exact(scene_with(scene, start=start), np.array([0, 0.1]))["gamma"]
     assert found.to_numpy() == pytest.approx([40.0, 42.0], abs=1e-12)
 
@@ -43,7 +42,7 @@ def test_angle_starts_on_the_branch_of_the_scene() -> None:
 def test_derived_variables(scene: Scene) -> None:
     """Rates, slip, local forces and needed friction follow from the state and the force by their definitions."""
     times = np.linspace(0, 0.1, 5)
-    dataset = truth(scene, times)
+    dataset = of_ball(truth(scene, times))
     body = rolling_ball(scene)
     names = body.surface.coordinates
     u = np.stack([dataset[name].to_numpy() for name in names], axis=-1)
@@ -65,9 +64,7 @@ def test_slip_has_sign_and_size() -> None:
     scene = load_scene("sphere_in_cylinder")
     body = rolling_ball(scene)
     surplus = np.array([0.0, 3.0, 2.0])
-    dataset = columns(
-        rolling_ball(scene), np.zeros(1), body.p0[None], body.v0[None], (body.w0 + surplus)[None]
-    ).dataset()
+    dataset = run_of(scene, np.zeros(1), body.p0[None], body.v0[None], (body.w0 + surplus)[None])
     assert float(dataset["slip2"][0]) == pytest.approx(0.025 * 2, rel=1e-12)
     assert float(dataset["slip3"][0]) == pytest.approx(-0.025 * 3, rel=1e-12)
 
@@ -90,17 +87,17 @@ def test_what_the_engine_cannot_say_is_absent() -> None:
     motion = closed_form(rolling_ball(scene), times)
     assert motion is not None
     states = list(zip(motion.p_WB, motion.v_WB, motion.w_WB, motion.force, strict=True))
-    silent = from_samples(scene, times, [BallSample(p, v, w) for p, v, w, _ in states])
+    silent = from_samples(scene, times, [sample_of(p, v, w) for p, v, w, _ in states])
     assert not {"N", "F2", "F3", "needed_friction", "q_WB"} & set(silent.data_vars)
     q = np.array([1.0, 0, 0, 0])
-    full = from_samples(scene, times, [BallSample(p, v, w, q, f) for p, v, w, f in states])
+    full = from_samples(scene, times, [sample_of(p, v, w, q, f) for p, v, w, f in states])
     assert {"N", "F2", "F3", "needed_friction", "q_WB"} <= set(full.data_vars)
-    assert full["q_WB"].dims == ("time", "wxyz")
+    assert full["q_WB"].dims == ("time", "body", "wxyz")
 
 
 def test_a_run_that_ended_early_has_fewer_times() -> None:
     """The time axis is as long as the samples."""
     scene = load_scene("sphere_in_cylinder")
     body = rolling_ball(scene)
-    dataset = from_samples(scene, np.linspace(0, 1, 11), [BallSample(body.p0, body.v0, body.w0)] * 2)
+    dataset = from_samples(scene, np.linspace(0, 1, 11), [sample_of(body.p0, body.v0, body.w0)] * 2)
     assert dataset["time"].to_numpy() == pytest.approx([0, 0.1])

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from proofroll.conformance.subject import scenes
 from proofroll.core import heyoka_library as library
 from proofroll.core.engine_abilities import Level, TellsLevels
 from proofroll.core.errors import Diverged, InputError, Missing, Refused
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.kind import BallOnSurfaceKind
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.reduced import Reduced
 from proofroll.running.simulation import build
@@ -21,9 +21,7 @@ TAYLOR = "reduced[preset=tuned]"
 needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 
 
-SCENES = {
-    name: scene for name, scene in BallOnSurfaceKind.conformance_scenes().items() if name != "cylinder-oriented"
-} | {
+SCENES = {name: scene for name, scene in scenes().items() if name in {"cylinder", "cylinder-resisting"}} | {
     "backwards": load_scene("sphere_in_cylinder", speed=-4.0, rolling_resistance=5e-4),
 }
 
@@ -40,9 +38,9 @@ def test_equations_against_the_truth(engine: str, scene: Scene) -> None:
         sample = built.sample()
         assert np.max(np.abs(sample.p_WB - true["p_WB"].to_numpy()[index])) < 1e-12
         assert np.max(np.abs(sample.w_WB - true["w_WB"].to_numpy()[index])) < 1e-9
-        assert sample.force is not None
+        assert sample.contact_force is not None
         size = np.linalg.norm([true[name].to_numpy()[index] for name in ("N", "F2", "F3")])
-        assert np.linalg.norm(sample.force) == pytest.approx(size, abs=1e-10)
+        assert np.linalg.norm(sample.contact_force) == pytest.approx(size, abs=1e-10)
 
 
 def test_closed_form_against_the_truth() -> None:
@@ -101,7 +99,7 @@ def test_levels_and_terms() -> None:
     assert {Reduced.levels[name] for name in Reduced.presets} == {Level.CLOSED_FORM, Level.REDUCED}
     assert build(SCENES["cylinder"], "reduced").built().terms == frozenset()
     terms = build(SCENES["cylinder-resisting"], "reduced").built().terms
-    assert terms == frozenset({BallCapability.ROLLING_RESISTANCE})
+    assert terms == frozenset({MechanismCapability.TURNING_FRICTION})
 
 
 @needs_heyoka

@@ -117,9 +117,10 @@ def test_the_orientation_of_a_ball_is_judged(tmp_path: Path, angle: float, agree
     """A ball that is right but for its orientation differs; a quaternion's sign, any at each sample, says nothing."""
 
     def turned(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
-        q = Rotation.from_quat(dataset["q_WB"].to_numpy(), scalar_first=True) * Rotation.from_rotvec([0, angle, 0])
+        turns = Rotation.from_quat(dataset["q_WB"].to_numpy()[:, 0], scalar_first=True)
+        q = turns * Rotation.from_rotvec([0, angle, 0])
         signs = np.where(np.arange(dataset.sizes["time"]) % 3, -1.0, 1.0)[:, None]
-        said = (("time", "wxyz"), signs * q.as_quat(scalar_first=True))
+        said = (("time", "body", "wxyz"), (signs * q.as_quat(scalar_first=True))[:, None])
         return dataset.assign(q_WB=said, attitude=said)
 
     (run,) = judged(tmp_path, claim([ROW], [4.0], TIGHT | {"attitude": Tolerance(1e-3, False, "1")}), turned).runs
@@ -276,7 +277,7 @@ def test_what_cannot_be_judged_hides_nothing(tmp_path: Path) -> None:
 
 def test_another_scene_is_shown_and_not_judged(tmp_path: Path) -> None:
     """A friction of 1 where the unbounded scene needs 1.08 is no verdict, and contradicts only who says it agrees."""
-    number = Line("1 / static friction", "1", (0.0,), (1.0,), 1.0, 1.0, "the engine needs a number")
+    number = Line("inverse friction", "1", (0.0,), (1.0,), 1.0, 1.0, "the engine needs a number")
     agrees = judged(tmp_path / "a", claim([ROW], [1.2, 4.0]), the_truth, certificate=[number])
     slow, fast = agrees.runs
     assert slow.result.status is Status.ANOTHER_SCENE

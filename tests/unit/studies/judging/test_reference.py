@@ -14,7 +14,7 @@ from proofroll.core.engine_abilities import SharesEquations
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Allowance, RunCurve, Verdict, judge_curve
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.reduced import Reduced
 from proofroll.running.case import Result, Status

@@ -81,7 +81,7 @@ def check_rungs(content: dict[str, Any]) -> None:
     rungs = {(rung["level"], rung["variant"]): rung for rung in content["rungs"]}
     assert list(dict.fromkeys(level for level, _ in rungs)) == [level.value for level in Level]
     empty = {level for (level, _), rung in rungs.items() if rung["status"] == "empty"}
-    assert empty == {Level.CLOSED_FORM, Level.PROJECTION, Level.CONSTRAINT, Level.FACETS}
+    assert empty == {Level.CLOSED_FORM, Level.PROJECTION, Level.CONSTRAINT}
     reduced = rungs[Level.REDUCED, ""]
     assert reduced["error"] == error_of(0.0, "formulation=midpoint")
     assert (reduced["resolution"], reduced["resolution_value"]) == ("dt", 1e-3)
@@ -93,7 +93,7 @@ def check_rungs(content: dict[str, Any]) -> None:
 def check_terms(content: dict[str, Any]) -> None:
     """Each term gets its verdict, by its effect on the quantity and against the truth of the scene with it."""
     terms = {(term["term"], term["formulation"]): term for term in content["terms"]}
-    resistance = terms["rolling resistance", "midpoint"]
+    resistance = terms["rolling resistance of contacts", "midpoint"]
     assert resistance["verdict"] == "needed"
     assert resistance["on"]["parameters"] == {"rolling_resistance": 5e-4}
     assert resistance["on"]["error"] == pytest.approx(error_of(5e-4, "formulation=midpoint"), rel=1e-6)

@@ -242,7 +242,9 @@ def test_of_each_formulation_the_matched_settings(tmp_path: Path) -> None:
     runner = Runner(Store(tmp_path), jobs=1)
     found = stability("sphere_in_cylinder", [axis], runner, engines=["projection"], effort=effort)
     names = [point.curve.engine for point in found.points]
-    assert names == [f"projection[formulation={name},preset=matched]" for name in ("euler", "rotating_frame")]
+    assert names == [
+        f"projection[formulation={name},preset=matched]" for name in ("euler", "rotating_frame", "dependent")
+    ]
     only = "projection[formulation=euler,preset=default]"
     assert [
         p.curve.engine for p in stability("sphere_in_cylinder", [axis], runner, engines=[only], effort=effort).points

@@ -8,7 +8,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.truth.ball_on_surface.friction_curve import friction_curve
 from proofroll.truth.ball_on_surface.onset import Onset, edge_between, first_slip, onset
 

@@ -5,7 +5,7 @@ import pytest
 
 from proofroll import load_scene
 from proofroll.core import heyoka_library as library
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.truth.ball_on_surface.regimes import Regime, classify
 
 pytestmark = pytest.mark.skipif(not library.available(), reason="a map takes minutes without heyoka")

@@ -15,7 +15,7 @@ from proofroll import load_scene
 from proofroll.core import heyoka_library as library
 from proofroll.core.events import events_of
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth.ball_on_surface.polar import Polar, first_route
 from proofroll.truth.ball_on_surface.switching import Path, follow

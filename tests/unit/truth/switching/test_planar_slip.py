@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from placed_balls import placed
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.contact.acting import Acting
 from proofroll.elements.mechanism.scene.drives import Actuator
@@ -33,7 +34,7 @@ GENTLE = (0.17666799150977489, 0.41209057382659164, 0.6281167309534607, 0.710311
 def ball_in_a_bore(speed: float, friction: float = 0.35) -> Mechanism:
     """The ball of the founding scene as body, sphere and bore."""
     scene = load_scene("sphere_in_cylinder", speed=speed)
-    found, wall = rolling_ball(scene), scene.elements[0].surface  # type: ignore[attr-defined]
+    found, wall = rolling_ball(scene), placed(scene).surface  # type: ignore[attr-defined]
     moment, radius = float(found.ball.inertia), float(found.ball.radius)
     free = Joint(
         "free", "free", "world", "ball", q0=(*map(float, found.p0), 1.0, 0.0, 0.0, 0.0),

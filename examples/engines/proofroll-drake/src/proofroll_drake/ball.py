@@ -16,14 +16,15 @@ from scipy.integrate import solve_ivp
 
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment
-from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ROLLS, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll_drake.settings import DrakeSettings
 
-PROVIDES: frozenset[str] = ROLLS | {BallCapability.ORIENTATION}
-INHERENT = {BallCapability.ORIENTATION: "a free body of Drake has one"}
+PROVIDES: frozenset[str] = ROLLS | {MechanismCapability.ORIENTATION}
+INHERENT = {MechanismCapability.ORIENTATION: "a free body of Drake has one"}
 
 
 class DrakeBall:
@@ -46,9 +47,9 @@ class DrakeBall:
         self._x = np.array(plant.GetPositionsAndVelocities(self._context))
 
     @classmethod
-    def build(cls, scene: Scene, settings: DrakeSettings) -> DrakeBall:
+    def build(cls, scene: Scene, settings: DrakeSettings) -> RunOnBody:
         """See :class:`proofroll.core.engine.Engine`."""
-        return cls(rolling_ball(scene), settings)
+        return on_body(cls(rolling_ball(scene), settings), scene)
 
     def _solved(self, x: Any) -> tuple[Any, Any]:
         """Accelerations (angular first) in the world, and force of the wall on the ball [N]."""

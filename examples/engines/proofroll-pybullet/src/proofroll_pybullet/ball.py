@@ -15,15 +15,16 @@ import numpy as np
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
 PROVIDES: frozenset[str] = ALL_OF_A_BALL
-INHERENT = {BallCapability.ORIENTATION: "every rigid body of PyBullet has one"}
+INHERENT = {MechanismCapability.ORIENTATION: "every rigid body of PyBullet has one"}
 # Coefficient that stands for unbounded friction; larger ones would cost the solver digits in double precision.
 UNBOUNDED = 1e6
 _FLAT = "for the length of a step the wall is a plane, and the first step does not yet know that it bends"
@@ -51,9 +52,9 @@ class PybulletBall:
             self._normal_force = self._first_normal_force()
 
     @classmethod
-    def build(cls, scene: Scene, settings: PybulletSettings) -> PybulletBall:
+    def build(cls, scene: Scene, settings: PybulletSettings) -> RunOnBody:
         """See :class:`proofroll.core.engine.Engine`."""
-        return cls(rolling_ball(scene), settings)
+        return on_body(cls(rolling_ball(scene), settings), scene)
 
     def _sphere(self, mu: float) -> int:
         body = self._body

@@ -82,6 +82,15 @@ def _without_round_off(part: Array, size: Any) -> Array:
     return np.where(np.linalg.norm(part, axis=0) > ROUND_OFF * size, part, 0.0)
 
 
+def rolling_levers(frictions: Sequence[TurningFriction], count: int) -> Array:
+    """Coefficient of rolling resistance [m] of each of ``count`` contacts, 0 without, shape (count,)."""
+    levers = np.zeros(count)
+    for friction in frictions:
+        if not friction.spins:
+            levers[friction.pressed_by] = friction.friction
+    return levers
+
+
 def turning_frictions(contacts: Sequence[BodyContact]) -> tuple[TurningFriction, ...]:
     """Friction against turning of each contact that has some."""
     laws = []

@@ -23,6 +23,7 @@ from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.point_loads import bushing_loads
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
+from proofroll.elements.mechanism.run.dataset import quaternions
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
 from proofroll.elements.mechanism.scene.model import Mechanism
@@ -283,13 +284,13 @@ class Change:
 
 def placed_of(mechanism: Mechanism, dataset: Any) -> Placed:
     """Motion of the bodies of a run."""
-    parts = (dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB", "q_WB"))
-    return Placed(mechanism, dataset["time"].to_numpy(), *parts)
+    time, p_WB, v_WB, w_WB = (dataset[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB"))
+    return Placed(mechanism, time, p_WB=p_WB, v_WB=v_WB, w_WB=w_WB, q_WB=quaternions(dataset))
 
 
 def is_motion(dataset: Any) -> bool:
     """True if all poses and velocities of a run are finite, and its quaternions are rotations."""
-    parts = [dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB", "q_WB")]
+    parts = [*(dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB")), quaternions(dataset)]
     return all(np.all(np.isfinite(part)) for part in parts) and bool(
         np.all(np.linalg.norm(parts[-1], axis=-1) > _TURNS)
     )

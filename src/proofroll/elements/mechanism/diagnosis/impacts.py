@@ -261,6 +261,8 @@ def _missed(model: Mechanism | None, impacts: Sequence[_Struck], convex: bool = 
     dynamics, parts = ContactDynamics(model), [np.zeros(0)]
     for impact in impacts:
         contact, state = dynamics.contacts[impact.contact], dynamics.at(impact.q, impact.before)
+        if convex and np.isinf(contact.friction):  # such a cone parts whatever it meets at once
+            return np.full(1, np.inf)
         n, J = state.touching[impact.contact].normal, state.J[impact.contact]
         comes, slip = abs(float(n @ J @ impact.before)), 0.0
         for _ in range(_CONTRACTIONS if convex else 1):

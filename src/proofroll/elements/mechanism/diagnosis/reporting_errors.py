@@ -20,6 +20,7 @@ from proofroll.core.diagnosis.samples import (
 from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
+from proofroll.elements.mechanism.run.dataset import quaternions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +36,7 @@ _UNITS = {
 def _state(element: Any, data: xr.Dataset) -> FloatArray:
     """Poses and twists of all bodies, each scaled to a length by the mechanism's own length and time [m]."""
     length, T = element.length, element.natural_time
-    parts = [data["p_WB"], data["v_WB"] * T, data["w_WB"] * (length * T), data["q_WB"] * length]
+    parts = [data["p_WB"], data["v_WB"] * T, data["w_WB"] * (length * T), quaternions(data) * length]
     return np.concatenate(parts, axis=-1)
 
 
@@ -92,7 +93,7 @@ def _size(element: Any, name: str) -> float:
 
 def _attitudes(evidence: Evidence) -> FloatArray:
     assert evidence.truth is not None
-    return np.asarray(evidence.truth["q_WB"].to_numpy())
+    return quaternions(evidence.truth)
 
 
 CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque", "motion"))

@@ -13,6 +13,7 @@ from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED
+from proofroll.elements.mechanism.run.dataset import quaternions
 from proofroll.elements.mechanism.scene.joint import Joint
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
 from proofroll.elements.mechanism.scene.model import Mechanism
@@ -39,7 +40,7 @@ def start_not_taken(evidence: Evidence) -> Iterator[Cause]:
     if "p_WB" not in run or run.sizes["time"] < _FIRST:
         return
     times = true["time"].to_numpy()[:_FIRST]
-    poses, expected = (_poses(data["p_WB"].to_numpy(), data["q_WB"].to_numpy()) for data in (run, true))
+    poses, expected = (_poses(data["p_WB"].to_numpy(), quaternions(data)) for data in (run, true))
     # an engine may report at time 0 what it was given
     distance = largest_difference(poses[1:_FIRST], expected[1:_FIRST])
     if not above_round_off(distance, longest(expected)):
@@ -134,4 +135,4 @@ def _moved(evidence: Evidence, mechanism: Mechanism, times: FloatArray) -> Float
         true = truth(Scene("start", "", (type(evidence.element)(mechanism),)), times)
     except ProofrollError:
         return None
-    return _poses(true["p_WB"].to_numpy(), true["q_WB"].to_numpy())
+    return _poses(true["p_WB"].to_numpy(), quaternions(true))

@@ -25,6 +25,7 @@ WITHOUT_FEATURE: Mapping[str, str] = {
     Capability.CONTACT: "every scene of contact has it",
     Capability.MASSLESS: "not drawn: every drawn body has mass and moments",
     Capability.REDUNDANT: "planar loops have it; an analysis of the scene finds it, not its keys",
+    Capability.ORIENTATION: "asked for; no part of a scene",
     Capability.COUPLINGS_OF_MANY: "not drawn: its rows are those of a coupling of two",
 }
 # Keys of the vocabulary that are not drawn, as table.key -> reason.

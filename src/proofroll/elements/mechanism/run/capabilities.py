@@ -56,6 +56,7 @@ class MechanismCapability(StrEnum):
     SIGNALS = "drives and targets that change in time"
     HELD = "targets held between instants"
     MOTIONS = "prescribed motions of joints"
+    ORIENTATION = "the orientation of a ball that rolls"
 
 
 ALL_JOINTS = frozenset(MechanismCapability[kind.upper()] for kind in FACTS)

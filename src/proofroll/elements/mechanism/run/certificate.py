@@ -42,6 +42,19 @@ CAPS: Mapping[str, Regularised] = {
     name: Regularised(0.5, "a loop that is held by a stiff spring pulls in proportion to its opening")
     for name in _FROM_ACCELERATIONS
 }
+_DEEP = "a ball that is sunk in by its radius has its centre in the wall"
+_LEVER = "a soft contact rolls about a point midway in its depth, and the depth is at most the radius"
+# Further quantities that a model of a ball that rolls evenly may soften.
+ROLLING_CAPS: Mapping[str, Regularised] = {
+    **CAPS,
+    **dict.fromkeys(
+        (*_FROM_ACCELERATIONS,), Regularised(1.0, "a contact that is not loaded yet lacks the whole force")
+    ),
+    **dict.fromkeys(("gaps", "position", "places of contact"), Regularised(1.0, _DEEP)),
+    **dict.fromkeys(("spin", "velocity"), Regularised(0.5, _LEVER)),
+    "rolling resistance": Regularised(1e-6, "its moment is read back through a normal force, which a solver finds"),
+    "inverse friction": Regularised(float("inf"), "a finite number stands for unbounded friction"),
+}
 # Quantities with a tolerance of their own, and why.
 _ROUGH = {"inverse friction": (0.02, "no engine's cone is unbounded; a coefficient of 50 or more stands for it")}
 # Accepted shapes: -1 is any number, for bodies or joints may be missing; of one body the index may be left out.
@@ -51,7 +64,7 @@ _SHAPES = {
     "inertia": ((-1, 3, 3), (3, 3)),
     "gravity": ((3,), (1, 3)),
     **dict.fromkeys(("contact_gap", "contact_friction", "contact_restitution"), ((-1,), ())),
-    **dict.fromkeys(("contact_static", "contact_tangential"), ((-1,), ())),
+    **dict.fromkeys(("contact_static", "contact_tangential", "contact_rolling"), ((-1,), ())),
     **dict.fromkeys(("contact_normal", "contact_place"), ((-1, 3), (3,))),
     "contact_response": ((-1, 3, -1, 3),),
     **dict.fromkeys(("rows", "rank", "mobility", "mass_matrix_error"), ((), (1,))),
@@ -96,7 +109,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         soft = built.regularised.get(quantity.replace(" ", "_"))
         if soft is None and quantity in _FORCES:  # as soft as what they accelerate
             soft = max(built.regularised.values(), key=lambda softness: softness.tolerance, default=None)
-        tolerance, because = tolerated(soft, CAPS.get(quantity), *_ROUGH.get(quantity, (COMPOSED, _COMPOSED)))
+        tolerance, because = tolerated(soft, _caps(element).get(quantity), *_ROUGH.get(quantity, (COMPOSED, _COMPOSED)))
         unit_scale = scale if "acceleration" in quantity else motion.scale
         noise = _MARGIN * element.noise / unit_scale if quantity in _FROM_ACCELERATIONS else 0.0
         tolerance, because = max((tolerance, because), (noise, _NOISY))
@@ -115,10 +128,12 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
             )
         )
 
-    size, bodies, gravity = element.length, mechanism.bodies, np.array(mechanism.gravity)
-    masses, inertias = (np.array([getattr(body, name) for body in bodies]) for name in ("mass", "inertia"))
+    size, gravity = element.length, np.array(mechanism.gravity)
+    masses, coms, inertias = (
+        np.array([getattr(body, name) for body in mechanism.bodies]) for name in ("mass", "com", "inertia")
+    )
     compare("mass", "kg", masses, built.mass, float(np.max(masses)))
-    compare("centre of mass", "m", np.array([body.com for body in bodies]), built.com, size)
+    compare("centre of mass", "m", coms, built.com, size)
     compare("inertia", "kg m^2", inertias, built.inertia, float(np.max(np.abs(inertias))) or 1.0)
     compare("gravity", "m/s^2", gravity, built.gravity, float(np.linalg.norm(gravity)) or 1.0)
     places = np.array([start.point(joint.child, joint.child_position)[0] for joint in mechanism.joints])
@@ -138,10 +153,14 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         compare("orientation", "1", start.q_WB[0], turned * signs, 1.0)
     compare("acceleration", "m/s^2", motion.acceleration, _first(element, built, "acceleration"), motion.scale)
     turning = _turning(element, soft="angular_acceleration" in built.regularised)
-    angular = _first(element, built, "angular_acceleration")
-    compare("angular acceleration", "rad/s^2", motion.angular_acceleration, angular, turning)
+    rates = motion.angular_acceleration, _first(element, built, "angular_acceleration")
+    compare("angular acceleration", "rad/s^2", *rates, turning)
     _compare_reactions(element, built, sample, compare)
     return lines
+
+
+def _caps(element: MechanismElement) -> Mapping[str, Regularised]:
+    return ROLLING_CAPS if element.rolls_evenly else CAPS
 
 
 def _compare_matrices(element: MechanismElement, built: MechanismBuilt, compare: _Compare) -> None:
@@ -197,6 +216,9 @@ def _compare_contacts(element: MechanismElement, built: MechanismBuilt, compare:
     sideways = np.array([contact.tangential_restitution for contact in contacts])
     if sideways.any():
         compare("tangential restitution of contacts", "1", sideways, built.contact_tangential, 1.0)
+    levers = np.array([contact.rolling_resistance for contact in contacts])
+    if levers.any():
+        compare("rolling resistance", "m", levers, built.contact_rolling, float(levers.max()))
     _compare_response(element, built, compare)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.columns import UNCERTAIN, Columns, Variable, axes
+from proofroll.core.columns import SMALLEST, UNCERTAIN, Columns, Variable, axes
 from proofroll.core.errors import Diverged
 from proofroll.core.whole_turns import doubt
 from proofroll.elements.mechanism.dynamics.link_forces import put_links
@@ -30,9 +30,13 @@ from proofroll.elements.mechanism.scene.joint_kinds import TURNING, JointKind
 from proofroll.elements.mechanism.scene.shapes.geometry import carried_bodies, contact_sums, shared_pairs
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from proofroll.elements.mechanism.run.element import MechanismElement
 
 # Reasons why a variable has no value.
+UNTURNED = np.array([[1.0, 0.0, 0.0, 0.0]])
+_OF_ORIENTATION = ("q_WB", "attitude", "attitudes")
 UNDETERMINED, UNSAID = "not determined by the equations", "not given by the engine"
 
 
@@ -48,11 +52,25 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
     placed = placed_from(element, times, samples)
     fields = {name: _over_time(samples, name, count) for name, count in lengths(element.mechanism).items()}
     named = pick_named(element.mechanism, fields).T
-    return columns(element, placed, wrench, given_forces(element.mechanism, samples), named)
+    whole = columns(element, placed, wrench, given_forces(element.mechanism, samples), named)
+    return unturned(whole) if any(sample.q_WB is None for sample in samples) else whole
+
+
+def quaternions(run: xr.Dataset) -> FloatArray:
+    """Quaternions of the bodies, (time, bodies, 4); of a ball without its orientation those of no turn."""
+    if "q_WB" in run:
+        return np.asarray(run["q_WB"].to_numpy())
+    return np.tile(UNTURNED, (run.sizes["time"], 1, 1))
+
+
+def unturned(run: Columns) -> Columns:
+    """The run of a ball without its orientation."""
+    kept = {name: variable for name, variable in run.variables.items() if name not in _OF_ORIENTATION}
+    return Columns(kept, run.attrs)
 
 
 def placed_from(element: MechanismElement, times: FloatArray, samples: Sequence[MechanismSample]) -> Placed:
-    """Motion of the bodies in samples at these times [s]."""
+    """Motion of the bodies in samples at these times [s]; a ball without its orientation does not turn."""
     count = len(element.bodies)
 
     def stacked(name: str, width: int) -> FloatArray:
@@ -64,7 +82,7 @@ def placed_from(element: MechanismElement, times: FloatArray, samples: Sequence[
         p_WB=stacked("p_WB", 3),
         v_WB=stacked("v_WB", 3),
         w_WB=stacked("w_WB", 3),
-        q_WB=stacked("q_WB", 4),
+        q_WB=np.array([np.reshape(UNTURNED if s.q_WB is None else s.q_WB, (count, 4)) for s in samples]),
     )
 
 
@@ -192,7 +210,14 @@ def columns(
                 put(name, value, unit, meaning, *(("xyz",) if value.ndim > 1 else ()))
     put("drift", placed.drift(), "m", "how far joints and loops are open")
     variables |= _local(element, placed, pressed)
-    return Columns(variables | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
+    variables |= axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))}
+    return Columns(variables, _smallest(variables))
+
+
+def _smallest(variables: Mapping[str, Variable]) -> dict[str, float]:
+    """Least normal force on a ball at the samples [N] but time 0, where several engines know none; {} without one."""
+    values = variables["N"][1] if "N" in variables else np.zeros(0)
+    return {f"{SMALLEST}N": float(np.min(values[1:] if len(values) > 1 else values))} if len(values) else {}
 
 
 def _local(element: MechanismElement, placed: Placed, pressed: FloatArray) -> dict[str, Variable]:

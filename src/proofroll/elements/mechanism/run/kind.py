@@ -110,11 +110,20 @@ class MechanismKind:
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
-        """A loop with varying inertia, a chain, a top, a slide, a free body, sliding feet: the hardest first."""
+        """A loop with varying inertia, a chain, a top, a slide, a free body, sliding feet, a coin: the hardest first.
+
+        Last come those that formulations of a ball that rolls in a cylinder build, without zero or symmetric values.
+        """
         from proofroll.files.scene_file import load_scene
 
         names = ("slider_crank", "double_pendulum", "heavy_top", "pendulum", "oscillators", "free_body", "sled")
-        return {name: load_scene(name) for name in names}
+        scenes = {name: load_scene(name) for name in (*names, "rolling_coin")}
+        cylinder: dict[str, Any] = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
+        return scenes | {
+            "cylinder-resisting": load_scene("sphere_in_cylinder", **cylinder, rolling_resistance=5e-4),
+            "cylinder": load_scene("sphere_in_cylinder", **cylinder),
+            "cylinder-oriented": load_scene("sphere_in_cylinder", **cylinder, asks=("orientation",)),
+        }
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:

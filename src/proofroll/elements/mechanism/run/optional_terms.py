@@ -9,10 +9,11 @@ from proofroll.elements.mechanism.scene.shapes.geometry import Pair
 
 # Laws of joints and of contacts that the ladder of models can leave out, by their key.
 _OF_JOINTS = {"armature": "armature of joints", "friction": "dry friction of joints", "damping": "damping of joints"}
+RESISTANCE = "rolling resistance of contacts"
 _OF_PAIRS = {
     "friction": "friction of contacts",
     "restitution": "restitution of contacts",
-    "rolling_resistance": "rolling resistance of contacts",
+    "rolling_resistance": RESISTANCE,
     "spinning_friction": "friction of contacts against spin",
 }
 _FAR = 1000.0  # factor on limits of efforts with which they bound nothing

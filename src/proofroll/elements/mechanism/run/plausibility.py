@@ -81,9 +81,21 @@ def _volume(shape: Geometry) -> float:
 
 def _density(body: Body, shapes: list[Geometry]) -> Iterator[str]:
     volume = max(map(_volume, shapes), default=0.0)
-    if volume and 0 < body.mass < LIGHTEST * volume:
-        density = body.mass / volume
-        yield f"{body.mass:.4g} kg in {volume:.3g} m³ are {density:.2g} kg/m³, less than any solid; {_METRES}"
+    if not volume or not body.mass > 0:
+        return
+    density = f"{body.mass:.4g} kg in {volume:.3g} m³ are {body.mass / volume:.2g} kg/m³"
+    if body.mass < LIGHTEST * volume:
+        yield f"{density}, less than any solid; {_METRES}"
+    elif body.mass > DENSEST * volume and _is_ball(body, shapes):
+        yield f"{density}, denser than osmium; {_METRES}"
+
+
+def _is_ball(body: Body, shapes: list[Geometry]) -> bool:
+    """True if no part of the body need lie outside its only shape, a sphere: its inertia is at most a hollow ball's."""
+    if len(shapes) != 1 or shapes[0].kind != "sphere":
+        return False
+    largest = float(np.linalg.eigvalsh(np.array(body.inertia))[-1])
+    return largest <= (2 / 3) * body.mass * (shapes[0].radius or 0.0) ** 2 * (1 + 1e-9)
 
 
 def _shape(shape: Geometry) -> Iterator[str]:

@@ -64,6 +64,9 @@ class MechanismBuilt:
         contact_friction, contact_restitution: coefficients that the engine made of the pair's, shape (contacts,).
         contact_static, contact_tangential: coefficients of static friction and of tangential restitution, of an engine
             that has them, shape (contacts,).
+        contact_rolling: lever arm of rolling resistance [m], shape (contacts,).
+        terms: capabilities that the model holds of those that a scene may do without
+            (:class:`proofroll.core.element_abilities.HasOptionalCapabilities`).
         contact_response: rates of all slides caused by unit forces on body a of each contact, world axes [1/kg] (the
             Delassus matrix), shape (contacts, 3, contacts, 3); for a pair without friction only along normals.
         rows: number of the engine's constraint rows.
@@ -103,6 +106,8 @@ class MechanismBuilt:
     contact_response: Array | None = None
     contact_static: Array | None = None
     contact_tangential: Array | None = None
+    contact_rolling: Array | None = None
+    terms: frozenset[str] | None = None
 
 
 def mechanism_of(scene: Any) -> Mechanism:

@@ -45,7 +45,7 @@ def start_facts(element: MechanismElement) -> Sequence[str]:
         clauses.append(f"{body.name}: centre of mass at {vector(centre)} m, speed {speed:.4g} m/s")
     if more := len(mechanism.bodies) - _BODIES:
         clauses += [f"and {more} more bodies"] if more > 0 else []
-    clauses += _start_velocities(element)
+    clauses += [*_start_velocities(element), *_on_wall(element)]
     bound = element.step_bound(())
     clauses += [bound] if bound else []
     touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))
@@ -68,6 +68,18 @@ def _start_velocities(element: MechanismElement) -> list[str]:
             moving.insert(0, f"{vector(element.start.v_WB[0, number])} m/s")
         sentences.append(f"{joint.name}: v0 is {velocity}; along the world's: {' and '.join(moving)}")
     return sentences[:_BODIES]
+
+
+def _on_wall(element: MechanismElement) -> list[str]:
+    """Sentence on the coordinates of a ball on its wall, and on what presses it."""
+    ball = element.on_wall
+    if ball is None:
+        return []
+    named = zip(ball.surface.coordinates, ball.u0.tolist(), ball.surface.units, strict=True)
+    place = ", ".join(f"{name} = {value:.4g}{'' if unit == '1' else f' {unit}'}" for name, value, unit in named)
+    force = float(np.linalg.norm(element.first_press[ball.contact_index]))
+    pressed = f"; the wall's force on it is {force:.4g} N" if np.isfinite(force) else ""
+    return [f"{ball.ball.name} on its wall: {place}{pressed}"]
 
 
 def pose(mechanism: Mechanism, sample: MechanismSample) -> str:

@@ -21,7 +21,7 @@ from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.contact.acting import OPEN
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.touching import Touching
-from proofroll.elements.mechanism.contact.turning import TurningFriction
+from proofroll.elements.mechanism.contact.turning import TurningFriction, rolling_levers
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import StepEvents, state_of
@@ -39,7 +39,7 @@ from proofroll.engines.exudyn.smooth.redundant import Redundant
 
 _CAPABILITY = MechanismCapability
 _OF_CONTACT = {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.UNBOUNDED_FRICTION}
-PROVIDES = redundant.PROVIDES | _OF_CONTACT | {_CAPABILITY.TURNING_FRICTION}
+PROVIDES = redundant.PROVIDES | _OF_CONTACT | {_CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
 LACKING: Mapping[str, str] = {
     **redundant.LACKING,
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
@@ -61,8 +61,8 @@ _CORNERS = ((-1.0, -1.0, 0.0), (2.0, -1.0, 0.0), (-1.0, 2.0, 0.0))
 
 
 def family(settings: ExudynSettings) -> Mapping[str, str]:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`; the same for balls and for bodies of mechanisms."""
-    if settings.formulation not in {"spheres", "contact"}:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
+    if settings.formulation != "spheres":
         return of_contact(Family.HARD)
     return of_contact(Family.SOFTENED, stiffness=settings.stiffness, zone=settings.friction_zone)
 
@@ -96,6 +96,7 @@ class Spheres(Redundant):
         self._contacts: list[_Made] = []
         self._events = StepEvents(mechanism.contacts, settings.dt)
         self._following: list[HollowSphere | MovingPlane] = []
+        self._resisting: list[TurningFriction] = []
         self._softness, self._larger, self._builds_up = 0.0, 0.0, False
         if not mechanism.contacts:
             return
@@ -130,7 +131,7 @@ class Spheres(Redundant):
         self, contact: BodyContact, gap: float, pressed: float, slip: float, settings: ExudynSettings
     ) -> _Made:
         """Adds a contact with the normal force ``pressed`` [N], ``gap`` [m] and ``slip`` [m/s] at the start."""
-        stiffness, zone = settings.penalty[:2]
+        stiffness, zone = settings.penalty
         sunk = pressed / stiffness
         sides = [(contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b)]
         sign = 1.0
@@ -193,11 +194,31 @@ class Spheres(Redundant):
         radius = max(shape.radius for shape in (contact.shape_a, contact.shape_b) if isinstance(shape, SphereShape))
         zone = settings.penalty[1] / radius
 
-        def pressing() -> tuple[float, Array]:
+        # A moment resists turning alike about a normal and its opposite; that of spheres joins their centres.
+        item, kind, output = (
+            self.system.GetObject(made.item),
+            exu.ConfigurationType.Current,
+            self.system.GetMarkerOutput,
+        )
+        end_a, end_b = item["markerNumbers"]
+
+        def between_spheres() -> tuple[float, Sequence[float]]:
+            xa, ya, za = output(end_a, Output.Position, kind).tolist()
+            xb, yb, zb = output(end_b, Output.Position, kind).tolist()
+            x, y, z = xa - xb, ya - yb, za - zb
+            distance = math.hypot(x, y, z)
+            Fx, Fy, Fz = self.system.GetObjectOutput(made.item, Output.Force).tolist()
+            return abs(x * Fx + y * Fy + z * Fz) / distance, (x / distance, y / distance, z / distance)
+
+        def on_plane() -> tuple[float, Sequence[float]]:
             _, normal, _ = self._lying(made)
-            return made.sign * float(normal @ self.system.GetObjectOutput(made.item, Output.Force)), normal
+            force = self.system.GetObjectOutput(made.item, Output.Force)
+            return made.sign * float(normal @ force), normal.tolist()
+
+        pressing = between_spheres if "spheresRadii" in item else on_plane
 
         bodies = contact.body_a, contact.body_b
+        self._resisting.append(friction)
         add_turning(self.system, friction, [self.marker(body, np.zeros(3)) for body in bodies], pressing, zone)
         motion = Tree(self._mechanism).at(*self._mechanism.start())
         w_a, w_b = (motion.w_WB[self._mechanism.body_index[body]] for body in bodies)
@@ -281,6 +302,7 @@ class Spheres(Redundant):
             contact_place=np.array(places),
             contact_friction=np.array([self.system.GetObject(made.item)["dynamicFriction"] for made in self._contacts]),
             contact_restitution=np.zeros(len(self._contacts)),
+            contact_rolling=rolling_levers(self._resisting, len(self._contacts)),
         )
         larger = Regularised(_DIFFERENCED + self._larger, "a sphere is larger by its indentation")
         if self._builds_up:  # then the first accelerations lack friction and prove nothing

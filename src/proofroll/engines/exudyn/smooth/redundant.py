@@ -14,7 +14,13 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.dynamics.commands import drive
 from proofroll.elements.mechanism.dynamics.loop_points import normal_of_plane
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.run.capabilities import (
+    ALL_JOINTS,
+    ALL_LOOPS,
+    FORCES,
+    MechanismCapability,
+    require,
+)
 from proofroll.elements.mechanism.run.sampling import (
     MechanismBuilt,
     MechanismSample,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from proofroll.core.engine import Regularised
-from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.settings import MujocoSettings
 
@@ -20,31 +20,23 @@ _ROUND_OFF = 1e-12
 
 def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regularised]:
     """Certificate quantity -> its tolerance with the reason."""
-    a, r = body.ball.radius, body.ball.inertia_ratio
-    e1 = body.surface.normal(body.p0)
-    e1_rate = body.surface.normal_gradient(body.p0) @ body.v0
-    bend = abs(float(e1_rate @ body.v0))
+    a = body.ball.radius
+    bend = abs(float(body.v0 @ body.surface.normal_gradient(body.p0) @ body.v0))
     gravity = float(np.linalg.norm(body.gravity))
     load = bend + gravity
     least, most = settings.impedances
     scale = natural_acceleration(body)
-    lacks = settings.formulation != "chart" and not settings.curvature
-    # Normal acceleration missing at depth zero: the share 1 - d of the load, which the impedance does not carry, the
-    # normal acceleration of the path (``bend``) if J̇v is missing, and its change over ``normal_lead``. Along the wall
-    # a ω × ė1 is missing, divided between motion and friction.
-    ahead = 2 * settings.normal_lead * abs(float(e1_rate @ initial_response(body)[0]))
-    missing = (1 - least) * load + ahead + (bend if lacks else 0.0)
-    turning = np.cross(e1, np.cross(body.w0, e1_rate))  # its part along the wall, turned
-    creep = a * float(np.linalg.norm(turning)) * r / (1 + r) if lacks else 0.0
-    why = "the impedance of a soft contact is below 1" + (" and its rows lack J̇v" if lacks else "")
+    # Normal acceleration missing at depth zero: the share 1 - d of the load, which the impedance does not carry.
+    missing = (1 - least) * load
+    why = "the impedance of a soft contact is below 1"
     result = dict(_computed(body, settings))
     if settings.start == "touching":
         # Friction is bounded by the little normal force of a contact at depth zero.
-        lost = _law_of_friction(body, settings, 0.0 if lacks else least * bend * body.ball.mass)
+        lost = _law_of_friction(body, settings, least * bend * body.ball.mass)
         why += "; the ball starts at depth zero, where no depth makes up for it"
         if lost:
             why += " and the normal force that remains does not hold the friction"
-        soft = _MARGIN * (missing + creep + lost) / scale + _SOLVER
+        soft = _MARGIN * (missing + lost) / scale + _SOLVER
         if soft >= 1:
             why += ": accelerations and forces at time 0 are not checked"
         return result | _dynamics(body, settings, soft, why)
@@ -54,7 +46,7 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     sunk = f"a soft contact carries the load only at a depth, {depth:.1e} of the radius at most"
     rolls = "MuJoCo's contact point, at which it rolls, lies midway in that depth"
     # The depth shortens the lever of friction, which balances gravity along the wall.
-    soft = (2 * (1 - least) * load + depth * gravity + _MARGIN * creep) / scale + _SOLVER
+    soft = (2 * (1 - least) * load + depth * gravity) / scale + _SOLVER
     return result | {
         "position": Regularised(depth, sunk),
         "gap": Regularised(depth, sunk),
@@ -90,8 +82,6 @@ def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str
         yield name, Regularised((1 + _ROUND_OFF) / settings.friction, stands)
     if body.contact.rolling_resistance:
         yield "rolling resistance", Regularised(_SOLVER, "its torque uses the normal force of the evaluation before")
-    if settings.velocity_lag:
-        yield "velocity", Regularised(_SOLVER, "it is MuJoCo's of half a step before plus half a step's acceleration")
 
 
 def _law_of_friction(body: RollingBall, settings: MujocoSettings, N: float) -> float:

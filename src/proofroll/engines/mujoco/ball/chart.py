@@ -9,22 +9,24 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.mujoco.ball.contact import foreseen_normal_force
-from proofroll.engines.mujoco.ball.formulation import Formulation
+from proofroll.engines.mujoco.ball.contact import Resistance, foreseen_normal_force
 from proofroll.engines.mujoco.ball.model import pose, quaternion_of, tangent_plane
-from proofroll.engines.mujoco.settings import MujocoSettings
 
 
-class Chart(Formulation):
+class Chart:
     """Joints ``u1`` (about the axis), ``u2`` (along it), ``normal`` (the depth) and ``spin`` (a ball joint).
 
     In these coordinates the contact's Jacobian is constant along the surface, so the term J̇v that MuJoCo leaves out
     of contact rows vanishes. Contact, friction and the normal degree of freedom remain MuJoCo's own. The site
     ``touch`` rides on ``u1`` and ``u2`` at the wall; the plane takes its pose, and stays a fixed body for MuJoCo.
+
+    Attributes:
+        resistance: the torque of rolling resistance that its steps apply.
     """
 
-    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
-        super().__init__(model, body, settings)
+    def __init__(self, model: Any, body: RollingBall) -> None:
+        self._model, self._ball = model, model.body("ball").id
+        self.resistance = Resistance(body.contact.rolling_resistance)
         self._wall = model.geom("wall").id
         self._touch = model.site("touch").id
         self._depth = int(model.joint("normal").dofadr[0])
@@ -56,7 +58,7 @@ class Chart(Formulation):
 
     @property
     def resists(self) -> bool:
-        """See :class:`Formulation`: True if the callback that applies the torque is set in MuJoCo."""
+        """True if the callback that applies the torque of rolling resistance is set in MuJoCo."""
         with self._callbacks(mujoco.MjData(self._model)):
             return mujoco.get_mjcb_passive() is not None
 

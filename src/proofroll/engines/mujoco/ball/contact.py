@@ -51,8 +51,6 @@ def contact_coefficient(model: Any, data: Any, geoms: tuple[int, int]) -> float:
     if data.ncon:
         contact = data.contact[0]
         return float(contact.friction[0]) if contact.dim > 1 else 0.0
-    if model.npair:
-        return float(model.pair_friction[0, 0]) if model.pair_dim[0] > 1 else 0.0
     sliding = max(model.geom_condim[index] for index in geoms) > 1
     return float(max(model.geom_friction[index, 0] for index in geoms)) if sliding else 0.0
 

@@ -19,20 +19,6 @@ from proofroll.engines.mujoco.settings import MujocoSettings
 # How much of the wall's tangent plane is drawn, in radii of the ball; for MuJoCo it has no end.
 _SEEN = 4.0
 
-_FREE = """
-<mujoco model="{name}, free">
-  <worldbody>
-    <light pos="0 0 1"/>
-    <body name="wall" mocap="true">
-      <geom name="wall" type="plane" size="{seen} {seen} 0.01"/>
-    </body>
-    <body name="ball">
-      <freejoint name="spin"/>
-      <geom name="ball" type="sphere" size="{radius}"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
 # The masses of carriage and slider are the least that MuJoCo accepts, and do not count.
 _CHART = """
 <mujoco model="{name}, chart">
@@ -60,15 +46,16 @@ _CHART = """
 """
 
 
-def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
-    """MjSpec of the scene's MJCF file for this formulation; without a file, a model of the same structure.
+def read_spec(scene: Scene, body: RollingBall) -> Any:
+    """MjSpec of the scene's MJCF file; without a file, a model of the same structure.
 
     Raises:
-        Refused: the scene does not name the file, MuJoCo cannot read it, or the formulation needs one and has none.
+        Refused: the scene does not name the file, or MuJoCo cannot read it.
     """
-    path = scene.folder / f"mujoco_{formulation}.xml"
+    path = scene.folder / "mujoco_chart.xml"
     if scene.folder == Path() or not path.is_file():
-        return mujoco.MjSpec.from_string(_written(body, scene.name, formulation))
+        numbers = {"radius": body.ball.radius, "seen": _SEEN * body.ball.radius}
+        return mujoco.MjSpec.from_string(_CHART.format(name=scene.name, **numbers))
     if path.name not in scene.files:
         raise Refused(f'the scene does not name the model beside it; write files = ["{path.name}"] into scene.toml')
     try:
@@ -77,22 +64,8 @@ def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
         raise Refused(f"MuJoCo cannot read {path.name}: {' '.join(str(error).split())}") from None
 
 
-def _written(body: RollingBall, name: str, formulation: str) -> str:
-    """MJCF of a model without a file.
-
-    Raises:
-        Refused: the formulation needs a file.
-    """
-    names = {"name": name, "radius": body.ball.radius, "seen": _SEEN * body.ball.radius}
-    if formulation == "free":
-        return _FREE.format(**names)
-    if formulation != "chart":
-        raise Refused(f"{formulation} needs a wall made of MuJoCo's shapes, mujoco_{formulation}.xml beside the scene")
-    return _CHART.format(**names)
-
-
 def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> None:
-    """Sets the numbers that all formulations share: ball, gravity, contact and solver."""
+    """Sets the numbers of ball, gravity, contact and solver."""
     ball = spec.body("ball")
     ball.explicitinertial = True
     ball.mass = body.ball.mass
@@ -113,18 +86,6 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
         # MuJoCo's defaults are written too: the file may hold others.
         geom.solref = [settings.contact_time, 1.0]
         geom.solimp = settings.solimp
-    if settings.friction_damping is not None:
-        _write_pair(spec, settings, settings.friction_damping)
-
-
-def _write_pair(spec: Any, settings: MujocoSettings, damping: float) -> None:
-    """Declares the contact as a pair of geoms, for only a pair has ``solreffriction``; it replaces MuJoCo's own."""
-    pair = spec.add_pair(geomname1="wall", geomname2="ball", condim=settings.condim)
-    sliding, turning, rolling = settings.friction_coefficients(settings.friction)
-    pair.friction = [sliding, sliding, turning, rolling, rolling]
-    pair.solref, pair.solimp = spec.geom("ball").solref, spec.geom("ball").solimp
-    # Stiffness and damping with the sign that marks the direct format; a slip has no position to be stiff about.
-    pair.solreffriction = [-1.0, -damping / settings.dt]
 
 
 def pose(element: Any, position: FloatArray, quaternion: FloatArray) -> None:

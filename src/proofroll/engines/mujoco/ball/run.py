@@ -7,46 +7,40 @@ import mujoco
 import numpy as np
 
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.engines.mujoco.ball.certificate_bounds import softness
 from proofroll.engines.mujoco.ball.chart import Chart
 from proofroll.engines.mujoco.ball.contact import contact_coefficient, contact_force
-from proofroll.engines.mujoco.ball.formulation import Formulation
-from proofroll.engines.mujoco.ball.free import Facets, Free
 from proofroll.engines.mujoco.ball.model import read_spec, write_physics
 from proofroll.engines.mujoco.ball.start import EVALUATIONS, accelerations, start
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
 from proofroll.engines.mujoco.settings import ROLLS, MujocoSettings, check
 
-_FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, "facets": Facets}
-# Joints whose coordinates hold an orientation.
-_TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
 # Part of the natural force above which a normal force is more than round-off.
 _PRESSED = 1e-6
-PROVIDES: Mapping[str, frozenset[str]] = dict.fromkeys(_FORMULATIONS, ALL_OF_A_BALL)
+PROVIDES: Mapping[str, frozenset[str]] = {"chart": ALL_OF_A_BALL}
 INHERENT: Mapping[str, Mapping[str, str]] = {
-    formulation: {BallCapability.ORIENTATION: "the ball's joint, a ball or free joint, has it in qpos"}
-    for formulation in _FORMULATIONS
+    "chart": {MechanismCapability.ORIENTATION: "the ball's joint has it in qpos"}
 }
 
 
 class MujocoBall(SteppedModel):
     """A ball in a cylinder.
 
-    The ball's orientation is in every model, asked for or not: free and ball joints have it in their state.
+    The ball's orientation is in every model, asked for or not: the ball's joint has it in its state.
     """
 
     def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
         super().__init__(model, settings)
         self._body = body
-        self._formulation = _FORMULATIONS[settings.formulation](model, body, settings)
+        self._formulation = Chart(model, body)
         self._ball = model.body("ball").id
         self._geom = model.geom("ball").id
-        wall = model.geom("wall").id if settings.formulation != "facets" else int(model.body("wall").geomadr[0])
-        self._geoms = (wall, self._geom)
+        self._geoms = (model.geom("wall").id, self._geom)
         with silent():
             start(model, self._data, body, settings, self._formulation)
 
@@ -64,9 +58,7 @@ class MujocoBall(SteppedModel):
         engine, spec = cls.of(scene, settings), _spec(scene, rolling_ball(scene), settings)
         for key in list(spec.keys):
             spec.delete(key)
-        data = engine._data
-        pose = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()} if len(data.mocap_pos) else {}
-        spec.add_key(name="start", qpos=data.qpos, qvel=data.qvel, **pose)
+        spec.add_key(name="start", qpos=engine._data.qpos, qvel=engine._data.qvel)
         compiled(spec)
         return spec
 
@@ -81,8 +73,6 @@ class MujocoBall(SteppedModel):
         """See :class:`proofroll.core.engine.Engine`."""
         data = self._evaluated()
         force = contact_force(self._model, data, self._geom)
-        data.qvel += self._settings.velocity_lag * data.qacc
-        mujoco.mj_comVel(self._model, data)
         velocity = np.zeros(6)
         mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_BODY, self._ball, velocity, 0)
         return BallSample(
@@ -114,7 +104,7 @@ class MujocoBall(SteppedModel):
             terms=terms_held(
                 # a contact of six dimensions resists rolling by itself
                 resists=self._formulation.resists or int(model.geom_condim[self._geom]) >= ROLLS,
-                turns=int(model.joint("spin").type[0]) in _TURNING_JOINTS,
+                turns=int(model.joint("spin").type[0]) == mujoco.mjtJoint.mjJNT_BALL,
             ),
             regularised=softness(self._body, self._settings),
         )
@@ -134,7 +124,7 @@ class MujocoBall(SteppedModel):
 
 def _spec(scene: Scene, body: RollingBall, settings: MujocoSettings) -> Any:
     """The model with all its numbers, before it is compiled."""
-    spec = read_spec(scene, body, settings.formulation)
+    spec = read_spec(scene, body)
     write_physics(spec, body, settings)
-    _FORMULATIONS[settings.formulation].write(spec, body)
+    Chart.write(spec, body)
     return spec

@@ -10,17 +10,11 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.mujoco.ball.formulation import Formulation
-from proofroll.engines.mujoco.running import evaluate_behind
+from proofroll.engines.mujoco.ball.chart import Chart
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 # Evaluations until the resistance's torque, which uses the normal force of the evaluation before, has converged.
 EVALUATIONS = 3
-# Evaluations where velocities lag; more for a soft contact, whose friction rows lag unlike the normal row, so that
-# the extrapolation removes less of the error.
-_ROUNDS_OF_LAG = 13
-_ROUNDS_OF_SOFT_LAG = 25
-_SOFT = 0.9
 # Relative tolerance of the settled depth.
 _DEPTH = 1e-14
 # Steps of false position before the search goes on by bisection.
@@ -39,14 +33,10 @@ def put_ball(model: Any, data: Any, body: RollingBall, depth: float) -> None:
     e1 = body.surface.normal(body.p0)
     data.qpos[:] = model.qpos0
     data.qvel[:] = data.qacc[:] = 0.0
-    if model.joint("spin").type[0] == mujoco.mjtJoint.mjJNT_FREE:
-        data.qpos[:3] = body.p0 + depth * e1
-        data.qpos[3:7] = (1.0, 0.0, 0.0, 0.0)
-    else:
-        for name, value in zip(("u1", "u2", "normal"), (*body.u0, depth), strict=True):
-            data.joint(name).qpos[0] = value
-        mujoco.mj_kinematics(model, data)
-        mujoco.mju_negQuat(data.joint("spin").qpos, data.xquat[ball])
+    for name, value in zip(("u1", "u2", "normal"), (*body.u0, depth), strict=True):
+        data.joint(name).qpos[0] = value
+    mujoco.mj_kinematics(model, data)
+    mujoco.mju_negQuat(data.joint("spin").qpos, data.xquat[ball])
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     about_normal = (body.w0 @ e1) * e1
@@ -56,23 +46,17 @@ def put_ball(model: Any, data: Any, body: RollingBall, depth: float) -> None:
     data.qvel[:] = np.linalg.solve(jacobian, np.concatenate([body.v0, w]))
 
 
-def start(model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Formulation) -> None:
+def start(model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Chart) -> None:
     """Writes the state at time 0 into ``data`` and computes its forces.
 
     Raises:
         Refused: the contact is too soft for a settled start.
     """
-    lag = settings.velocity_lag
-    # Lagging velocities are damped by b = 2 / (d tc), of which a soft contact turns the part d into acceleration.
-    share = 2 * lag / settings.contact_time
-    # Evaluations until all terms converge that use results of the evaluation before.
-    rounds = EVALUATIONS
-    if lag:
-        rounds = _ROUNDS_OF_LAG if settings.impedances[0] >= _SOFT else _ROUNDS_OF_SOFT_LAG
 
     def evaluate_at(depth: float) -> None:
         put_ball(model, data, body, depth)
-        evaluate_behind(data, formulation.evaluate, lag, share, rounds)
+        for _ in range(EVALUATIONS):
+            formulation.evaluate(data)
 
     depth = _TOUCHING * body.ball.radius
     if settings.start == "settled":

@@ -38,7 +38,7 @@ _SOFT = (
     "would change that much"
 )
 PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-PROVIDES |= {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION}
+PROVIDES |= {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
 LACKING: Mapping[str, str] = {
     **mechanism.LACKING,
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
@@ -181,13 +181,16 @@ class MujocoGeoms(MujocoMechanism):
     def _forward(self, data: Any) -> None:
         self._forward_once(data)
         if self._resistance:
-            if super()._applies:
-                self._loads.apply(data)
-            else:
-                data.xfrc_applied[:] = 0.0
-            pressing = self._resistance.pressing(data)
-            self._resistance.apply(data, pressing, self._states, self._resistance.applied)
+            self._resist(self._resistance, data)
             self._forward_once(data)
+
+    def _resist(self, resistance: RollingResistance, data: Any) -> None:
+        """Puts the torques of rolling resistance under the present normal forces into ``data``."""
+        if super()._applies:
+            self._loads.apply(data)
+        else:
+            data.xfrc_applied[:] = 0.0
+        resistance.apply(data, resistance.pressing(data), self._states, resistance.applied)
 
     def _forward_once(self, data: Any) -> None:
         self._walls.pose(data)
@@ -214,6 +217,8 @@ class MujocoGeoms(MujocoMechanism):
         with self._without_steps(), self._walls.unlifted():
             read = self._contacts.read(self._evaluated(), self._rows)
         contacts = {f"contact_{name}": value for name, value in read._asdict().items()}
+        if self._resistance is not None:
+            contacts["contact_rolling"] = self._resistance.levers
         if not self._evaluated().ncon:
             return replace(plain, **contacts)
         softened, forces = dict(plain.regularised), self._forces(self._evaluated())
@@ -248,14 +253,21 @@ class MujocoGeoms(MujocoMechanism):
         model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         model.pair_solimp[:, :2] = model.dof_solimp[:, :2] = LARGEST_IMPEDANCE
         try:
-            mujoco.mj_forward(model, data)
-            self._contacts.add_turning(data)
-            reference = data.efc_aref.copy()
-            for _ in range(_ROUNDS):
-                rates = self._rows(data, data.nefc) @ data.qacc
-                data.efc_aref[:] = reference
-                self._contacts.take_lift(data, rates)
-                mujoco.mj_fwdConstraint(model, data)
+            self._solve_hard(data)
+            if self._resistance:
+                self._resist(self._resistance, data)
+                self._solve_hard(data)
             return self._accelerations(data)
         finally:
             model.opt.cone, model.pair_solimp[:], model.dof_solimp[:] = kept
+
+    def _solve_hard(self, data: Any) -> None:
+        """Computes forces and accelerations of the present state, with J̇v and without the cone's lift."""
+        mujoco.mj_forward(self._model, data)
+        self._contacts.add_turning(data)
+        reference = data.efc_aref.copy()
+        for _ in range(_ROUNDS):
+            rates = self._rows(data, data.nefc) @ data.qacc
+            data.efc_aref[:] = reference
+            self._contacts.take_lift(data, rates)
+            mujoco.mj_fwdConstraint(self._model, data)

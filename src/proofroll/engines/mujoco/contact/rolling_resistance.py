@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.turning import turning_frictions
+from proofroll.elements.mechanism.contact.turning import rolling_levers, turning_frictions
 from proofroll.elements.mechanism.run.contacts.step_events import SLIP
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.mujoco.contact.contact_states import ContactStates
@@ -28,10 +28,12 @@ class RollingResistance:
     Attributes:
         applied: moments on the first bodies of the contacts in the last evaluation [N m], (contacts, 3).
         of_step: moments of the last step [N m].
+        levers: coefficient of each contact [m], (contacts,).
     """
 
     def __init__(self, model: Any, mechanism: Mechanism, settings: MujocoSettings, contacts: Contacts) -> None:
         self._model, self._contacts, self._pyramidal = model, contacts, settings.cone == "pyramidal"
+        self.levers = rolling_levers(turning_frictions(mechanism.contacts), len(mechanism.contacts))
         self._frictions = [friction for friction in turning_frictions(mechanism.contacts) if not friction.spins]
         pairs = [mechanism.contacts[friction.pressed_by] for friction in self._frictions]
         self._bodies = [(model.body(contact.body_a).id, model.body(contact.body_b).id) for contact in pairs]

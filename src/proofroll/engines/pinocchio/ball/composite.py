@@ -9,7 +9,25 @@ import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, ContactRows
+
+
+class ContactRows(NamedTuple):
+    """Constraint rows of the contact at a state; mass matrix and bias forces are then in ``data``.
+
+    The next evaluation may overwrite the arrays: copy them to keep them.
+
+    Attributes:
+        frame: e1, e2, e3 as columns, in the world, shape (3, 3).
+        rows: Jacobian for joint velocities, shape (n, nv); the last two rows are the slip along e2 and e3.
+        drift: time derivative of the constrained velocities at zero joint acceleration, shape (n,).
+        resistance: generalised force of rolling resistance per unit of normal force [m], shape (nv,); from the moment f
+            e1 × v/V about the centre (Blajer 2006, section 2.4), zero at V = 0, where it has no direction.
+    """
+
+    frame: FloatArray
+    rows: FloatArray
+    drift: FloatArray
+    resistance: FloatArray
 
 
 class _AlongAxes(NamedTuple):
@@ -30,7 +48,7 @@ class _AlongAxes(NamedTuple):
     turns: tuple[Any, ...]
 
 
-class Composite(BallWithRows):
+class Composite:
     """A joint about the cylinder's axis and one along it carry a massless carriage; a spherical joint carries the ball.
 
     Coordinates are (u1, u2, orientation of the ball in the carriage), velocities (u̇1, u̇2, spin relative to the
@@ -40,11 +58,23 @@ class Composite(BallWithRows):
     Without integrated orientation the ball's axes are those of the carriage, e1, e2, e3, and all quantities of
     Pinocchio have components along them. As the two motions of the surface commute, Jacobian and rows are constant in
     these axes.
+
+    Every method takes the ``data`` that it may overwrite, so sampling leaves the running data alone.
+
+    Attributes:
+        model: pin.Model.
+        ball: index of the joint that carries the ball.
+        q0, v0: joint configuration and velocity at time 0.
+        q_scale, v_scale: natural sizes of their components, for tolerances.
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
-        """See :class:`~proofroll.engines.pinocchio.ball.ball_with_rows.BallWithRows`."""
-        super().__init__(body)
+        """Builds the model; ``orientation``: whether the ball's own axes turn."""
+        self._radius = body.ball.radius
+        self._f = body.contact.rolling_resistance
+        self.model: Any = pin.Model()
+        self.model.gravity.linear = body.gravity
+        speed = float(np.linalg.norm(body.v0)) or math.sqrt(float(np.linalg.norm(body.gravity)) * self._radius)
         self._frame0 = body.surface.frame(np.zeros(2))
         self._carriage = 0
         self._read: Any = None  # the data to which self._wrench refers
@@ -54,7 +84,10 @@ class Composite(BallWithRows):
             self._carriage = self.model.addJoint(self._carriage, joint, pin.SE3.Identity(), name)
         placement = pin.SE3(self._frame0, body.surface.position(np.zeros(2)))
         self._wrench = np.zeros(3)
-        self._add_ball(body, self._carriage, pin.JointModelSpherical(), placement)
+        self.ball = self.model.addJoint(self._carriage, pin.JointModelSpherical(), placement, body.ball.name)
+        inertia = pin.Inertia(body.ball.mass, np.zeros(3), body.ball.inertia * np.eye(3))
+        self.model.appendBodyToJoint(self.ball, inertia, pin.SE3.Identity())
+        self._rest = np.zeros(self.model.nv)
 
         data = self.model.createData()
         self.q0 = np.concatenate([body.u0, [0.0, 0.0, 0.0, 1.0]])
@@ -67,10 +100,10 @@ class Composite(BallWithRows):
         self.v0 = np.linalg.lstsq(jacobian, np.concatenate([body.v0, body.w0]), rcond=None)[0]
         metres = np.asarray(body.surface.length_scales)
         self.q_scale = np.concatenate([self._radius / metres, np.ones(4)])
-        self.v_scale = np.concatenate([self._speed / metres, np.full(3, self._speed / self._radius)])
+        self.v_scale = np.concatenate([speed / metres, np.full(3, speed / self._radius)])
 
     def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
-        """Rows of no slip; see :class:`~proofroll.engines.pinocchio.ball.ball_with_rows.BallWithRows`."""
+        """Constraint rows of no slip at a state."""
         model, ball, a, axes = self.model, self.ball, self._radius, pin.LOCAL_WORLD_ALIGNED
         # computeAllTerms does not touch data.a, so the bias needs forwardKinematics with a joint acceleration of zero
         pin.forwardKinematics(model, data, q, v, self._rest)
@@ -110,9 +143,24 @@ class Composite(BallWithRows):
         """Jacobian from joint velocities to the ball's (v, ω), in the axes of its joint, shape (6, 5)."""
         return np.array(pin.computeJointJacobian(self.model, self.model.createData(), q, self.ball))
 
+    def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """State with velocities projected onto the rows, orthogonally in the mass metric (Blajer 2002)."""
+        return q, np.array(pin.impulseDynamics(self.model, data, v, self._only_rows(data, q, v)))
+
+    def _own_bias(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Acceleration of centre and spin at zero joint acceleration, in the joint's axes, shape (6,).
+
+        Leaves kinematics, mass matrix and bias forces in ``data``.
+        """
+        pin.forwardKinematics(self.model, data, q, v, self._rest)
+        pin.crba(self.model, data, q)
+        pin.nonLinearEffects(self.model, data, q, v)
+        return pin.getClassicalAcceleration(self.model, data, self.ball, pin.LOCAL).vector  # type: ignore[no-any-return]  # it is an array
+
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Constraint rows alone; leaves the mass matrix in ``data``."""
         if self._own is None:
-            return super()._only_rows(data, q, v)
+            return self.rows(data, q, v).rows
         pin.crba(self.model, data, q)
         return self._own.rows
 
@@ -140,7 +188,7 @@ class Composite(BallWithRows):
         return -float(e1.dot(data.oMi[self.ball].rotation.dot(data.f[self.ball].linear)))
 
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """See :class:`~proofroll.engines.pinocchio.ball.ball_with_rows.BallWithRows`; the multipliers are F2, F3."""
+        """Joint acceleration without slip, shape (nv,), overwritten by the next call; the multipliers are F2, F3."""
         if self._own is not None:
             return self._accelerate_along(self._own, data, q, v)
         frame, rows, drift, torque = self.rows(data, q, v)
@@ -157,7 +205,10 @@ class Composite(BallWithRows):
         return -self._wrench.item(0)
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, and the wall's force: N from the joint's wrench, F2 and F3 from the multipliers."""
+        """Joint acceleration without slip, shape (nv,), and wall force on the ball [N], world axes, shape (3,).
+
+        N comes from the joint's wrench, F2 and F3 from the multipliers.
+        """
         acceleration, friction = np.array(self.accelerate(data, q, v)), np.array(data.lambda_c)
         frame = data.oMi[self._carriage].rotation @ self._frame0
         pin.rnea(self.model, data, q, v, acceleration)

@@ -5,31 +5,22 @@ from collections.abc import Mapping
 
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
-from proofroll.engines.pinocchio.ball.contact import ContactRun
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.engines.pinocchio.ball.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
-BallRun = ContactRun | RowsRun
-PROVIDES: Mapping[str, frozenset[str]] = {
-    "composite": ALL_OF_A_BALL,
-    "free_flyer": ALL_OF_A_BALL,
-    "contact": ALL_OF_A_BALL,
-}
-INHERENT: Mapping[str, Mapping[str, str]] = {
-    "contact": {BallCapability.ORIENTATION: "the spherical joint's configuration is the ball's orientation"}
-}
+PROVIDES: Mapping[str, frozenset[str]] = {"composite": ALL_OF_A_BALL}
 
 
-def ball_run(scene: Scene, settings: PinocchioSettings) -> BallRun:
+def ball_run(scene: Scene, settings: PinocchioSettings) -> RunOnBody:
     """Run of the scene's ball.
 
     Raises:
         Refused: the scene requires the orientation, and the settings exclude it.
     """
-    settings = _decided(scene, settings)
-    return (ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings)
+    return on_body(RowsRun(rolling_ball(scene), _decided(scene, settings)), scene)
 
 
 def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
@@ -38,9 +29,7 @@ def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
     Raises:
         Refused: the scene requires the orientation, and the settings exclude it.
     """
-    if settings.formulation == "contact":
-        return settings
-    asked = BallCapability.ORIENTATION in scene.requires
+    asked = MechanismCapability.ORIENTATION in scene.requires
     if asked and settings.orientation is False:
-        raise Refused(f"needs {BallCapability.ORIENTATION}, which orientation=false leaves out")
+        raise Refused(f"needs {MechanismCapability.ORIENTATION}, which orientation=false leaves out")
     return dataclasses.replace(settings, orientation=asked) if settings.orientation is None else settings

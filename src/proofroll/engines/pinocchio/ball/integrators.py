@@ -10,7 +10,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import controlled_step, solver_from
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows
+from proofroll.engines.pinocchio.ball.composite import Composite
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.tangent_map import require_tangent_map
 
@@ -23,7 +23,7 @@ class TangentIntegrator(ABC):
         turns: True if the orientation of the ball is integrated.
     """
 
-    def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
+    def __init__(self, mechanism: Composite, settings: PinocchioSettings) -> None:
         self._mechanism, self._settings = mechanism, settings
         self._model, self._data = mechanism.model, mechanism.model.createData()
         self.turns = bool(settings.orientation)
@@ -54,11 +54,11 @@ class TangentIntegrator(ABC):
 class FixedStep(TangentIntegrator):
     """Base of methods with a fixed step ``dt``; subclasses define one step."""
 
-    def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
+    def __init__(self, mechanism: Composite, settings: PinocchioSettings) -> None:
         super().__init__(mechanism, settings)
         # Factors on the joint velocity that moves the configuration: 0 freezes the ball's orientation. The ball's
-        # inertia is the same in all axes, so at each instant axes may be chosen that coincide with the carriage's (or
-        # the world's). In both formulations the spin comes last.
+        # inertia is the same in all axes, so at each instant axes may be chosen that coincide with the carriage's. The
+        # spin comes last.
         self._moving = np.ones(self._model.nv)
         self._moving[-3:] = float(self.turns)
         self._dt = float(settings.dt or 0.0)
@@ -125,11 +125,11 @@ class Adaptive(TangentIntegrator):
     lower order.
     """
 
-    def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
+    def __init__(self, mechanism: Composite, settings: PinocchioSettings) -> None:
         super().__init__(mechanism, settings)
         if self.turns:
             require_tangent_map()
-        # In both formulations the orientation comes last. Without it (see FixedStep) only the position is integrated,
+        # The orientation comes last. Without it (see FixedStep) only the position is integrated,
         # and its rates are joint velocities.
         self._count_q = self._model.nq if self.turns else self._model.nq - QUATERNION
         self._rtol = float(settings.rtol or 0.0)

@@ -1,4 +1,4 @@
-"""Formulations ``composite`` and ``free_flyer``: a ball with constraint rows, and the integrator of its motion."""
+"""Formulation ``composite``: a ball with rows of rolling, and the integrator of its motion."""
 
 from collections.abc import Callable, Mapping
 
@@ -7,9 +7,7 @@ import pinocchio as pin
 
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
-from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.ball.composite import Composite
-from proofroll.engines.pinocchio.ball.free_flyer import FreeFlyer
 from proofroll.engines.pinocchio.ball.integrators import (
     Adaptive,
     SemiImplicitEuler,
@@ -18,7 +16,7 @@ from proofroll.engines.pinocchio.ball.integrators import (
 )
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
-_INTEGRATORS: Mapping[str, Callable[[BallWithRows, PinocchioSettings], TangentIntegrator]] = {
+_INTEGRATORS: Mapping[str, Callable[[Composite, PinocchioSettings], TangentIntegrator]] = {
     "dop853": Adaptive,
     "semi_implicit_euler": SemiImplicitEuler,
     "rk4": TangentRungeKutta4,
@@ -31,8 +29,7 @@ class RowsRun:
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
         """Starts at time 0; ``settings.orientation`` decides if the orientation is integrated, not the scene."""
-        kind = Composite if settings.formulation == "composite" else FreeFlyer
-        self.mechanism: BallWithRows = kind(body, bool(settings.orientation))
+        self.mechanism = Composite(body, bool(settings.orientation))
         self.motion = _INTEGRATORS[settings.integrator](self.mechanism, settings)
         self._looked_at = self.mechanism.model.createData()  # for sampling, which leaves the running data alone
 
@@ -59,7 +56,7 @@ class RowsRun:
         mechanism, q, v = self.mechanism, self.motion.q, self.motion.v
         model, data, ball = mechanism.model, mechanism.model.createData(), mechanism.ball
         inertia = model.inertias[ball]
-        # In both formulations the spin comes last, in orthonormal axes: there the row of slip has the norm a, and
+        # The spin comes last, in orthonormal axes: there the row of slip has the norm a, and
         # rolling resistance the norm f. At rest the resistance has no direction, so it is evaluated for a motion along
         # that row.
         row = mechanism.rows(data, q, v).rows[-2].copy()
@@ -73,7 +70,7 @@ class RowsRun:
             gravity=model.gravity.linear.copy(),
             ball_radius=float(np.linalg.norm(row[-3:])),
             rolling_resistance=float(np.linalg.norm(torque[-3:])),
-            gap=mechanism.gap(q),
+            gap=None,  # the joints hold the ball on the wall
             acceleration=of_ball.linear.copy(),
             angular_acceleration=of_ball.angular.copy(),
             terms=terms_held(resists=torque.any(), turns=self.motion.turns),

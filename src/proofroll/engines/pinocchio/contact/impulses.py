@@ -15,6 +15,7 @@ import pinocchio as pin
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.contact.turning import rolling_levers
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
@@ -31,7 +32,7 @@ PROVIDES: frozenset[str] = (
     ALL_JOINTS
     | FORCES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-    | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION}
+    | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
     | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
     | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS, _CAPABILITY.MOTIONS}
 )
@@ -200,10 +201,10 @@ class ImpulseSteps:
             q = pin.integrate(self._model, q, late * v)
         terms = self.terms(q, v, self._dt, late)
         turning = np.zeros((len(terms.touching), 3))
-        if self._midpoint:
-            turning = self._turning(q, v, terms.touching, 0.5 * self._dt)
+        if self._midpoint or self._returned.any():
+            turning = self._turning(q, v, terms.touching, self._dt - late)
         shifts = self._shifts(terms.J, q, v, terms.touching, turning)
-        return self._turned(v, terms, shifts, self._dt, convex=self._settings.convex)
+        return self._turned(q, v, terms, shifts, self._dt, convex=self._settings.convex)
 
     def beginning(self, span: float, *, convex: bool) -> Impulses:
         """Impulses of a short time from now on, with the turning of the contacts (J̇v); open gaps stay open."""
@@ -212,7 +213,7 @@ class ImpulseSteps:
         shifts[: len(touching)] = self._turning(self.q, self.v, touching, span)
         apart = [touch.absent or touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
         shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
-        return self._turned(self.v, terms, shifts, span, convex=convex)
+        return self._turned(self.q, self.v, terms, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:
         """Normals, positions and widest cones of contact points in Pinocchio, with gaps of the shapes at its poses."""
@@ -230,6 +231,7 @@ class ImpulseSteps:
             "contact_place": place,
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
             "contact_restitution": self.restitution.copy(),
+            "contact_rolling": rolling_levers(self._moments.frictions, len(touching)),
             "contact_tangential": np.array([contact.tangential_restitution for contact in self.contacts]),
             "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
         }
@@ -361,8 +363,8 @@ class ImpulseSteps:
         speeds = self.joints.J[len(self.joints.friction) :] @ v
         gaps += [(k, item.gap(q), float(speeds[k - begin])) for k, item in enumerate(self.joints.stops, begin)]
         for k, gap, approach in gaps:
-            e = float(self._returned[k])
-            hits = e and -e * approach > _SOFT * self._gravity * dt
+            e, bend = float(self._returned[k]), abs(turning[k, 2]) if k < len(touching) else 0.0
+            hits = e and -e * approach > _SOFT * (self._gravity * dt + bend)
             shifts[k, 2] = np.inf
             if self._midpoint:
                 if gap <= max(self._touching, _NEAR * self._gravity * dt**2):
@@ -377,7 +379,7 @@ class ImpulseSteps:
                 shifts[k, :2] = self.contacts[k].tangential_restitution * (J[k, :2] @ v)
         return shifts
 
-    def _turned(self, v: Array, terms: StepTerms, shifts: Array, span: float, *, convex: bool) -> Impulses:
+    def _turned(self, q: Array, v: Array, terms: StepTerms, shifts: Array, span: float, *, convex: bool) -> Impulses:
         """Impulses of a step that begins with the velocity ``v``, with those of friction against turning.
 
         An impact has no moment of friction.
@@ -386,7 +388,8 @@ class ImpulseSteps:
             return self._solved(terms, shifts, span, convex=convex)
         J, free, inverse, touching = terms
         rows, count = self._moments.rows(self._data, touching), len(touching)
-        soft = J[:, 2] @ v >= -_SOFT * self._gravity * span
+        bends = np.abs(self._turning(q, v, touching, span)[:, 2])  # as a curved wall turns away from a fast ball
+        soft = J[:, 2] @ v >= -_SOFT * (self._gravity * span + bends)
         kicks = list[Impulses]()
 
         def pressed(impulses: Array) -> Pressed:

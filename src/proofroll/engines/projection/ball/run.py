@@ -9,9 +9,10 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.engines.projection.ball.geometry import Uniform, matrix
 from proofroll.engines.projection.ball.method import ProjectedBall, start_and_scales
 from proofroll.engines.projection.ball.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
@@ -23,7 +24,7 @@ _WITHOUT_ORIENTATION = 7
 FORMULATIONS = ("euler", "rotating_frame")
 PROVIDES: Mapping[str, frozenset[str]] = dict.fromkeys(FORMULATIONS, ALL_OF_A_BALL)
 INHERENT: Mapping[str, Mapping[str, str]] = {
-    "euler": {BallCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
+    "euler": {MechanismCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
 }
 
 
@@ -142,9 +143,9 @@ class ProjectionBall:
         )
 
 
-def ball_run(scene: Scene, settings: ProjectionSettings) -> ProjectionBall:
+def ball_run(scene: Scene, settings: ProjectionSettings) -> RunOnBody:
     """Run of the scene's ball. Raises Refused: the compiled series do not follow the orientation."""
-    follow = BallCapability.ORIENTATION in scene.requires
+    follow = MechanismCapability.ORIENTATION in scene.requires
     if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
         raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
-    return ProjectionBall(rolling_ball(scene), settings, follow=follow)
+    return on_body(ProjectionBall(rolling_ball(scene), settings, follow=follow), scene)

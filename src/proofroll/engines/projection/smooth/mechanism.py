@@ -13,7 +13,13 @@ from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.dynamics.commands import drive
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.run.capabilities import (
+    ALL_JOINTS,
+    ALL_LOOPS,
+    FORCES,
+    MechanismCapability,
+    require,
+)
 from proofroll.elements.mechanism.run.sampling import (
     MechanismBuilt,
     MechanismSample,
@@ -55,6 +61,7 @@ PROVIDES = frozenset(
         MechanismCapability.SLIP_REBOUNDS,
         MechanismCapability.CONTACT_REBOUNDS,
         MechanismCapability.TURNING_FRICTION,
+        MechanismCapability.ORIENTATION,
     }
 )
 # Regularity of the loops' rows, relative to the largest so far, that counts as singular: accelerations lose as many

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import parse_engine
-from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.papers.blajer_2006.figures.definition import Figures
@@ -119,7 +120,7 @@ def run_figures(
     facts, spec, asks = known_facts[chosen], names[chosen], tuple[str, ...]()
     if spec.name != TRUTH and figures.wants_orientation:
         provided = describe(spec.name, runner.workers).provides[str(facts.settings.get("formulation"))]
-        asks = (ORIENTATION,) if BallCapability.ORIENTATION in provided else ()
+        asks = (ORIENTATION,) if MechanismCapability.ORIENTATION in provided else ()
     cases, truths = dict[str, Case](), dict[str, Case]()
     for name, planned in figures.runs.items():
         run_engine = planned.engine if planned.engine and spec.name != TRUTH else chosen

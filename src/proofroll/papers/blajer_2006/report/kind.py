@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
-from proofroll.elements.ball_on_surface.of_body import ball_of
+from proofroll.elements.ball_on_surface.as_body import ball_of, rolling_ball
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.papers.blajer_2006.report import onsets
 from proofroll.report.kinds import ReportKind
 
@@ -35,12 +35,13 @@ class BallReport(ReportKind):
     def covers(scene: Scene) -> bool:
         """True if one ball in an upright cylinder is the scene's only element."""
         (element,) = scene.elements if len(scene.elements) == 1 else (None,)
-        return isinstance(element, BallOnSurface) or (element is not None and ball_of(element) is not None)
+        return element is not None and ball_of(element) is not None
 
     @staticmethod
     def group(scene: Scene) -> str:
         """Group of the ball's contact with the wall: slipping or rolling."""
-        return "ball rolling" if isinstance(scene.elements[0], BallOnSurface) else "ball slipping"
+        (element,) = scene.elements
+        return "ball rolling" if isinstance(element, MechanismElement) and element.rolls_evenly else "ball slipping"
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:

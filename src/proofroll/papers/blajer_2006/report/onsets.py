@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from proofroll.core.events import Event, EventKind, events_of
 from proofroll.core.number_format import number
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.json_data import OPTIONAL
 from proofroll.papers.blajer_2006.slip.onset import onset_verdict as judged_onset
 from proofroll.report.comparison.plots import Bound, Mark, PointCurves

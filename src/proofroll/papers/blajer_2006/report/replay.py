@@ -13,7 +13,7 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import EventKind
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.contacts.stretches import carried
 from proofroll.files.json_data import plain
@@ -108,7 +108,7 @@ def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
         normal=normal,
         press=press,
         friction=friction,
-        state=_state(sampled, times),
+        state=None if np.isinf(body.contact.mu_static) else _state(sampled, times),  # it always sticks
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from proofroll.core.errors import InputError, ProofrollError, Refused
 from proofroll.core.events import Event, EventKind, events_of
 from proofroll.core.plugins import engine_names, parse_engine
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns

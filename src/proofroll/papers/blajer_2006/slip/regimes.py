@@ -15,7 +15,7 @@ from proofroll.core.bounds import require_bounds
 from proofroll.core.errors import InputError, error_location
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, validated
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_file

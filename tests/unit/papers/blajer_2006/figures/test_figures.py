@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.figures import style
 from proofroll.papers.blajer_2006.figures.definition import Figures

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from placed_balls import of_ball
 
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.engines.projection.ball.orientation import EulerAngles
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.figures.quantities import euler_angles, known, quantity
@@ -28,7 +29,7 @@ def test_euler_angles_come_back_over_many_turns() -> None:
 def test_every_known_quantity_has_values_or_is_the_engines_to_tell() -> None:
     """All but the Euler angles follow from the truth's trajectory, in the order of its samples."""
     scene = load_scene("sphere_in_cylinder")
-    dataset = truth(scene, np.linspace(0.0, 0.2, 5))
+    dataset = of_ball(truth(scene, np.linspace(0.0, 0.2, 5)))
     missing = []
     for name in known(rolling_ball(scene)):
         values = quantity(name, rolling_ball(scene), dataset, (0.0, math.pi / 2, 0.0))

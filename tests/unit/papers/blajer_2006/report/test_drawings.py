@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.report.drawings import overview

@@ -91,7 +91,7 @@ class ContactWatch:
             return SeenInRun(count, located if mechanism.has_events else None, None)
         if located and wrong_bracket(located):  # whoever keeps the record says so
             return SeenInRun(count, located, None)
-        if any(sample.q_WB is None for sample in samples):
+        if self._element.lacks(samples, ()):
             return SeenInRun(count, None, None)
         pressed = given_forces(mechanism, samples)
         if count < 3 or np.isnan(pressed[1:]).any():

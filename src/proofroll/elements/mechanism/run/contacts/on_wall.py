@@ -5,13 +5,15 @@ The contact point is at ``p_WB + a e1``; array arguments may carry leading dimen
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.arrays import FloatArray, cross, longest
 from proofroll.elements.mechanism.dynamics.commands import placed_start
 from proofroll.elements.mechanism.scene.balls import Ball, Contact
 from proofroll.elements.mechanism.scene.checks import WORLD, ZERO
@@ -20,8 +22,11 @@ from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, Declared
 from proofroll.elements.mechanism.scene.shapes.walls.charts import WallCoordinates, wall_coordinates
+from proofroll.elements.mechanism.scene.shapes.walls.of_revolution import Bore
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from proofroll.elements.mechanism.scene.model import Mechanism
     from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 
@@ -145,6 +150,25 @@ class BodyOnWall:
     index: int
     contact_index: int
     sign: float
+
+    @cached_property
+    def upright_bore(self) -> bool:
+        """True if it moves in a cylinder at rest about a line through the world's origin along gravity."""
+        place, gravity = self.surface, self.gravity
+        wall = getattr(getattr(place, "chart", None), "wall", None)
+        if self.flies or self.wall_rate is not None or not isinstance(wall, Bore):
+            return False
+        off_axis, leaning = (longest(cross(vector, place.axis)) for vector in (place.origin, gravity))
+        return off_axis <= _SAME * wall.radius and leaning <= _SAME * longest(gravity)
+
+    @property
+    def rolls_evenly(self) -> bool:
+        """True if it rolls in such a cylinder and never slips."""
+        return self.upright_bore and math.isinf(self.contact.mu_static)
+
+    def own(self, dataset: xr.Dataset, name: str) -> FloatArray:
+        """A variable of all bodies, for the ball alone, shape (time, ...)."""
+        return np.asarray(dataset[name].to_numpy()[:, self.index])
 
     def resisting(self, N: FloatArray, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:  # noqa: ARG002 -- the protocol's
         """Moment against turning relative to the wall, about axes along it; of a ball that slips, too [N m]."""

@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 import xarray as xr
-from balls_as_bodies import as_bodies
 from closed_balls import A, G, sliding_to_roll
 
 from proofroll.core.truth import truth
@@ -23,7 +22,7 @@ TIMES, MU, MASS = np.linspace(0, 0.25, 81), 0.2, 0.517
 @cache
 def sliding() -> tuple[MechanismElement, xr.Dataset]:
     """A ball that slides on a plane, in closed form, as a run of a mechanism with a contact."""
-    element = the_mechanism(as_bodies("slide_to_roll"))
+    element = the_mechanism(load_scene("slide_to_roll"))
     p, v, w, _ = sliding_to_roll({}, TIMES)
     way = v[0] / np.linalg.norm(v[0])
     force = np.repeat((MASS * G * (np.array([0, 0, 1.0]) - MU * way))[None], len(TIMES), axis=0)
@@ -79,6 +78,6 @@ def test_audits_of_the_truth_vanish(name: str) -> None:
 
 def test_energy_of_a_resisted_slip_balances() -> None:
     """Rolling resistance of a ball that slips acts against its turning, not against the velocity of its centre."""
-    scene = as_bodies("slide_to_roll", side_spin=40, normal_spin=9, rolling_resistance=5e-3)
+    scene = load_scene("slide_to_roll", side_spin=40, normal_spin=9, rolling_resistance=5e-3)
     curves = the_mechanism(scene).observe(truth(scene, np.linspace(0, 0.1, 31)))
     assert np.abs(curves["energy_balance"]).max() < 1e-4  # along the centre's velocity: 0.1 J

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
-from proofroll.core.arrays import cross
+from proofroll.core.arrays import cross, read_only
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.scene.rotations import Array, from_z
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Wall
@@ -238,7 +238,7 @@ class WallCoordinates:
     @cached_property
     def axes(self) -> Array:
         """The wall's axes in the world, as columns."""
-        return from_z(self.axis)
+        return read_only(from_z(self.axis))
 
     def position(self, u: npt.ArrayLike) -> Array:
         """Centre in the world [m], shape (..., 3)."""

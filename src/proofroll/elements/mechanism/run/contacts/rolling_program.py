@@ -4,7 +4,8 @@ import numpy as np
 
 from proofroll.core import program_text
 from proofroll.core.program_text import FailedRun, asking, assignment
-from proofroll.elements.ball_on_surface.failure import (
+from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall
+from proofroll.elements.mechanism.run.contacts.rolling_failure import (
     BACKWARDS,
     GAIN,
     SLIPPED,
@@ -12,23 +13,23 @@ from proofroll.elements.ball_on_surface.failure import (
     largest_kinetic_energy,
     off_surface,
 )
-from proofroll.elements.ball_on_surface.model import RollingBall
 
 _WALL = '''
 
 def frame(p):
     """e1 (into the wall), e2, e3 for a ball at p."""
-    return np.reshape(BODY.surface.triad(*map(float, p)), (3, 3))
+    return np.reshape(BODY.surface.frame(BODY.surface.locate(p)).T, (3, 3))
 
 
 def gap(p):
     """Distance of the ball from the wall [m], negative where it has sunk in."""
-    return float(BODY.surface.nearby(*map(float, p))[0])
+    return float(BODY.surface.gap(p))
 '''
 _SIGNS = '''
 
 def signs(stopped, p, v, w):
     """Which failures the run shows."""
+    p, v, w = (np.reshape(values, (-1, 3)) for values in (p, v, w))
     gaps = np.array([gap(x) for x in p])
     energy = 0.5 * MASS * (v**2).sum(1) + 0.5 * INERTIA * (w**2).sum(1) - MASS * p @ np.array(GRAVITY)
     gain = float(np.max(energy - energy[0])) / KINETIC
@@ -55,38 +56,37 @@ def signs(stopped, p, v, w):
 '''
 
 
-def _run(body: RollingBall, failed: FailedRun) -> str:
+def _run(body: BodyOnWall, failed: FailedRun) -> str:
     """Part of the program that runs the ball by proofroll."""
     head = "import numpy as np\nfrom proofroll import load_scene, simulate\n"
-    head += "from proofroll.elements.ball_on_surface.element import rolling_ball\n\n"
+    head += "\n"
     numbers = assignment(
         RADIUS=body.ball.radius,
         MASS=body.ball.mass,
         INERTIA=body.ball.inertia,
         GRAVITY=body.gravity,
-        POSITION=body.p0,
+        POSITION=body.surface.position(body.u0),
         VELOCITY=body.v0,
     )
     run = asking(failed, "p_WB", "v_WB", "w_WB")
-    return f"{head}{numbers}\n{run}\n\nBODY = rolling_ball(SCENE)\n{_WALL}"
+    return f"{head}{numbers}\n{run}\n\nBODY = SCENE.elements[0].on_wall\n{_WALL}"
 
 
-def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
+def program(body: BodyOnWall, failed: FailedRun, engine: str | None) -> str:
     """Text of the program; see :class:`proofroll.core.element_abilities.WritesPrograms`."""
     truth, part = failed.truth, engine if engine is not None else _run(body, failed)
-    generator = body.surface.generators[-1]
     true: list[float] = []
     if truth is not None:
         true = (truth[body.surface.coordinates[-1]].to_numpy() - body.u0[-1]).tolist()
     resists = truth is not None and body.contact.rolling_resistance > 0
-    ways = np.round(heading(truth["v_WB"].to_numpy()), 4).tolist() if resists and truth is not None else []
+    ways = np.round(heading(body.own(truth, "v_WB")), 4).tolist() if resists and truth is not None else []
     numbers = {
         "OFF": off_surface(body),
         "KINETIC": largest_kinetic_energy(body, truth),
         "GAIN": GAIN,
         "SLIPPED": SLIPPED,
         "BACKWARDS": BACKWARDS,
-        "ALONG": list(generator.axis),
+        "ALONG": body.surface.axis.tolist(),
         "TRUE": true,
         "HEADING": ways,
     }

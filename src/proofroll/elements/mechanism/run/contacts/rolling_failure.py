@@ -1,18 +1,20 @@
-"""Signs of failure of a run of a ball on a surface; each threshold has its reason."""
+"""Signs of failure of a run of a ball that rolls in an upright cylinder; each threshold has its reason."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Sign
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.contacts.local_frame import creep
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall
 
 # Distance from the wall, relative to the radius or to the path's radius of curvature if smaller, that is a failure. The
 # lever of friction and the curvature of the path are then wrong by as much, so that nothing is accurate.
@@ -37,22 +39,22 @@ MEANINGS = {
 }
 
 
-def off_surface(body: RollingBall) -> float:
+def off_surface(body: BodyOnWall) -> float:
     """Largest allowed distance from the wall, to either side [m]."""
-    bend = float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))
+    bend = float(np.linalg.norm(body.surface.normal_gradient(body.surface.position(body.u0)), 2))
     return OFF_SURFACE * (min(body.ball.radius, 1 / bend) if bend else body.ball.radius)
 
 
-def largest_kinetic_energy(body: RollingBall, truth: xr.Dataset | None) -> float:
+def largest_kinetic_energy(body: BodyOnWall, truth: xr.Dataset | None) -> float:
     """Largest kinetic energy of the true run, or without it of the start [J]."""
     m, J = body.ball.mass, body.ball.inertia
     v, w = body.v0[None, :], body.w0[None, :]
     if truth is not None:
-        v, w = np.vstack([v, truth["v_WB"].to_numpy()]), np.vstack([w, truth["w_WB"].to_numpy()])
+        v, w = (np.vstack([at_start, body.own(truth, name)]) for at_start, name in ((v, "v_WB"), (w, "w_WB")))
     return float(np.max(0.5 * m * (v**2).sum(-1) + 0.5 * J * (w**2).sum(-1)))
 
 
-def signs(body: RollingBall, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
+def signs(body: BodyOnWall, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
     """See :class:`proofroll.core.element.Element`."""
     gap, energy = dataset["gap"].to_numpy(), dataset["energy"].to_numpy()
     allowed = off_surface(body)
@@ -63,8 +65,8 @@ def signs(body: RollingBall, dataset: xr.Dataset, truth: xr.Dataset | None) -> l
             ENERGY_GAIN: energy - energy[0] > GAIN * largest_kinetic_energy(body, truth),
         }
     if truth is not None and body.contact.rolling_resistance > 0:
-        v = dataset["v_WB"].to_numpy()
-        forward_speed = np.sum(v * heading(truth["v_WB"].to_numpy())[: len(v)], axis=-1)
+        v = body.own(dataset, "v_WB")
+        forward_speed = np.sum(v * heading(body.own(truth, "v_WB"))[: len(v)], axis=-1)
         shown[REVERSED] = forward_speed < -BACKWARDS * float(np.linalg.norm(body.v0))
     return [Sign(name, values) for name, values in shown.items()]
 
@@ -77,6 +79,23 @@ def heading(v: FloatArray) -> FloatArray:
     return np.asarray(v[last] / np.where(speeds[last] > 0, speeds[last], 1.0)[:, None])
 
 
-def cause(body: RollingBall, dataset: xr.Dataset, error: float) -> str | None:
+def cause(body: BodyOnWall, dataset: xr.Dataset, error: float) -> str | None:
     """Creep, if the distance slipped while rolling explains the ``error`` of the last coordinate; else None."""
-    return CREEP if creep(dataset) >= SLIPPED * error * body.surface.length_scales[-1] else None
+    return CREEP if creep(dataset) >= SLIPPED * error * body.surface.scales(*body.u0.tolist())[-1] else None
+
+
+def exceeds_grip(lines: Sequence[Mapping[str, Any]], friction: FloatArray) -> str | None:
+    """Reason why an engine whose friction is bounded moves another ball than one that never slips; None: it does not.
+
+    Args:
+        lines: of a stored certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
+        friction: friction over normal force of the true motion [1], shape (time,); NaN without contact.
+    """
+    needed = float(np.max(friction[np.isfinite(friction)], initial=0.0))
+    for line in lines:
+        largest = max(line["found"], default=0.0) if line["quantity"] == "inverse friction" else 0.0
+        if largest * needed > 1:
+            return (
+                f"another scene: a friction of {1 / largest:.4g}, where the scene has no bound and needs {needed:.4g}"
+            )
+    return None
