@@ -33,8 +33,8 @@ class RollingResistance:
 
     def __init__(self, model: Any, mechanism: Mechanism, settings: MujocoSettings, contacts: Contacts) -> None:
         self._model, self._contacts, self._pyramidal = model, contacts, settings.cone == "pyramidal"
-        self.levers = rolling_levers(turning_frictions(mechanism.contacts), len(mechanism.contacts))
         self._frictions = [friction for friction in turning_frictions(mechanism.contacts) if not friction.spins]
+        self.levers = rolling_levers(self._frictions, len(mechanism.contacts))
         pairs = [mechanism.contacts[friction.pressed_by] for friction in self._frictions]
         self._bodies = [(model.body(contact.body_a).id, model.body(contact.body_b).id) for contact in pairs]
         self._dt, self._lag = settings.dt, settings.velocity_lag
