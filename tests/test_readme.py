@@ -123,7 +123,7 @@ MARKS = {"agrees": "✓", "converges": "≈", "differs": "✗", "refused": "⊘"
 
 
 def test_the_picture_of_the_report_is_that_of_the_table() -> None:
-    """The picture has the rows of the paper with verdicts that the table has for them, in 300 kB at most."""
+    """The picture has the rows of the paper, each with a verdict that the table counts there, in 300 kB at most."""
     text = PAGE.read_text(encoding="utf-8")
     path = ROOT / "docs" / "report.png"
     assert "](docs/report.png)" in (ROOT / "README.md").read_text(encoding="utf-8")
@@ -132,7 +132,7 @@ def test_the_picture_of_the_report_is_that_of_the_table() -> None:
     assert [engine for engine, _ in shown] == [row.engine for row in load_comparison("paper").rows]
     table = text.partition("<!-- verdicts:begin -->\n")[2].partition("<!-- verdicts:end -->")[0].splitlines()[2:]
     for (engine, verdict), cell in zip(shown, (line.split("|")[5] for line in table), strict=True):
-        # a report shows fewer of the runs until all are made
+        # a report judges the combinations of [brief]; the table also counts the other verdicts of a row
         assert verdict in cell or MARKS[verdict] in cell, engine
 
 

@@ -166,3 +166,16 @@ def test_who_builds_without_the_harness_is_refused_too(name: str) -> None:
                 kind.build(one, next(iter(presets.values())))
             tried += 1
     assert tried > 1
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_a_formulation_of_a_rolling_ball_says_that_it_has_no_other_bodies(name: str) -> None:
+    """Who asks it for a ball on a plane reads what it represents, and not that it lacks what a ball is."""
+    kind, said = load_engine(name), 0
+    for formulation, presets in kind.presets.items():
+        if MechanismCapability.FREE in kind.provides[formulation] or formulation == "tree":
+            continue
+        with pytest.raises(Refused, match="free bodies, and it represents nothing but a ball that rolls without slip"):
+            kind.build(load_scene("slide_to_roll"), next(iter(presets.values())))
+        said += 1
+    assert said

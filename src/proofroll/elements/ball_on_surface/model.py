@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -18,6 +19,10 @@ _CAPABILITY = MechanismCapability
 # What a formulation of one ball provides that rolls in an upright cylinder, without and with its orientation.
 ROLLS: frozenset[str] = frozenset({_CAPABILITY.CONTACT, _CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION})
 ALL_OF_A_BALL: frozenset[str] = ROLLS | {_CAPABILITY.ORIENTATION}
+# Why such a formulation has no other bodies.
+NO_OTHER_BODIES: Mapping[str, str] = {
+    _CAPABILITY.FREE: "it represents nothing but a ball that rolls without slip in an upright cylinder"
+}
 
 
 @dataclass(frozen=True)

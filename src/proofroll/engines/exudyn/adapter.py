@@ -13,6 +13,7 @@ from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.exudyn.ball import formulations as ball
@@ -56,6 +57,7 @@ class Exudyn:
         "discs": frozenset({MechanismCapability.UNBOUNDED_FRICTION}),
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        **dict.fromkeys(ball.RUNS, NO_OTHER_BODIES),
         "redundant": redundant.LACKING,
         "spheres": spheres.LACKING,
         "discs": discs.LACKING,

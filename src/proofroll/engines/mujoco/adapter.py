@@ -11,6 +11,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body
+from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.mujoco.ball import run as ball
@@ -38,6 +39,7 @@ class Mujoco:
     }
     made_for: ClassVar[Mapping[str, frozenset[str]]] = {"geoms": frozenset({MechanismCapability.CONTACT})}
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "chart": NO_OTHER_BODIES,
         "joints": mechanism.LACKING,
         "geoms": mechanism_geoms.LACKING,
     }

@@ -10,6 +10,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.as_body import RunOnBody
+from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.pinocchio.ball import formulations as ball
@@ -40,6 +41,7 @@ class Pinocchio:
         "impulses": frozenset(MechanismCapability[name] for name in ("CONTACT", "JOINT_FRICTION", "STOPS"))
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "composite": NO_OTHER_BODIES,
         "null_space": joint_tree.LACKING,
         "constraint_dynamics": constraint_dynamics.LACKING,
         "impulses": impulses.LACKING,

@@ -8,6 +8,7 @@ from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.heyoka_library import with_heyoka
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.as_body import RunOnBody
+from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.engines.projection.ball import run as ball
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
@@ -25,6 +26,7 @@ class Projection:
         **ball.PROVIDES,
         "dependent": mechanism.PROVIDES,
     }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = dict.fromkeys(ball.FORMULATIONS, NO_OTHER_BODIES)
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {

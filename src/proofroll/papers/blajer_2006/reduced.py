@@ -21,7 +21,7 @@ from proofroll.elements.ball_on_surface.compiled.rolling import parameters, redu
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import ROLLS, RollingBall
+from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES, ROLLS, RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form, placed, reduced_rates, start
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
@@ -268,10 +268,12 @@ class Reduced:
         "closed_form": ROLLS - {MechanismCapability.TURNING_FRICTION},
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "equations": NO_OTHER_BODIES,
         "closed_form": {
+            **NO_OTHER_BODIES,
             MechanismCapability.TURNING_FRICTION: "there is no closed form with rolling resistance; "
-            "take formulation=equations"
-        }
+            "take formulation=equations",
+        },
     }
     settings: ClassVar[type[ReducedSettings]] = ReducedSettings
     presets: ClassVar[Mapping[str, Mapping[str, ReducedSettings]]] = PRESETS

@@ -58,8 +58,7 @@ def signs(stopped, p, v, w):
 
 def _run(body: BodyOnWall, failed: FailedRun) -> str:
     """Part of the program that runs the ball by proofroll."""
-    head = "import numpy as np\nfrom proofroll import load_scene, simulate\n"
-    head += "\n"
+    head = "import numpy as np\nfrom proofroll import load_scene, simulate\n\n"
     numbers = assignment(
         RADIUS=body.ball.radius,
         MASS=body.ball.mass,
