@@ -30,14 +30,14 @@ class ChoiceStudy(NamedTuple):
         href: HTML id of its evidence.
         runs: HTML ids of the evidence of its runs, by row and place.
         requires: capabilities that its scene requires of a formulation; None: not known.
-        short: why a row does not hold in at most twelve words, by number of the row.
+        short: verdicts that a row expects, and why it does not hold in at most twelve words, by number of the row.
     """
 
     title: str
     href: str
     runs: Mapping[tuple[int, str], str] = MappingProxyType({})
     requires: frozenset[str] | None = None
-    short: Mapping[int, str] = MappingProxyType({})
+    short: Mapping[int, tuple[Collection[str], str]] = MappingProxyType({})
 
 
 @dataclass(frozen=True)

@@ -155,7 +155,7 @@ class ReportContent:
                 href=item.section,
                 runs={(run.row, run.point): item.run_id(run.row, run.point) for run in item.runs},
                 requires=frozenset(item.requires),
-                short={number: row.claim.short for number, row in enumerate(item.rows) if row.claim.short},
+                short={n: (row.claim.expect, row.claim.short) for n, row in enumerate(item.rows) if row.claim.short},
             )
             for item in self.comparisons
         }

@@ -53,7 +53,7 @@ class Holds:
         points = holding(study, Requirements(quantity, self.tolerance, engines=(self.engine,)), here=True)
         steps = [point.step for point in points if point.step is not None]
         if not steps:
-            return ClaimJudgement(claim, self.because, False, "no step of the sweep does")
+            return ClaimJudgement(claim, self.because, *_not_shown(study, [self.engine], "no step of the sweep does"))
         shown = f"the coarsest that does is {max(steps):g}"
         return ClaimJudgement(claim, self.because, math.isclose(max(steps), self.step), shown)
 
@@ -82,7 +82,7 @@ class Converges:
         budgets = [b for b in study.budgets if b.curve in curves and b.quantity == quantity]
         orders = [(b.order_low or b.order, b.order_high or b.order) for b in budgets if b.order]
         if not orders:
-            return ClaimJudgement(claim, self.because, False, "no order shows")
+            return ClaimJudgement(claim, self.because, *_not_shown(study, [self.engine], "no order shows"))
         shown = "what shows is " + ", ".join(f"{low:.3g} to {high:.3g}" for low, high in orders)
         holds = all(low <= highest and high >= lowest for low, high in orders)
         return ClaimJudgement(claim, self.because, holds, shown)
@@ -123,7 +123,7 @@ class Cheapest:
         mine = _of(within, self.engine)
         others = [point for point in within if point not in mine]
         if not mine:
-            return False, "no step of it holds that"
+            return _not_shown(study, self.engine, "no step of it holds that")
         if not others:
             return True, "nothing else holds that"
         best, rival = mine[0], others[0]
@@ -162,6 +162,13 @@ def _unknown(study: TradeoffStudy, engines: Sequence[str]) -> str:
         return "it was not measured"
     late = next((point for point in about if point.status == "timeout"), None)
     return f"a run of it met the limit of time: {late.message}" if late else ""
+
+
+def _not_shown(study: TradeoffStudy, engines: Sequence[str], words: str) -> tuple[bool | None, str]:
+    """Judgement of what no point shows: undecided with the reason if a brief study left steps of the engines out."""
+    curves = {point.curve for point in _of(study.points, engines)}
+    left_out = next((item.reason for item in study.dropped if study.brief and item.engine in curves), None)
+    return (False, words) if left_out is None else (None, left_out)
 
 
 STUDY = "tradeoff"

@@ -31,8 +31,8 @@ from proofroll.studies.tradeoff.records import (
     TradeoffStudy,
     TruthCost,
 )
-from proofroll.studies.tradeoff.sweep import BROKEN
-from proofroll.studies.tradeoff.tradeoff import Extent, Tradeoff, pareto_entries, study_path, tradeoff
+from proofroll.studies.tradeoff.sweep import BROKEN, too_long
+from proofroll.studies.tradeoff.tradeoff import BRIEF_LONGEST, Extent, Tradeoff, pareto_entries, study_path, tradeoff
 
 
 def make_tradeoff(
@@ -212,14 +212,14 @@ def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]
         sentences.append(f"No tolerance breaks {names}, sampled every {outcome.question.sparse:g} s either.")
     done = [point for point in outcome.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
-    reason = TimeBudget(outcome.extent.budget or 0.0).sentence
-    beyond = [
-        f"{curve.engine} from {max(dropped):g} on"
-        for curve in outcome.curves
-        if (dropped := [step for step, why in curve.dropped.items() if why == reason])
-    ]
-    if beyond:
-        sentences.append(f"Left out, for {reason}: {', '.join(beyond)}.")
+    for reason in (TimeBudget(outcome.extent.budget or 0.0).sentence, too_long(BRIEF_LONGEST)):
+        beyond = [
+            f"{curve.engine} from {max(dropped):g} on"
+            for curve in outcome.curves
+            if (dropped := [step for step, why in curve.dropped.items() if why == reason])
+        ]
+        if beyond:
+            sentences.append(f"Left out, for {reason}: {', '.join(beyond)}.")
     refused = sum(point.result.status == Status.REFUSED for point in outcome.points)
     wrong = sum(point.result.status == Status.WRONG_MODEL for point in outcome.points)
     ended = len(outcome.points) - len(done) - refused - wrong

@@ -115,12 +115,13 @@ def sweep(
     finer: Callable[[Curve], Sequence[float]] = lambda _: FINER,
     gain: float = GAIN,
     budget: TimeBudget | None = None,
+    longest: float | None = None,
 ) -> dict[float, Reference]:
     """Fills the curves with points, and returns sampling interval [s] -> truth.
 
     Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to finer ones while
-    each removes the part ``gain`` of the error. With a budget the coarsest runs of all curves come first, and runs that
-    would exceed their share are dropped.
+    each removes the part ``gain`` of the error. With a budget or a longest run the coarsest runs of all curves come
+    first, and runs that would take longer than their share, or than the longest, are dropped.
 
     Args:
         question: of the sweep.
@@ -130,6 +131,7 @@ def sweep(
         finer: curve -> its finer steps, in sampling intervals.
         gain: see above.
         budget: processor time of all runs, or None.
+        longest: processor time of a run but the first of its curve [s], or None.
     """
     references: dict[float, Reference] = {}
     for is_first in (True, False, False, False):
@@ -142,7 +144,7 @@ def sweep(
         ]
         if not asked:
             break
-        _run(question, asked, runner, references, progress, budget)
+        _run(question, asked, runner, references, progress, budget, longest)
         for curve in curves:
             curve.points.sort(key=lambda point: -(point.step or 0.0))
     return references
@@ -201,6 +203,7 @@ def _run(
     references: dict[float, Reference],
     progress: Progress | None,
     budget: TimeBudget | None,
+    longest: float | None,
 ) -> None:
     """Runs curves with these steps or tolerances, and the truths that are still missing."""
     options: list[tuple[str, dict[str, Any]]] = []
@@ -220,8 +223,8 @@ def _run(
             curve.dropped[value] = str(error)
     runs = [case for _, both in cases for case in both]
     pending = [] if references else [question.truth(truth_facts, runs)]
-    for stage in _stages(cases) if budget else [cases]:
-        kept = [(curve, both) for curve, both in stage if not budget or _affordable(curve, both[0], budget, len(stage))]
+    for stage in _stages(cases) if budget or longest else [cases]:
+        kept = [(curve, both) for curve, both in stage if _affordable(curve, both[0], budget, longest, len(stage))]
         cases_now = [*pending, *(case for _, both in kept for case in both)]
         results = runner.run(cases_now, progress, budget, {case.key: -1 for case in pending})  # the truth begins first
         for case in pending:
@@ -248,20 +251,28 @@ def _stages(cases: Sequence[tuple[Curve, tuple[Case, ...]]]) -> list[list[tuple[
     return [[item for item in turn if item] for turn in itertools.zip_longest(*turns.values())]
 
 
-def _affordable(curve: Curve, case: Case, budget: TimeBudget, abreast: int) -> bool:
-    """True if a run is expected to fit its share of the budget, from the time of the curve's last run.
+def too_long(longest: float) -> str:
+    """Reason why a step is dropped whose run would take more than ``longest`` [s]."""
+    return f"runs of more than {longest:g} s of processor time are left out of a brief study"
+
+
+def _affordable(curve: Curve, case: Case, budget: TimeBudget | None, longest: float | None, abreast: int) -> bool:
+    """True if a run is expected to fit its share of the budget and the longest run, from the time of the curve's last.
 
     Otherwise its step is dropped with a reason. False, too, if the engine refused the scene, as it would with every
     step.
     """
     if not curve.points:
-        return not curve.dropped
+        return not (budget and curve.dropped)
     last, step = curve.points[-1], CurvePoint(case, curve.points[-1].result).step
     if last.result.status is Status.REFUSED:
         return False
     finer = (last.step or 1.0) / (step or 1.0)
-    longer = finer if curve.fixed_step or finer < 1 else _TIGHTER
-    if last.result.processor.get("advance", 0.0) * longer <= _OF_RUNS * budget.left / abreast:
+    expected = last.result.processor.get("advance", 0.0) * (finer if curve.fixed_step or finer < 1 else _TIGHTER)
+    if longest and expected > longest:
+        curve.dropped[step or 0.0] = too_long(longest)
+    elif budget and expected > _OF_RUNS * budget.left / abreast:
+        curve.dropped[step or 0.0] = budget.sentence
+    else:
         return True
-    curve.dropped[step or 0.0] = budget.sentence
     return False

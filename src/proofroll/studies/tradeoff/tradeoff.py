@@ -38,6 +38,8 @@ BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS, ONCE = 2, 0.1, 0.02, 10.0
 # of a sampling interval (BRIEF_CLAIMED for curves with a claim), and only while each step removes BRIEF_GAIN of the
 # error, as methods of order 2 do; a curve of order 1 can be extrapolated.
 BRIEF_FINER, BRIEF_CLAIMED, BRIEF_GAIN = 2e-3, 1e-3, 0.65
+# A brief study drops runs that are expected to take longer [s of processor time].
+BRIEF_LONGEST = 3.0
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,8 @@ def tradeoff(question: Question, runner: Runner, extent: Extent, progress: Progr
         tell(case.engine.name)
 
     finer, gain = (partial(_briefly, extent.claimed), BRIEF_GAIN) if extent.is_brief else (lambda _: FINER, GAIN)
-    references = sweep(question, curves, runner, arrived, finer, gain, limit)
+    longest = BRIEF_LONGEST if extent.is_brief else None
+    references = sweep(question, curves, runner, arrived, finer, gain, limit, longest)
     study = Tradeoff(question=question, curves=curves, absent=absent, references=references, extent=extent)
     _, truth = resolve_with_truth([], runner.workers)
     _time(study, question.case(truth, question.every), runner.workers, tell, limit)

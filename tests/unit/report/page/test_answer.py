@@ -94,10 +94,11 @@ def test_a_kind_is_held_with_one_setting_or_with_one_by_scene() -> None:
 
 
 def test_what_fails_is_told_in_the_words_of_its_comparison() -> None:
-    """One reason for a formulation, the gravest first, and none of what holds the tolerance."""
+    """One reason for a formulation, the gravest first; none of what holds the tolerance, or of a refusal elsewhere."""
     wrong = line(engine="delta", row=5, error=0.5, limit="another limit", verdict="differs", preset="default")
-    studies = STUDIES | {"arm": STUDIES["arm"]._replace(short={0: "it is soft", 5: "it falls"})}
-    matrix = choice_matrix([LINE, wrong], studies)
+    refused = line(engine="eta", row=6, status="refused", verdict="refused")
+    short = {0: (["differs"], "it is soft"), 5: (["differs"], "it falls"), 6: (["differs"], "it hops elsewhere")}
+    matrix = choice_matrix([LINE, wrong, refused], STUDIES | {"arm": STUDIES["arm"]._replace(short=short)})
     told = answer(matrix, 1e-6, False).kinds[0].failures
     assert [(item.name, item.why) for item in told] == [
         ("delta joints default", "it falls"), ("alpha joints default", "it is soft"),

@@ -15,7 +15,7 @@ from proofroll.files.data_folders import data_folder
 from proofroll.running.case import Status
 from proofroll.running.timing import FACTOR
 from proofroll.studies.tradeoff.claims import claims_for, load_claims
-from proofroll.studies.tradeoff.records import TradeoffStudy
+from proofroll.studies.tradeoff.records import DroppedStep, TradeoffStudy
 
 TEXT = """
 study = "tradeoff"
@@ -130,6 +130,19 @@ def test_steps_and_orders_are_judged_exactly_in_a_brief_study_too(tmp_path: Path
     assert "what shows is 0.9 to 1.1" in sentence
     late = [replace(first, status=Status.TIMEOUT, id=9), *study.points]
     assert claims.contradictions(replace(study, points=late)) == []
+
+
+def test_steps_that_a_brief_study_leaves_out_contradict_nothing(tmp_path: Path) -> None:
+    """No step that holds, no order and no cheapest engine: undecided with the reason where steps were left out."""
+    claims = load_claims(written(tmp_path, TEXT + EXACT))
+    study = measured(0.1, (1.0,), brief=True)
+    off = replace(study.points[0], error={"z": 1e-2}, envelope={"z": 1e-2})
+    study = replace(study, points=[off, study.points[1]])
+    assert len(claims.contradictions(study)) == 3
+    study = replace(study, dropped=[DroppedStep(off.curve, 1e-4, "it would take too long")])
+    assert claims.contradictions(study) == []
+    assert sum("it would take too long" in sentence for sentence in claims.undecided(study)) == 3
+    assert len(claims.contradictions(replace(study, brief=False))) == 3
 
 
 @pytest.mark.parametrize(

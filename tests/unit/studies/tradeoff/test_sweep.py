@@ -19,7 +19,7 @@ from proofroll.running.store import Store
 from proofroll.running.time_budget import TimeBudget
 from proofroll.studies.tradeoff import tradeoff
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question
-from proofroll.studies.tradeoff.sweep import BROKEN, FINER, _affordable, _first, _further, curves_of, sweep
+from proofroll.studies.tradeoff.sweep import BROKEN, FINER, _affordable, _first, _further, curves_of, sweep, too_long
 from proofroll.studies.tradeoff.tradeoff import _briefly
 
 QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.1, "z")
@@ -191,12 +191,27 @@ def test_within_a_budget_a_step_takes_no_more_than_its_share(step: float, left: 
 
     curve.points = [CurvePoint(case(2e-3), Result(Status.DONE, "reached", processor={"advance": 1.0}))]
     budget = SimpleNamespace(left=left, sentence="too dear")
-    assert _affordable(curve, case(step), budget, 2) is affordable  # type: ignore[arg-type]
+    assert _affordable(curve, case(step), budget, None, 2) is affordable  # type: ignore[arg-type]
     assert curve.dropped == ({} if affordable else {step: "too dear"})
     refused = Result(Status.REFUSED, "it cannot", processor={})
     curve.points, curve.dropped = [CurvePoint(case(2e-3), refused)], {}
-    assert not _affordable(curve, case(step), budget, 2)  # type: ignore[arg-type]
+    assert not _affordable(curve, case(step), budget, None, 2)  # type: ignore[arg-type]
     assert curve.dropped == {}
+
+
+@pytest.mark.parametrize(("longest", "kept"), [(1.9, False), (2.1, True), (None, True)])
+def test_a_run_that_would_take_too_long_is_dropped(longest: float | None, kept: bool) -> None:
+    """Half the step takes twice as long: a brief study drops it above its longest run, and says so."""
+    (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=default]"])
+
+    def case(step: float) -> Case:
+        facts = replace(curve.facts, settings=curve.facts.settings | {"dt": step})
+        return Case("sphere_in_cylinder", {}, "", facts, QUESTION.until, QUESTION.every)
+
+    assert _affordable(curve, case(2e-3), None, longest, 2)  # the first run of a curve tells how long it takes
+    curve.points = [CurvePoint(case(2e-3), Result(Status.DONE, "reached", processor={"advance": 1.0}))]
+    assert _affordable(curve, case(1e-3), None, longest, 2) is kept
+    assert curve.dropped == ({} if kept else {1e-3: too_long(longest or 0.0)})
 
 
 def test_the_truth_begins_before_any_run(tmp_path: Path) -> None:
