@@ -173,7 +173,7 @@ def _from_report(
         "engines": costs,
     }
     head = f"Tolerance: {number(part)} {'of the path' if bound.relative else unit}."
-    key = "× real time: seconds of motion per second of computing; ≈: to a factor of about two."
+    key = "× real time: seconds of motion per second of computing; ≈: to a factor of about two; ≥: at least."
     shown: list[Table | str] = [answer_table(matrix, part, forces, scenes=True), advised[-1].sentence]
     options.show(content, as_json, lambda: [head, *shown, *_cost_tables(costs), key])
     single = [item for item, column in zip(advised, matrix.columns, strict=False) if not column.whole]

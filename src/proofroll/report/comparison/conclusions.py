@@ -11,7 +11,7 @@ from proofroll.report.comparison.scores import closest, furthest_off, scores
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, off_by, unjudged, with_caveat
-from proofroll.report.page.answer import ColumnAnswer, ReaderQuestion, told
+from proofroll.report.page.answer import ColumnAnswer, ReaderQuestion, speed_words, told
 from proofroll.report.page.candidates import Candidate
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
 
@@ -54,7 +54,7 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
         asked = ReaderQuestion(FIRST_TOLERANCE, not choice.unjudged[True].issuperset(column.studies))
         taken = ColumnAnswer(choice, column, asked).taken
         if taken is not None:
-            text += f" To hold {asked.words}, the cheapest is {told(choice, taken)}: {taken.text} real time."
+            text += f" To hold {asked.words}, the cheapest is {told(choice, taken)}: {speed_words(taken)} real time."
     return text
 
 

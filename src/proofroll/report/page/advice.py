@@ -9,6 +9,7 @@ from proofroll.report.page.answer import (
     NOT_REACHED,
     ColumnAnswer,
     answer,
+    speed_words,
     take_words,
     told,
 )
@@ -24,8 +25,8 @@ class Advised:
         of: name of the group or scene; ``all``: all scenes.
         sentence: for a person.
         choice: setting and step, or formulation; None: nothing holds the tolerance.
-        cost: of the choice, wall seconds per simulated second at the slowest scene; None: without a choice, or for
-        ``all``.
+        cost: of the choice, wall seconds per simulated second at the slowest scene that it holds; None: without a
+            choice, or for ``all``.
         judged: False: motion is judged in none of the scenes, so that nothing can be chosen.
     """
 
@@ -57,8 +58,8 @@ def _of_column(matrix: ChoiceMatrix, motion: ColumnAnswer, forces: bool) -> Advi
     taken = item.taken
     if taken is None:
         return Advised(column.name, f"{head}: {item.closest_words}.")
-    speed = f"{taken.text} real time{taken.share}"
-    sentence = f"{head}: take {told(matrix, taken)} ({speed}); next: {item.next_words}"
+    sentence = f"{head}: take {told(matrix, taken)} ({speed_words(taken)} real time); next: {item.next_words}"
+    sentence += "".join(f"; {text}" for text in item.exceptions)
     sentence += "." if forces else f"; if forces count: {motion.forces_words}."
     return Advised(column.name, sentence, taken.name or take_words(matrix, taken), taken.cost)
 

@@ -12,7 +12,7 @@ from functools import cached_property
 
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
-from proofroll.report.page.choice_cell import CANNOT, NO_RUN, PARTLY, ChoiceCell, cell_of
+from proofroll.report.page.choice_cell import CANNOT, NO_RUN, ChoiceCell, cell_of, speeds
 from proofroll.report.page.choice_matrix import ChoiceColumn, ChoiceMatrix, ChoiceRow
 
 # Lengths per metre of path, in words, by negative power of ten of the tolerance.
@@ -66,7 +66,7 @@ class ColumnAnswer:
     @cached_property
     def scenes(self) -> list[ChoiceCell]:
         """Best cell of these in each scene of the column."""
-        return [min(cells, key=_state_rank) for cells in zip(*(item.by_scene for item in self.standings), strict=True)]
+        return [min(cells, key=_state_rank) for cells in zip(*(item.each for item in self.standings), strict=True)]
 
     @property
     def judged(self) -> bool:
@@ -80,18 +80,31 @@ class ColumnAnswer:
 
     @property
     def taken(self) -> ChoiceCell | None:
-        """The engine to take; None: nothing holds the tolerance."""
-        return self.standings[0] if self.standings and self.standings[0].holds else None
+        """The engine to take, for as many scenes as it holds; None: nothing holds the tolerance in any."""
+        return self.standings[0] if self.standings and self.standings[0].held else None
 
     @property
     def tied(self) -> list[ChoiceCell]:
-        """Engines whose costs overlap with that of the one to take."""
+        """Engines whose costs overlap with that of the one to take in all scenes that it holds."""
         return [item for item in self.standings if self.taken and item.ties(self.taken)]
 
     @property
-    def most_held(self) -> int:
-        """Largest number of the column's scenes that one engine holds."""
-        return max((sum(cell.holds for cell in item.by_scene) for item in self.standings), default=0)
+    def exceptions(self) -> list[str]:
+        """For each scene that the engine to take does not hold: which one does, or what comes closest."""
+        taken = self.taken
+        if taken is None or taken.held == len(taken.each):
+            return []
+        alone = [item for item in self.matrix.columns if not item.whole and item.group == self.column.group]
+        texts = []
+        for column, cell in zip(alone, taken.each, strict=True):
+            if cell.holds:
+                continue
+            there = replace(self, column=column)
+            if there.taken is not None:
+                texts.append(f"{column.title}: {take_words(self.matrix, there.taken)}, {there.taken.text}")
+            else:
+                texts.append(f"{column.title}: {there.closest_words}")
+        return texts
 
     @property
     def failures(self) -> list[ChoiceCell]:
@@ -120,13 +133,20 @@ class ColumnAnswer:
     @property
     def next_words(self) -> str:
         """The next engine and what it costs relative to the one to take; or what it does not do."""
-        best, second = self.taken, next((item for item in self.standings[1:2] if item.holds), None)
+        best, second = self.taken, next((item for item in self.standings[1:2] if item.held), None)
         if second is None or best is None:
             return "no other engine holds it" if best else ""
+        pairs = [(mine, other) for mine, other in zip(second.each, best.each, strict=True) if mine.holds]
+        part = f" in {len(pairs)} of {second.scenes} scenes" if second.held < best.held else ""
+        name = f"{take_words(self.matrix, second)}{part}"
         if second.ties(best):
-            return f"{take_words(self.matrix, second)}, a tie"
-        ratio = float(f"{second.cost / best.cost:.2g}")
-        return f"{take_words(self.matrix, second)}, {ratio:g}× the cost"
+            return f"{name}, a tie"
+        ratios = sorted(float(f"{mine.cost / other.cost:.2g}") for mine, other in pairs if other.holds)
+        if not ratios:
+            return name
+        ends = "–".join(f"{item:g}" for item in dict.fromkeys((ratios[0], ratios[-1])))
+        is_open = any(mine.open for mine, other in pairs if other.holds)
+        return f"{name}, {ends}× the cost{', lead open' if is_open else ''}"
 
     @property
     def closest_words(self) -> str:
@@ -139,10 +159,6 @@ class ColumnAnswer:
         if all(standing.state == Verdict.NOT_JUDGED for standing in ran):
             return NOT_REACHED
         best = self.standings[0]
-        if best.state == PARTLY:
-            pairs = zip(self.column.scenes, best.by_scene, strict=True)
-            held = ", ".join(f"{scene.words} {cell.text}" for scene, cell in pairs if cell.holds)
-            return f"none for all; {self.matrix.title(best.engine)} holds {best.text}: {held}"
         return f"none; closest {take_words(self.matrix, best)}: {best.why or best.state}"
 
     @property
@@ -153,9 +169,9 @@ class ColumnAnswer:
             return "✗ none" if self.both.judged else "not judged"
         # A kind of several scenes is held by settings that only the cells of these name.
         best, second = (
-            item and (item.engine, item.name, [cell.name for cell in item.by_scene]) for item in (self.taken, taken)
+            item and (item.engine, item.name, [cell.name for cell in item.each]) for item in (self.taken, taken)
         )
-        return "✓ the same choice" if best == second else f"{take_words(self.matrix, taken)}, {taken.text}"
+        return "✓ the same choice" if best == second else f"{take_words(self.matrix, taken)}, {speed_words(taken)}"
 
 
 @dataclass(frozen=True)
@@ -221,9 +237,10 @@ def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
         name = _lower(item.column.title)
         many = len(item.column.scenes)
         if item.taken is not None:
-            equals = [tie.engine for tie in item.tied if tie.absent == item.taken.absent]
+            equals = [tie.engine for tie in item.tied if tie.held == item.taken.held]
             engines = sorted([item.taken.engine, *equals], key=lambda engine: matrix.title(engine).lower())
-            taken.setdefault(tuple(engines), []).append(name)
+            part = f"{item.taken.held} of {item.taken.scenes} scenes of " if item.taken.held < item.taken.scenes else ""
+            taken.setdefault(tuple(engines), []).append(f"{part}{name}")
         elif not item.judged:
             silent.append(name)
         elif all(x.state in {NO_RUN, CANNOT, Verdict.NOT_JUDGED} for x in item.standings):
@@ -259,6 +276,16 @@ def listed(words: Sequence[str]) -> str:
 def take_words(matrix: ChoiceMatrix, taken: ChoiceCell | ChoiceRow) -> str:
     """Engine and formulation for a reader."""
     return f"{matrix.title(taken.engine)} {taken.formulation.replace('_', ' ')}".strip()
+
+
+def speed_range(taken: ChoiceCell) -> str:
+    """Speeds of the engine to take, from the slowest to the fastest scene that it holds."""
+    return speeds([cell for cell in taken.each if cell.holds])
+
+
+def speed_words(taken: ChoiceCell) -> str:
+    """The same with the part of the scenes that it holds."""
+    return f"{speed_range(taken)}{taken.share}"
 
 
 def told(matrix: ChoiceMatrix, taken: ChoiceCell) -> str:

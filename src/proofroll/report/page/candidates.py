@@ -42,6 +42,7 @@ class Candidate:
     Attributes:
         row: number of its row in the study.
         name: engine, formulation, setting and step, for a person.
+        step: its step [s] or tolerance; None: it has neither.
         motion, forces: largest error of a coordinate, and of a reaction, relative to its size; None: not reported.
         motion_held, forces_held: smallest tolerance that it holds without luck: the largest of that error, of those of
             its next two finer steps, and of the least error that its limit of small steps can have.
@@ -56,6 +57,7 @@ class Candidate:
 
     row: int
     name: str
+    step: float | None
     motion: float | None
     forces: float | None
     motion_held: float | None
@@ -129,6 +131,7 @@ def _candidate(
     return Candidate(
         row=table_line.row,
         name=name,
+        step=value,
         motion=motion,
         forces=forces,
         motion_held=held[0],

@@ -32,15 +32,16 @@ class ChoiceCell(NamedTuple):
     Attributes:
         state: verdict, for colour and glyph; ``none``: nothing was run; ``cannot``: the formulation lacks a capability
             that every scene requires; ``partly``: some scenes are held.
-        text: speed if the tolerance is held, else the least error, or the number of scenes that hold it.
+        text: speed if the tolerance is held, of several scenes from the slowest to the fastest; else the least error,
+            or the number of scenes that hold it.
         title: the same in sentences.
         href: HTML id of the evidence; empty: there is none.
-        cost: of the slowest scene; infinite unless the tolerance is held in all and costs were measured.
+        cost: of the slowest scene that is held; infinite unless one is and costs were measured.
         clean: True if clean runs measured the cost; else it is known to a factor of about two.
+        open: True if no coarser step of the setting was seen to fail, so that it may be cheaper.
         name: setting and step; for several scenes the ones that they share, or empty.
         why: short reason why the tolerance is not held; empty: it is.
         scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
-        absent: number of the latter without a run of it, as it may be unable to represent them; others were left out.
         engine, formulation: names of an engine and its best formulation, or of several; empty: not of an engine.
         by_scene: best cell of that engine in each scene.
     """
@@ -51,11 +52,11 @@ class ChoiceCell(NamedTuple):
     href: str = ""
     cost: float = math.inf
     clean: bool = False
+    open: bool = False
     name: str = ""
     why: str = ""
     scenes: int = 1
     lacking: int = 0
-    absent: int = 0
     engine: str = ""
     formulation: str = ""
     by_scene: tuple["ChoiceCell", ...] = ()
@@ -63,22 +64,38 @@ class ChoiceCell(NamedTuple):
     @property
     def holds(self) -> bool:
         """True if the tolerance is held in all scenes, and the cost is known."""
-        return math.isfinite(self.cost)
+        return self.state == Verdict.AGREES and math.isfinite(self.cost)
+
+    @property
+    def each(self) -> tuple["ChoiceCell", ...]:
+        """Cell of each scene; the cell itself if it is of one."""
+        return self.by_scene or (self,)
+
+    @property
+    def held(self) -> int:
+        """Number of scenes in which it holds the tolerance."""
+        return sum(cell.holds for cell in self.each)
 
     @property
     def share(self) -> str:
-        """Words for the part of the column's scenes in which it was judged; empty: in all."""
+        """Words for the part of the column's scenes in which it holds, or was judged; empty: in all."""
+        if self.state == PARTLY:
+            return f" in {self.held} of {self.scenes} scenes"
         return f" in {self.scenes} of {self.scenes + self.lacking} scenes" if self.lacking else ""
 
     @property
-    def rank(self) -> tuple[float, float, int]:
+    def rank(self) -> tuple[bool, float, int]:
         """Sort key: what holds in all scenes comes first, the cheapest first; then by state."""
-        return self.absent if self.holds else math.inf, self.cost, ORDER.index(self.state)
+        return not self.holds, self.cost, ORDER.index(self.state)
 
     def ties(self, best: "ChoiceCell") -> bool:
-        """True if its cost overlaps with that of the first."""
-        rough = not (self.clean and best.clean)
-        return self is not best and self.holds and rough and self.cost < TIE * best.cost
+        """True if its cost overlaps with that of ``best`` in every scene that this holds."""
+        pairs = [(mine, other) for mine, other in zip(self.each, best.each, strict=True) if other.holds]
+        return self is not best and bool(pairs) and all(mine.near(other) for mine, other in pairs)
+
+    def near(self, other: "ChoiceCell") -> bool:
+        """True if the costs of two cells of one scene cannot be told apart."""
+        return self.holds and not (self.clean and other.clean) and self.cost < TIE * other.cost
 
     @property
     def setting(self) -> str:
@@ -97,16 +114,35 @@ class ChoiceCell(NamedTuple):
         return ", ".join(filter(None, (words, " or ".join(sorted(presets)) if few else "settings vary")))
 
 
-def speed(cost: float, clean: bool) -> str:
-    """Seconds of motion per second of computing, as ``90×``; rough ones are marked and rounded to coarse steps."""
-    if cost <= 0:
+def speed(cost: float, clean: bool, *, at_least: bool = False) -> str:
+    """Seconds of motion per second of computing, as ``90×``; rough ones are marked and rounded to coarse steps.
+
+    ``at_least``: no coarser step was seen to fail; ``≥`` stands before the speed.
+    """
+    return f"{_sign(clean, at_least)}{_rounded(cost, clean)}×" if cost > 0 else "not timed"
+
+
+def speeds(cells: Sequence[ChoiceCell]) -> str:
+    """Speeds of cells that hold, from the slowest to the fastest, as ``≥ 40–200×``."""
+    slowest, fastest = max(cells, key=lambda item: item.cost), min(cells, key=lambda item: item.cost)
+    if fastest.cost <= 0:
         return "not timed"
+    ends = dict.fromkeys(_rounded(item.cost, item.clean) for item in (slowest, fastest))
+    sign = _sign(slowest.clean and fastest.clean, slowest.open or fastest.open)
+    return f"{sign}{'–'.join(ends)}×"
+
+
+def _sign(clean: bool, at_least: bool) -> str:
+    return "≥ " if at_least else "" if clean else "≈ "
+
+
+def _rounded(cost: float, clean: bool) -> str:
     value = 1 / cost
     power = 10.0 ** math.floor(math.log10(value))
     leading = value / power
     step = 0.1 if clean or leading < 2 else 0.5 if leading < 5 else 1.0
     rounded = float(f"{round(leading / step) * step * power:.2g}")
-    return f"{'' if clean else '≈ '}{f'{rounded:.0f}' if rounded >= 10 else f'{rounded:g}'}×"
+    return f"{rounded:.0f}" if rounded >= 10 else f"{rounded:g}"
 
 
 def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
@@ -116,13 +152,21 @@ def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> Choic
     held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in sized if size <= tolerance]
     if held:
         cost, size, item = min(held, key=lambda entry: entry[:2])
-        text = "not timed" if math.isinf(cost) else speed(cost, item.clean)
+        is_open = item.step is not None and not any(_fails(other, item, tolerance, forces) for other in steps)
+        text = "not timed" if math.isinf(cost) else speed(cost, item.clean, at_least=is_open)
         spent = (
             text if math.isinf(cost) else f"{text} real time ({number(cost, 2)} s of computing per second of motion)"
         )
         title = f"{item.name}: within {number(size)}, {spent}"
         return ChoiceCell(
-            state=Verdict.AGREES, text=text, title=title, href=item.href, cost=cost, clean=item.clean, name=item.name
+            state=Verdict.AGREES,
+            text=text,
+            title=title,
+            href=item.href,
+            cost=cost,
+            clean=item.clean,
+            open=is_open,
+            name=item.name,
         )
     if sized:
         size, item = min(sized, key=lambda entry: entry[0])
@@ -144,6 +188,14 @@ def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> Choic
     return ChoiceCell(state, word, f"{item.name}: {item.message}".rstrip(": "), item.href, why=word)
 
 
+def _fails(coarser: Candidate, item: Candidate, tolerance: float, forces: bool) -> bool:
+    """True if a candidate is a coarser step of the same row that ran and does not hold the tolerance."""
+    if coarser.row != item.row or (coarser.step or 0.0) <= (item.step or 0.0):
+        return False
+    size = coarser.tolerance(forces)
+    return bool(coarser.status) if coarser.blame is not None else size is None or size > tolerance
+
+
 def _beyond(size: float, tolerance: float, digits: int = 1) -> str:
     """Text of an error with enough digits to show that it exceeds the tolerance."""
     text = error(size, digits)
@@ -157,7 +209,8 @@ def _beyond(size: float, tolerance: float, digits: int = 1) -> str:
 def joined(cells: Mapping[str, ChoiceCell], titles: Mapping[str, str], *, counted: bool = True) -> ChoiceCell:
     """One cell for several studies or scenes: the worst; its cost is that of the slowest if all hold the tolerance.
 
-    ``counted``: where some hold it and others do not, their number stands in place of the least error.
+    ``counted``: cells are of scenes; its speeds are a range, and where some hold the tolerance and others do not, their
+    number stands in place of the least error.
     """
     worst = max(cells.values(), key=lambda item: (SEVERITY.index(item.state), item.cost))
     if len(cells) == 1:
@@ -167,7 +220,7 @@ def joined(cells: Mapping[str, ChoiceCell], titles: Mapping[str, str], *, counte
     shared = len({cell.name for cell in cells.values()}) == 1
     worst = worst._replace(title=title, name=worst.name if shared else "")
     if held == len(cells):
-        return worst
+        return worst._replace(text=speeds([*cells.values()])) if counted and worst.holds else worst
     if not counted:
         return worst._replace(cost=math.inf)
     why = f"{worst.why}; holds {held} of {len(cells)}"

@@ -11,7 +11,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.report.kinds import group_words
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.candidates import Candidate, candidates
-from proofroll.report.page.choice_cell import CANNOT, NO_RUN, ORDER, PARTLY, ChoiceCell, cell_of, joined
+from proofroll.report.page.choice_cell import CANNOT, NO_RUN, ORDER, PARTLY, TIE, ChoiceCell, cell_of, joined, speeds
 
 # Tolerances that a reader can choose: negative powers of ten, relative to the path or the largest force.
 DECADES = range(2, 9)
@@ -171,11 +171,8 @@ class ChoiceMatrix:
             for scene in column.scenes
             if self.judged[forces].intersection(scene.studies) and not set(run_names).intersection(scene.studies)
         ]
-        return joined(scenes, {scene.name: scene.words for scene in column.scenes})._replace(
-            scenes=len(scenes),
-            lacking=len(lacking),
-            absent=sum(not row.found.keys() & set(scene.studies) for scene in lacking),
-        )
+        words = {scene.name: scene.words for scene in column.scenes}
+        return joined(scenes, words)._replace(scenes=len(scenes), lacking=len(lacking))
 
     def _without_run(self, row: ChoiceRow, column: ChoiceColumn) -> ChoiceCell:
         """Cell without a run: the formulation cannot represent the scenes, or was not tried."""
@@ -217,45 +214,60 @@ class ChoiceMatrix:
     def standing(self) -> Callable[[str, ChoiceColumn, float, bool], ChoiceCell]:
         """Function (engine, column, tolerance, whether forces count) -> cell of the engine in the column.
 
-        A formulation that holds all scenes comes first, the cheapest of these; then the best one for each scene.
+        Each scene has the engine's best formulation there; a kind has the range of their speeds.
         """
         return cache(self._standing)
 
     def _standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
-        of_rows = [
-            self.cell(row, column, tolerance, forces)._replace(engine=engine, formulation=row.formulation)
-            for row in self.formulations(engine)
-        ]
-        best = min(of_rows, key=lambda item: item.rank)
         single = [item for item in self.columns if not item.whole and item.group == column.group]
         if not column.whole or len(column.scenes) == 1 or len(single) < len(column.scenes):
-            return best._replace(by_scene=(best,))
+            of_rows = [
+                self.cell(row, column, tolerance, forces)._replace(engine=engine, formulation=row.formulation)
+                for row in self.formulations(engine)
+            ]
+            return min(of_rows, key=lambda item: item.rank)
         by_scene = [self.standing(engine, item, tolerance, forces) for item in single]
-        best = best._replace(by_scene=tuple(by_scene))
         ran = [item for item in by_scene if item.state not in {NO_RUN, CANNOT, Verdict.NOT_JUDGED}]
-        asked = [item for item in by_scene if item in ran or (item.state in {NO_RUN, CANNOT} and best.lacking)]
-        held = [item for item in asked if item.holds]
-        if (best.holds and not best.absent) or not ran:
-            return best
-        slowest = max(held, key=lambda item: item.cost, default=best)
-        words = ", ".join(dict.fromkeys(item.formulation for item in held)) or best.formulation
-        named = {scene.name: scene.words for scene in column.scenes}
-        says = "; ".join(
-            f"{named[item.name]}: {item_of_scene.title}" for item, item_of_scene in zip(single, by_scene, strict=True)
+        if not ran:
+            return by_scene[0]._replace(by_scene=tuple(by_scene))
+        judged = [bool(self.judged[forces].intersection(item.studies)) for item in single]
+        lacks = [known and cell.state in {NO_RUN, CANNOT} for cell, known in zip(by_scene, judged, strict=True)]
+        count, held = len(ran) + sum(lacks), [item for item in ran if item.holds]
+        titles = [f"{item.title}: {cell.title}" for item, cell in zip(single, by_scene, strict=True)]
+        slowest = max(held, key=lambda item: item.cost, default=by_scene[0])
+        joint = slowest._replace(
+            title="; ".join(titles),
+            name=slowest.name if len({item.name for item in ran}) == 1 else "",
+            formulation=", ".join(dict.fromkeys(item.formulation for item in held or ran)),
+            open=any(item.open for item in held),
+            scenes=count,
+            lacking=sum(judged) - count,
+            by_scene=tuple(by_scene),
         )
-        if len(held) == len(asked):
-            return slowest._replace(title=says, name="", formulation=words, by_scene=best.by_scene)
+        if len(held) == count:
+            return joint._replace(text=speeds(held))
         state = PARTLY if held else max((item.state for item in ran), key=ORDER.index)
-        text = f"{len(held)} of {len(asked)}"
-        cell = ChoiceCell(state, text, says, best.href, why=f"holds {text} scenes", scenes=len(ran))
-        return cell._replace(engine=engine, formulation=words, by_scene=best.by_scene)
+        text = f"{len(held)} of {count}"
+        return joint._replace(state=state, text=text, why=f"holds {text} scenes")
 
     def standings(
         self, column: ChoiceColumn, tolerance: float, forces: bool, engines: Collection[str] | None = None
     ) -> list[ChoiceCell]:
-        """Cells of the engines that may be taken, the best first; ``engines``: of these alone."""
+        """Cells of the engines that may be taken, the best first; ``engines``: of these alone.
+
+        Of several scenes the best engine is near the cheapest, within the factor :data:`TIE`, in most; then it holds
+        most.
+        """
         names = [name for name in self.engines if name not in self.witnesses and (engines is None or name in engines)]
-        return sorted((self.standing(name, column, tolerance, forces) for name in names), key=lambda item: item.rank)
+        cells = [self.standing(name, column, tolerance, forces) for name in names]
+        scenes = zip(*(cell.each for cell in cells), strict=True)
+        least = [min((cell.cost for cell in scene if cell.holds), default=0.0) for scene in scenes]
+
+        def near(cell: ChoiceCell) -> int:
+            pairs = zip(cell.each, least, strict=True)
+            return sum(item.holds and item.cost <= TIE * cost for item, cost in pairs)
+
+        return sorted(cells, key=lambda item: (-near(item), -item.held, item.rank))
 
 
 def choice_matrix(

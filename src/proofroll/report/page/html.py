@@ -20,7 +20,7 @@ from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page import profile
-from proofroll.report.page.answer import LENGTHS
+from proofroll.report.page.answer import LENGTHS, speed_range
 from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE
 from proofroll.report.page.first_screen import STATES, FirstScreen, bar, look
 from proofroll.report.pages import environment, folded, packed, rendered, slug
@@ -142,6 +142,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "states": STATES,
         "look": look,
         "bar": bar,
+        "speed_range": speed_range,
         "lengths": LENGTHS,
         "profiles": profile,
         "loop_key": slug,

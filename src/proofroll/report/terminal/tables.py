@@ -23,7 +23,7 @@ from proofroll.report.labels import (
     unjudged,
     verdict_text,
 )
-from proofroll.report.page.answer import answer, told
+from proofroll.report.page.answer import answer, speed_words, told
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
 from proofroll.running.case import Status, host_sentences
@@ -265,8 +265,8 @@ def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes
         table.add_row(
             Text(item.column.title),
             Text(told(matrix, taken) if taken else item.closest_words),
-            Text(f"{taken.text}{taken.share}" if taken else "–"),
-            Text(item.next_words),
+            Text(speed_words(taken) if taken else "–"),
+            Text("; ".join([item.next_words, *item.exceptions])),
             *([] if forces else [Text(item.forces_words)]),
         )
     return table

@@ -131,7 +131,7 @@ def sweep(
         finer: curve -> its finer steps, in sampling intervals.
         gain: see above.
         budget: processor time of all runs, or None.
-        longest: processor time of a run but the first of its curve [s], or None.
+        longest: processor time of a run but the first two of its curve [s], or None.
     """
     references: dict[float, Reference] = {}
     for is_first in (True, False, False, False):
@@ -259,17 +259,14 @@ def too_long(longest: float) -> str:
 def _affordable(curve: Curve, case: Case, budget: TimeBudget | None, longest: float | None, abreast: int) -> bool:
     """True if a run is expected to fit its share of the budget and the longest run, from the time of the curve's last.
 
-    Otherwise its step is dropped with a reason. False, too, if the engine refused the scene, as it would with every
-    step.
+    Otherwise its step is dropped with a reason. The longest run bounds none of the first two, as the first may compile.
     """
     if not curve.points:
         return not (budget and curve.dropped)
     last, step = curve.points[-1], CurvePoint(case, curve.points[-1].result).step
-    if last.result.status is Status.REFUSED:
-        return False
     finer = (last.step or 1.0) / (step or 1.0)
     expected = last.result.processor.get("advance", 0.0) * (finer if curve.fixed_step or finer < 1 else _TIGHTER)
-    if longest and expected > longest:
+    if longest and expected > longest and len(curve.points) > 1:
         curve.dropped[step or 0.0] = too_long(longest)
     elif budget and expected > _OF_RUNS * budget.left / abreast:
         curve.dropped[step or 0.0] = budget.sentence

@@ -24,8 +24,8 @@ def said(lines: list[TableLine], tolerance: float, forces: bool = False) -> list
 def test_the_sentence_has_the_words_of_the_answer() -> None:
     """The choice with its step and speed, the next engine with how many times its cost, and the choice with forces."""
     assert said([*ARM, BETA, WRONG, MUTE], 1e-3)[0] == (
-        "Trees to 1e-3: take alpha joints, default, dt 1e-3 s (100× real time); next: beta joints, 50× the cost; "
-        "if forces count: alpha joints, 5×."
+        "Trees to 1e-3: take alpha joints, default, dt 1e-3 s (≥ 100× real time); next: beta joints, 50× the cost, "
+        "lead open; if forces count: alpha joints, ≥ 5×."
     )
 
 
@@ -49,7 +49,7 @@ def test_forces_are_told_where_they_change_nothing_or_are_never_given() -> None:
     assert said([LINE, exact], 1e-3)[0].endswith("if forces count: ✓ the same choice.")
     assert said([LINE], 1e-3)[0].endswith("if forces count: not judged.")
     alone = "Trees: forces are not judged; for motion alone to 1e-3: take alpha joints, default, dt 1e-3 s"
-    assert said([LINE], 1e-3, forces=True)[0] == f"{alone} (100× real time); next: no other engine holds it."
+    assert said([LINE], 1e-3, forces=True)[0] == f"{alone} (≥ 100× real time); next: no other engine holds it."
     assert "Trees to 1e-3 with forces: take" in said([LINE, exact], 1e-3, forces=True)[0]
 
 

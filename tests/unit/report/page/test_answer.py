@@ -35,8 +35,8 @@ def test_the_cheapest_engine_of_each_kind_is_told_and_a_witness_never_is() -> No
 def test_a_tie_is_told_of_rough_costs_alone() -> None:
     """Costs known to a factor of two that are nearer than that tie; clean ones do not."""
     dear = choice_matrix([line(error=1e-9, cost=0.2), replace(BETA, cost=23.0)], STUDIES)
-    assert answer(dear, 1e-4, False).kinds[0].next_words == "beta joints, 120× the cost"
-    for clean, words in ((False, "beta joints, a tie"), (True, "beta joints, 1.5× the cost")):
+    assert answer(dear, 1e-4, False).kinds[0].next_words == "beta joints, 120× the cost, lead open"
+    for clean, words in ((False, "beta joints, a tie"), (True, "beta joints, 1.5× the cost, lead open")):
         lines = [line(error=1e-9, cost=0.2, clean=clean), replace(BETA, cost=0.3, clean=clean)]
         matrix = choice_matrix(lines, STUDIES)
         item = answer(matrix, 1e-4, False).kinds[0]
@@ -53,14 +53,21 @@ def test_a_tie_is_told_in_the_chip_in_a_fixed_order() -> None:
 
 
 def test_where_nothing_holds_it_the_closest_is_told() -> None:
-    """By what it is off; of several scenes how many the best engine holds, and at which speed."""
-    matrix = choice_matrix([BALL], STUDIES)
-    item = answer(matrix, 1e-3, False).kinds[0]
+    """By what it is off."""
+    item = answer(choice_matrix([BALL], STUDIES), 1e-3, False).kinds[0]
     assert item.closest_words.startswith("none; closest alpha joints: off by 0.1")
-    matrix = choice_matrix([LINE, replace(LINE, study="chain", scene="chain", error=0.5)], STUDIES)
-    item = answer(matrix, 1e-3, False).kinds[0]
-    assert item.closest_words == "none for all; alpha holds 1 of 2: arm 100×"
-    assert item.most_held == 1
+
+
+def test_scenes_that_the_engine_to_take_does_not_hold_name_their_own() -> None:
+    """Another engine with its speed, or what comes closest; the chip has the number of scenes that are held."""
+    wrong = replace(LINE, study="chain", scene="chain", error=0.5)
+    item = answer(choice_matrix([LINE, wrong], STUDIES), 1e-3, False)
+    assert item.kinds[0].exceptions == ["chain: none; closest alpha joints: off by 0.5, finer steps come closer"]
+    assert [(chip.title, chip.words) for chip in item.chips] == [("alpha", "for 1 of 2 scenes of trees")]
+    other = line(engine="beta", row=3, study="chain", scene="chain", error=1e-9, cost=0.5)
+    item = answer(choice_matrix([LINE, wrong, other], STUDIES), 1e-3, False)
+    assert item.kinds[0].exceptions == ["chain: beta joints, ≥ 2×"]
+    assert item.kinds[0].next_words == "beta joints"
 
 
 def test_forces_are_told_where_they_change_the_choice() -> None:
@@ -90,7 +97,7 @@ def test_a_kind_is_held_with_one_setting_or_with_one_by_scene() -> None:
     forces = [replace(FORCE, error=1e-9), replace(FORCE, study="chain", scene="chain", error=0.5)]
     forces.append(replace(forces[1], row=9, preset="tuned", setting="tuned", cost=tuned.cost, error=1e-9))
     matrix = choice_matrix([LINE, chain, tuned, *forces], STUDIES)
-    assert answer(matrix, 1e-3, False).kinds[0].forces_words == "alpha joints, 50×"
+    assert answer(matrix, 1e-3, False).kinds[0].forces_words == "alpha joints, ≥ 50–100×"
 
 
 def test_what_fails_is_told_in_the_words_of_its_comparison() -> None:
@@ -124,7 +131,12 @@ def test_the_terminal_shows_the_same_answer() -> None:
     """A line for each kind: what to take with its step, speed, the next engine, and what forces change."""
     table = answer_table(choice_matrix([*ARM, BETA, BALL], STUDIES, NAMES), 1e-3, False)
     lines = list(zip(*([str(cell) for cell in column.cells] for column in table.columns), strict=True))
-    assert lines[0][:4] == ("Trees", "Alpha joints, default, dt 1e-3 s", "100×", "beta joints, 50× the cost")
+    assert lines[0][:4] == (
+        "Trees",
+        "Alpha joints, default, dt 1e-3 s",
+        "≥ 100×",
+        "beta joints, 50× the cost, lead open",
+    )
     assert lines[1][:3] == ("Rolling balls", "none; closest Alpha joints: off by 0.1, finer steps come closer", "–")
 
 

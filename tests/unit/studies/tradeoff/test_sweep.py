@@ -193,10 +193,9 @@ def test_within_a_budget_a_step_takes_no_more_than_its_share(step: float, left: 
     budget = SimpleNamespace(left=left, sentence="too dear")
     assert _affordable(curve, case(step), budget, None, 2) is affordable  # type: ignore[arg-type]
     assert curve.dropped == ({} if affordable else {step: "too dear"})
-    refused = Result(Status.REFUSED, "it cannot", processor={})
-    curve.points, curve.dropped = [CurvePoint(case(2e-3), refused)], {}
-    assert not _affordable(curve, case(step), budget, None, 2)  # type: ignore[arg-type]
-    assert curve.dropped == {}
+    too_coarse = Result(Status.REFUSED, "its contact is too soft for this step", processor={})
+    curve.points, curve.dropped = [CurvePoint(case(2e-3), too_coarse)], {}
+    assert _affordable(curve, case(step), budget, None, 2)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("longest", "kept"), [(1.9, False), (2.1, True), (None, True)])
@@ -209,7 +208,10 @@ def test_a_run_that_would_take_too_long_is_dropped(longest: float | None, kept: 
         return Case("sphere_in_cylinder", {}, "", facts, QUESTION.until, QUESTION.every)
 
     assert _affordable(curve, case(2e-3), None, longest, 2)  # the first run of a curve tells how long it takes
-    curve.points = [CurvePoint(case(2e-3), Result(Status.DONE, "reached", processor={"advance": 1.0}))]
+    compiled = CurvePoint(case(4e-3), Result(Status.DONE, "reached", processor={"advance": 9.0}))
+    curve.points = [compiled]
+    assert _affordable(curve, case(2e-3), None, longest, 2), "the first may have compiled"
+    curve.points = [compiled, CurvePoint(case(2e-3), Result(Status.DONE, "reached", processor={"advance": 1.0}))]
     assert _affordable(curve, case(1e-3), None, longest, 2) is kept
     assert curve.dropped == ({} if kept else {1e-3: too_long(longest or 0.0)})
 
