@@ -127,6 +127,8 @@ def outcomes_of(
     budget: float | None = None,
     spent: float = 0.0,
     interrupted: Callable[[Outcome], None] | None = None,
+    *,
+    coarser: bool = False,
 ) -> list[Outcome]:
     """Runs all comparisons with one progress bar, one after the other as far as that leaves no worker idle.
 
@@ -142,6 +144,7 @@ def outcomes_of(
         budget: processor time of all of them [s]. All runs then come before the first ladder, and each comparison has
             an equal share of the time left; what it does not use is for later ones.
         spent: part of the budget that was used before [s].
+        coarser: see :func:`proofroll.studies.comparison.planning.plan`.
         interrupted: called with each comparison, judged by the runs that ended, if the user ends the command; ended
             runs have a line each, too, once that takes long.
     """
@@ -152,7 +155,7 @@ def outcomes_of(
 
     begin = processor_seconds() - spent
     with options.spinner(f"{stage}cases"):
-        plans = [affordable(plan(comparison, engines, runner.workers), runner) for comparison in comparisons]
+        plans = [affordable(plan(item, engines, runner.workers, coarser=coarser), runner) for item in comparisons]
     brief = [item.brief for item in plans]
     grown = [(index, item.cases) for index, item in enumerate(plans) if len(item.truths) > len(brief[index].truths)]
     if budget:

@@ -106,7 +106,9 @@ def report(
             outcomes: list[Outcome] = []
             if loaded:
                 stage, spent = _begin(1, total, "comparisons"), _processor_seconds() - begin
-                outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget, spent)
+                outcomes = outcomes_of(
+                    loaded, engine or [], runner, stage, growing.add, budget, spent, coarser=not budget
+                )
         made = begun(outcomes, command, left_out=left_out)
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)

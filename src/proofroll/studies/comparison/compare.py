@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -77,7 +77,11 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         if reference.ended and reference.dataset.sizes["time"] < _LEAST and not laws & {*band.bounds, *run.row.bound}:
             judged.append(_run(run, replace(result, status=Status.NO_TRUTH, message=reference.ended)))
             continue
-        judgements, errors = _judgements(run, band, reference, trajectories, _lost(run, results))
+        steps = {1.0, *run.row.ladder}
+        rungs = {factor: dataset for factor, dataset in trajectories.items() if factor in steps}
+        judgements, errors = _judgements(run, band, reference, rungs, _lost(run, results))
+        coarser = {factor: dataset for factor, dataset in trajectories.items() if factor not in steps}
+        errors |= _errors(reference, judgements, trajectories[1.0], coarser)
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
         judged_run = _run(
             run,
@@ -260,6 +264,19 @@ def _judgements(
     return judgements, errors
 
 
+def _errors(
+    reference: Reference, judgements: Sequence[Judgement], main: xr.Dataset, coarser: Mapping[float, xr.Dataset]
+) -> dict[float, dict[str, float]]:
+    """Factor of each coarser step -> observable that is judged of the run ``main`` -> error."""
+    errors: dict[float, dict[str, float]] = {}
+    for factor, dataset in coarser.items():
+        within, spans = reference.common_span({1.0: main, factor: dataset})
+        curves = run_values.observables_of(within, spans[factor])
+        names = [item.observable for item in judgements if item.observable in curves]
+        errors[factor] = {name: run_values.error(within, name, curves[name], spans[factor]) for name in names}
+    return errors
+
+
 def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[str, float]]) -> list[LadderRun]:
     """Further runs of a row's ladder, without the run at the row's own step."""
     rungs = []
@@ -334,8 +351,8 @@ def _floor(
 
 def _lost(run: Planned, results: dict[str, Result]) -> str:
     """First step of the ladder without a trajectory, and why; empty if each has one."""
-    for case in run.ladder.values():
+    for factor, case in run.ladder.items():
         result, name = results[case.key], case.engine.resolution
-        if result.status != Status.DONE and name is not None:
+        if factor in {1.0, *run.row.ladder} and result.status != Status.DONE and name is not None:
             return f"{name} {case.engine.settings[name]:g} {result.status}: {result.message}"
     return ""

@@ -17,6 +17,7 @@ from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_nam
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.core.truth import edge_between
+from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.engine_questions import describe_each, resolve, resolve_with_truth
@@ -30,6 +31,8 @@ _UNFIT = frozenset({"failed", "refused", "another-scene"})
 _USUAL = [4.0, 2.0, 1.0]
 # Ladders that replace it if its steps do not fit between samples, the cheapest first.
 _LADDERS = (_USUAL, [2.0, 1.0, 0.5], [1.0, 0.5, 0.25])
+
+_SAME = 1e-9  # relative difference of two factors that are equal but for round-off
 
 _FIRST = " (the first "  # beginning of a remark in the title of a comparison
 
@@ -50,7 +53,10 @@ def at_point(parameters: dict[str, float]) -> str:
 
 @dataclass(frozen=True)
 class Planned:
-    """A row at a point, with factor on the step -> case of its ladder; the run's own case has the factor 1."""
+    """A row at a point, with factor on the step -> case of its ladder, and of coarser steps that show no limit.
+
+    The run's own case has the factor 1.
+    """
 
     row: Row
     parameters: dict[str, float]
@@ -156,10 +162,18 @@ def _further_steps(runs: Sequence[Planned]) -> list[Case]:
     return [case for run in runs for factor, case in run.ladder.items() if factor != 1]
 
 
-def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None) -> Plan:
+def plan(
+    comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None, *, coarser: bool = False
+) -> Plan:
     """Plan of a comparison, or of its rows of some engines only.
 
     An engine in another interpreter, ``mujoco@3.8.1``, runs the rows of ``mujoco`` there.
+
+    Args:
+        comparison: what to run.
+        engines: to which it is restricted; empty: all.
+        workers: pool for questions to engines; None: new workers.
+        coarser: True to run settings that should agree with coarser steps, too, for advice on the cheapest one.
 
     Raises:
         InputError: an engine or setting that does not exist.
@@ -187,7 +201,8 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     times = time_grid(comparison.until, comparison.every)
     steps = [facts.step if isinstance(facts, EngineFacts) else None for facts in resolved]
     rows = [_fitting(row, step, times) for row, step in zip(rows, steps, strict=True)]
-    rungs = _rungs(rows, resolved, workers)
+    further = [_coarser(comparison, *pair, times) if coarser else [] for pair in zip(rows, resolved, strict=True)]
+    rungs = _rungs(rows, resolved, workers, further)
     scenes: dict[str, Scene] = {}
     truths: dict[str, Case] = {}
     runs: list[Planned] = []
@@ -307,14 +322,35 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
                 raise InputError(f"{place.removesuffix('engine')}ladder", ladder, advice)
 
 
+def _coarser(comparison: Comparison, row: Row, facts: EngineFacts | ProofrollError, times: FloatArray) -> list[float]:
+    """Factors on the step of an engine's row that should agree, beyond its ladder: half the steps between samples.
+
+    They end with one step between two samples.
+    """
+    if not isinstance(facts, EngineFacts) or facts.witness or facts.step is None or Verdict.AGREES not in row.expect:
+        return []
+    many, factors = round(comparison.every / facts.step), []
+    while many := many // 2:
+        factors.append(comparison.every / many / facts.step)
+    beyond = [factor for factor in factors if factor > max(row.ladder) * (1 + _SAME)]
+    return [factor for factor in beyond if _misfit([factor], facts.step, times) is None]
+
+
 def _rungs(
-    rows: list[Row], resolved: list[EngineFacts | ProofrollError], workers: Workers | None
+    rows: list[Row],
+    resolved: list[EngineFacts | ProofrollError],
+    workers: Workers | None,
+    further: Sequence[Sequence[float]],
 ) -> list[dict[float, EngineFacts]]:
-    """Factor -> facts of each rung of every row's ladder, as far as the engine allows the scaled resolution."""
+    """Factor -> facts of each rung of every row's ladder, as far as the engine allows the scaled resolution.
+
+    ``further``: factors of each row beyond its ladder.
+    """
     asked: list[tuple[int, float, EngineFacts]] = []
-    for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
+    for index, (row, facts, beyond) in enumerate(zip(rows, resolved, further, strict=True)):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
-            asked += [(index, factor, facts) for factor in row.ladder if factor != 1 and _asked(facts, factor)]
+            factors = [*beyond, *row.ladder]
+            asked += [(index, factor, facts) for factor in factors if factor != 1 and _asked(facts, factor)]
     scaled = [
         (facts.name, {**facts.settings, facts.resolution: facts.settings[facts.resolution] * _scaled(facts, factor)})
         for _, factor, facts in asked
