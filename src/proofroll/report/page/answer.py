@@ -108,12 +108,18 @@ class ColumnAnswer:
 
     @property
     def failures(self) -> list[ChoiceCell]:
-        """Cells of settings that fail, one per formulation; ``name`` for a reader, ``why`` in at most twelve words."""
+        """Cells of settings that fail, one per formulation; ``name`` for a reader, ``why`` in at most twelve words.
+
+        Where another setting of the formulation holds the tolerance, only a failing default is told.
+        """
         entries: list[tuple[int, float, ChoiceCell, str]] = []
         for row in self.matrix.rows:
             if not row.setting or row.own_equations or (self.engines is not None and row.engine not in self.engines):
                 continue
             for study in self.column.studies:
+                asked = (study, self.asked.tolerance, self.asked.forces)
+                if row.setting != "default" and self.matrix.held(row.engine, row.formulation, *asked):
+                    continue
                 for number_of_row, (expected, short) in self.matrix.studies[study].short.items():
                     steps = [item for item in row.found.get(study, ()) if item.row == number_of_row]
                     cell = cell_of(steps, self.asked.tolerance, self.asked.forces) if steps else None
@@ -122,8 +128,7 @@ class ColumnAnswer:
                     if cell.state == Verdict.REFUSED and Verdict.REFUSED not in expected:
                         continue  # the text is about other points
                     sizes = [size for item in steps if (size := item.tolerance(self.asked.forces)) is not None]
-                    preset = f" {row.setting}" if row.setting == "default" else ""
-                    failure = cell._replace(name=f"{take_words(self.matrix, row)}{preset}", why=short)
+                    failure = cell._replace(name=f"{take_words(self.matrix, row)} {row.setting}", why=short)
                     place = _STATES.index(cell.state) if cell.state in _STATES else len(_STATES)
                     entries.append((place, -min(sizes, default=0.0), failure, row.name))
         entries.sort(key=lambda item: item[:2])

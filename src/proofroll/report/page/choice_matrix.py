@@ -187,6 +187,15 @@ class ChoiceMatrix:
         return ChoiceCell(CANNOT, "", f"cannot represent this: it lacks {named}")
 
     @cached_property
+    def held(self) -> Callable[[str, str, str, float, bool], bool]:
+        """Function (engine, formulation, study, tolerance, whether forces count) -> True if a setting of it holds."""
+        return cache(self._held)
+
+    def _held(self, engine: str, formulation: str, study: str, tolerance: float, forces: bool) -> bool:
+        settings = [row for row in self.rows if row.setting and (row.engine, row.formulation) == (engine, formulation)]
+        return any(cell_of(row.found[study], tolerance, forces).holds for row in settings if study in row.found)
+
+    @cached_property
     def judged(self) -> tuple[set[str], set[str]]:
         """Studies in which motion is judged, and those in which forces are judged, too."""
         items = [(name, item) for row in self.rows for name, of_study in row.found.items() for item in of_study]

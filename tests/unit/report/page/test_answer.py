@@ -113,6 +113,23 @@ def test_what_fails_is_told_in_the_words_of_its_comparison() -> None:
     assert [item.why for item in answer(matrix, 1e-2, False).kinds[0].failures] == ["it falls"]
 
 
+def test_what_another_setting_mends_is_told_of_defaults_alone() -> None:
+    """Of a formulation that holds the tolerance with one setting the failing default is told, and no other setting."""
+    settings = [
+        line(error=error, row=row, preset=preset, setting=preset, limit="another limit")
+        for row, (preset, error) in enumerate({"default": 0.5, "matched": 0.4, "tuned": 1e-9}.items())
+    ]
+    short = {row: (["differs"], f"reason {row}") for row in range(2)}
+    studies = STUDIES | {"arm": STUDIES["arm"]._replace(short=short)}
+    for chosen, told in (
+        (settings, ["alpha joints default"]),
+        (settings[1:], []),
+        (settings[1:2], ["alpha joints matched"]),
+    ):
+        found = answer(choice_matrix(chosen, studies), 1e-4, False).kinds[0].failures
+        assert [item.name for item in found] == told
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
