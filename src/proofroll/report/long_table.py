@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,8 @@ class TableLine:
         group: group of the scene.
         scene: name of the scene.
         place: parameters of the run in words; empty: the scene's own.
+        case: all parameters of the scene and the length of the run in words (:func:`case_words`).
+        own_case: True if all parameters are the scene's own.
         row: number of the run's row in its study; of a trade-off, of its curve.
         engine, version, formulation, preset, setting, precision: of the run; ``setting`` has preset and further
         options.
@@ -56,6 +58,8 @@ class TableLine:
     group: str
     scene: str
     place: str
+    case: str
+    own_case: bool
     row: int
     engine: str
     version: str
@@ -101,6 +105,12 @@ class TableLine:
         if self.limit_error is None or not self.scale:
             return None
         return max(0.0, self.limit_error - (self.limit_doubt or 0.0)) / self.scale
+
+
+def case_words(parameters: Mapping[str, float], until: float) -> str:
+    """Parameters of a scene, defaults included, and the length of a run [s], in words."""
+    values = [f"{name}={value:.12g}" for name, value in sorted(parameters.items())]
+    return ", ".join([*values, f"{until:.12g} s"])
 
 
 def setting_columns(name: str, engine: str, facts: EngineFacts | SweptSetting) -> dict[str, Any]:

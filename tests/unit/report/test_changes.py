@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import table_lines
 
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
@@ -17,13 +18,7 @@ from proofroll.report.changes import Against, EarlierReport, against
 from proofroll.report.long_table import LongTable, TableLine
 from proofroll.report.terminal.tables import change_lines
 
-LINE = TableLine(
-    study="arm", group="trees", scene="arm", place="", row=0, engine="alpha", version="1", formulation="joints",
-    preset="default", setting="default", precision="double", own_equations=False, resolution="dt", step=1e-3,
-    status="done", message="", verdict="agrees", limit="", quantity="x", unit="m", role="motion", headline=True,
-    error=5e-4, truth_error_bar=1e-12, tolerance=1e-2, scale=1.0, order=2.0, cost=0.01, cost_low=9e-3, cost_high=0.011,
-    clean=True,
-)  # fmt: skip
+LINE = table_lines.line(limit="", cost_low=9e-3, cost_high=0.011)
 COST = {"cost": 0.01, "cost_low": 9.8e-3, "cost_high": 0.0102}
 SLOW = {"cost": 0.02, "cost_low": 0.019, "cost_high": 0.021}
 LINES = [LINE, replace(LINE, quantity="z", error=1e-13), replace(LINE, row=1, engine="beta", error=2e-9)]

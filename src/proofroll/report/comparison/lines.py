@@ -9,7 +9,7 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.report.comparison.records import clean_cost, rough_cost
 from proofroll.report.comparison.summary import facts_of
 from proofroll.report.kinds import group_of
-from proofroll.report.long_table import COLUMNS, TableLine, setting_columns
+from proofroll.report.long_table import COLUMNS, TableLine, case_words, setting_columns
 from proofroll.running.case import Result, Status
 from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
@@ -36,11 +36,14 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
     """Fields shared by all lines of a run."""
     comparison, facts = outcome.comparison, facts_of(run)
     point = outcome.points.get(point_name(run.parameters))
+    scene = outcome.scene if point is None else point.scene
     return TableLine(
         study=comparison.name,
-        group=group_of(outcome.scene if point is None else point.scene),
+        group=group_of(scene),
         scene=comparison.scene,
         place=point_name(run.parameters),
+        case=case_words(scene.parameters, comparison.until),
+        own_case=dict(scene.parameters) == dict(outcome.scene.parameters),
         row=row,
         version=facts.version,
         own_equations=bool(run.shared) or by_hand(facts.level) or facts.witness,

@@ -42,6 +42,7 @@ class Candidate:
     Attributes:
         row: number of its row in the study.
         name: engine, formulation, setting and step, for a person.
+        setting: engine, formulation and setting, without the step.
         step: its step [s] or tolerance; None: it has neither.
         motion, forces: largest error of a coordinate, and of a reaction, relative to its size; None: not reported.
         motion_held, forces_held: smallest tolerance that it holds without luck: the largest of that error, of those of
@@ -57,6 +58,7 @@ class Candidate:
 
     row: int
     name: str
+    setting: str
     step: float | None
     motion: float | None
     forces: float | None
@@ -131,6 +133,7 @@ def _candidate(
     return Candidate(
         row=table_line.row,
         name=name,
+        setting=_name(table_line, None),
         step=value,
         motion=motion,
         forces=forces,

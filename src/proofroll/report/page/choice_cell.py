@@ -79,7 +79,7 @@ class ChoiceCell(NamedTuple):
     @property
     def share(self) -> str:
         """Words for the part of the column's scenes in which it holds, or was judged; empty: in all."""
-        if self.state == PARTLY:
+        if self.state == PARTLY and self.by_scene:
             return f" in {self.held} of {self.scenes} scenes"
         return f" in {self.scenes} of {self.scenes + self.lacking} scenes" if self.lacking else ""
 
@@ -146,7 +146,7 @@ def _rounded(cost: float, clean: bool) -> str:
 
 
 def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
-    """Cell of one study: the cheapest candidate that holds the tolerance, else the closest, else why there is none."""
+    """Cell of a case or study: the cheapest candidate that holds the tolerance, else the closest, else why none is."""
     whole = [item for item in steps if item.blame is None]
     sized = [(size, item) for item in whole if (size := item.tolerance(forces)) is not None]
     held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in sized if size <= tolerance]
@@ -189,8 +189,8 @@ def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> Choic
 
 
 def _fails(coarser: Candidate, item: Candidate, tolerance: float, forces: bool) -> bool:
-    """True if a candidate is a coarser step of the same row that ran and does not hold the tolerance."""
-    if coarser.row != item.row or (coarser.step or 0.0) <= (item.step or 0.0):
+    """True if a candidate is a coarser step of the same setting that ran and does not hold the tolerance."""
+    if coarser.setting != item.setting or (coarser.step or 0.0) <= (item.step or 0.0):
         return False
     size = coarser.tolerance(forces)
     return bool(coarser.status) if coarser.blame is not None else size is None or size > tolerance
@@ -206,13 +206,33 @@ def _beyond(size: float, tolerance: float, digits: int = 1) -> str:
     )
 
 
-def joined(cells: Mapping[str, ChoiceCell], titles: Mapping[str, str], *, counted: bool = True) -> ChoiceCell:
-    """One cell for several studies or scenes: the worst; its cost is that of the slowest if all hold the tolerance.
+def of_cases(cells: Mapping[str, ChoiceCell], own: str | None, count: int) -> ChoiceCell:
+    """Cell of a scene: that of its own case if all cases are held, without one of the slowest; else the worst.
 
-    ``counted``: cells are of scenes; its speeds are a range, and where some hold the tolerance and others do not, their
-    number stands in place of the least error.
+    Args:
+        cells: case in words -> cell.
+        own: the case with the scene's own parameters; None: it was not run.
+        count: number of judged cases; the others of them were not run.
     """
     worst = max(cells.values(), key=lambda item: (SEVERITY.index(item.state), item.cost))
+    held = sum(cell.state == Verdict.AGREES for cell in cells.values())
+    title = worst.title if len(cells) == 1 else "; ".join(f"{case}: {cell.title}" for case, cell in cells.items())
+    if held == count:
+        return cells.get(own or "", worst)._replace(title=title)
+    if not held:
+        return worst._replace(title=title)
+    text = f"{held} of {count} cases"
+    why = f"{worst.why or 'was not run in the others'}; holds {text}"
+    return worst._replace(state=PARTLY, text=text, title=title, cost=math.inf, why=why)
+
+
+def joined(cells: Mapping[str, ChoiceCell], titles: Mapping[str, str]) -> ChoiceCell:
+    """One cell for several scenes: the worst; its cost is that of the slowest if all hold the tolerance.
+
+    Speeds are a range, and where some scenes hold the tolerance and others do not, their number stands in place of the
+    least error.
+    """
+    worst = max(cells.values(), key=lambda item: (ORDER.index(item.state), item.cost))
     if len(cells) == 1:
         return worst
     title = "; ".join(f"{titles[name]}: {cell.title}" for name, cell in cells.items())
@@ -220,8 +240,6 @@ def joined(cells: Mapping[str, ChoiceCell], titles: Mapping[str, str], *, counte
     shared = len({cell.name for cell in cells.values()}) == 1
     worst = worst._replace(title=title, name=worst.name if shared else "")
     if held == len(cells):
-        return worst._replace(text=speeds([*cells.values()])) if counted and worst.holds else worst
-    if not counted:
-        return worst._replace(cost=math.inf)
+        return worst._replace(text=speeds([*cells.values()])) if worst.holds else worst
     why = f"{worst.why}; holds {held} of {len(cells)}"
     return worst._replace(text=f"{held} of {len(cells)}", cost=math.inf, why=why)

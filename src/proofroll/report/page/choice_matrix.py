@@ -1,6 +1,6 @@
 """Matrix of engines and kinds of scenes: the cheapest run that holds a tolerance, or the reason why none does."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from itertools import groupby, product
@@ -11,7 +11,18 @@ from proofroll.core.verdict import Verdict
 from proofroll.report.kinds import group_words
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.candidates import Candidate, candidates
-from proofroll.report.page.choice_cell import CANNOT, NO_RUN, ORDER, PARTLY, TIE, ChoiceCell, cell_of, joined, speeds
+from proofroll.report.page.choice_cell import (
+    CANNOT,
+    NO_RUN,
+    ORDER,
+    PARTLY,
+    TIE,
+    ChoiceCell,
+    cell_of,
+    joined,
+    of_cases,
+    speeds,
+)
 
 # Tolerances that a reader can choose: negative powers of ten, relative to the path or the largest force.
 DECADES = range(2, 9)
@@ -20,6 +31,10 @@ FIRST = 4
 FIRST_TOLERANCE = 10.0**-FIRST
 # All questions that a reader can ask: with forces or not, and the tolerance.
 ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DECADES)]
+
+
+# Group, name of a scene, and case in words.
+CaseKey = tuple[str, str, str]
 
 
 class ChoiceStudy(NamedTuple):
@@ -42,10 +57,19 @@ class ChoiceStudy(NamedTuple):
 
 @dataclass(frozen=True)
 class ChoiceScene:
-    """A scene with the studies about it; it counts once however many they are."""
+    """A scene with the studies about it; it counts once however many they are.
+
+    Attributes:
+        name: of the scene.
+        studies: names of the studies.
+        cases: their cases in words.
+        own: the first with the scene's own parameters; None: no study has one.
+    """
 
     name: str
     studies: tuple[str, ...]
+    cases: tuple[str, ...]
+    own: str | None
 
     @property
     def words(self) -> str:
@@ -82,13 +106,17 @@ class ChoiceColumn:
 
 @dataclass(frozen=True, eq=False)
 class ChoiceRow:
-    """Formulation with one setting, or with all (``setting`` is empty); ``found``: its candidates by study."""
+    """Formulation with one setting, or with all (``setting`` is empty).
+
+    ``found``, ``cases``: its candidates by study, over all points of it, and by case, of all studies.
+    """
 
     engine: str
     formulation: str
     setting: str
     own_equations: bool
     found: dict[str, list[Candidate]] = field(default_factory=dict)
+    cases: dict[CaseKey, list[Candidate]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -154,25 +182,36 @@ class ChoiceMatrix:
         if names and not judged:
             what = "no forces" if forces else "no motion"
             return ChoiceCell(Verdict.NOT_JUDGED, what, f"{what} judged here", why=f"{what} judged")
-        # A study without any judgement, say for lack of time, does not count against the studies that ran.
-        run_names = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
-        cells = {name: cell_of(row.found[name], tolerance, forces) for name in run_names or judged}
-        if not cells:
-            return self._without_run(row, column)
         scenes = {
-            scene.name: joined(
-                {name: cells[name] for name in scene.studies if name in cells}, self.titles, counted=False
-            )
+            scene.name: cell
             for scene in column.scenes
-            if cells.keys() & set(scene.studies)
+            if not self.unjudged[forces].issuperset(scene.studies)
+            and (cell := self._of_scene(row, column.group, scene, tolerance, forces)) is not None
         }
+        if not scenes:
+            return self._without_run(row, column)
+        # A scene without any judgement, say for lack of time, does not count against the scenes that ran.
+        ran = {name: cell for name, cell in scenes.items() if cell.state != Verdict.NOT_JUDGED}
         lacking = [
             scene
             for scene in column.scenes
-            if self.judged[forces].intersection(scene.studies) and not set(run_names).intersection(scene.studies)
+            if self.judged[forces].intersection(scene.studies) and scene.name not in ran
         ]
         words = {scene.name: scene.words for scene in column.scenes}
-        return joined(scenes, words)._replace(scenes=len(scenes), lacking=len(lacking))
+        return joined(ran or scenes, words)._replace(scenes=len(ran or scenes), lacking=len(lacking))
+
+    def _of_scene(
+        self, row: ChoiceRow, group: str, scene: ChoiceScene, tolerance: float, forces: bool
+    ) -> ChoiceCell | None:
+        """Cell of a scene: per case the cheapest run of all studies that holds; None without a run."""
+        cases = [case for case in scene.cases if (group, scene.name, case) in self.judged_cases[forces]]
+        keys = [(group, scene.name, case) for case in cases or scene.cases]
+        found = {key[-1]: row.cases[key] for key in keys if key in row.cases}
+        ran = {case: items for case, items in found.items() if any(x.blame != Verdict.NOT_JUDGED for x in items)}
+        cells = {case: cell_of(items, tolerance, forces) for case, items in (ran or found).items()}
+        # A case that was left out for lack of time counts against nobody.
+        count = len(cases) - len(found.keys() - ran.keys()) if ran and cases else len(cells)
+        return of_cases(cells, scene.own, count) if cells else None
 
     def _without_run(self, row: ChoiceRow, column: ChoiceColumn) -> ChoiceCell:
         """Cell without a run: the formulation cannot represent the scenes, or was not tried."""
@@ -208,6 +247,13 @@ class ChoiceMatrix:
         pairs = [(name, of_study) for row in self.rows for name, of_study in row.found.items()]
         ran = {name for name, of_study in pairs if any(item.blame is None for item in of_study)}
         return ran - self.judged[False], ran - self.judged[True]
+
+    @cached_property
+    def judged_cases(self) -> tuple[set[CaseKey], set[CaseKey]]:
+        """Cases in which motion is judged, and those in which forces are judged, too."""
+        items = [(case, item) for row in self.rows for case, of_case in row.cases.items() for item in of_case]
+        motion = {case for case, item in items if item.motion is not None}
+        return motion, motion & {case for case, item in items if item.forces is not None}
 
     @property
     def models(self) -> list[ChoiceRow]:
@@ -293,18 +339,26 @@ def choice_matrix(
     chosen = sorted((line for line in lines if line.study in order), key=lambda x: (order[x.study], x.row, x.engine))
     rows: dict[tuple[str, str, str], ChoiceRow] = {}
     groups: dict[str, dict[str, dict[str, None]]] = {}
+    cases: dict[tuple[str, str], dict[str, bool]] = {}
     derived = {(line.engine, line.formulation) for line in chosen if line.own_equations}
     for (name, _, _), group_lines in groupby(chosen, key=lambda x: (x.study, x.row, x.engine)):
         of_row, study = list(group_lines), studies[name]
         row_line, steps = of_row[0], candidates(of_row, study.href, study.runs)
         groups.setdefault(row_line.group, {}).setdefault(row_line.scene, {})[name] = None
+        by_case: dict[str, list[TableLine]] = {}
+        for item in of_row:
+            by_case.setdefault(item.case, []).append(item)
+            cases.setdefault((item.group, item.scene), {})[item.case] = item.own_case
+        found = {case: candidates(items, study.href, study.runs) for case, items in by_case.items()}
         for setting in ("", row_line.setting or "as it is"):
             key = (row_line.engine, row_line.formulation, setting)
             row = rows.setdefault(key, ChoiceRow(*key, own_equations=key[:2] in derived))
             row.found.setdefault(name, []).extend(steps)
+            for case, items_found in found.items():
+                row.cases.setdefault((row_line.group, row_line.scene, case), []).extend(items_found)
     columns = []
     for group, studies_of in groups.items():
-        scenes = tuple(ChoiceScene(name, tuple(group_lines)) for name, group_lines in studies_of.items())
+        scenes = tuple(_scene(name, of_scene, [*cases[group, name].items()]) for name, of_scene in studies_of.items())
         title, meaning = group_words(group)
         whole = ChoiceColumn(group=group, title=title, meaning=meaning, href="", scenes=scenes)
         single = []
@@ -321,3 +375,9 @@ def choice_matrix(
     return ChoiceMatrix(
         columns=columns, rows=[rows[key] for key in keys], studies=dict(studies), names=names, provides=provides
     )
+
+
+def _scene(name: str, studies: Iterable[str], cases: Sequence[tuple[str, bool]]) -> ChoiceScene:
+    """A scene with its studies; ``cases``: each with True if it has the scene's own parameters."""
+    own = next((case for case, is_own in cases if is_own), None)
+    return ChoiceScene(name, tuple(studies), tuple(case for case, _ in cases), own)

@@ -145,7 +145,7 @@ class FirstScreen:
         dots = tuple(cell.holds for cell in standing.by_scene) if len(standing.by_scene) > 1 else ()
         if view.look in {CANNOT, NO_RUN, "unjudged"}:
             return view
-        if standing.state == PARTLY:
+        if standing.state == PARTLY and standing.by_scene:
             pairs = zip(column.scenes, standing.by_scene, strict=True)
             return view._replace(sub=", ".join(f"{s.words} {c.text}" for s, c in pairs if c.holds), dots=dots)
         words = standing.formulation.replace("_", " ")

@@ -15,8 +15,9 @@ from proofroll.core.engine_abilities import by_hand
 from proofroll.core.number_format import counted
 from proofroll.core.verdict import LimitResult
 from proofroll.files.json_data import MERGED
+from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import group_of
-from proofroll.report.long_table import TableLine, setting_columns
+from proofroll.report.long_table import TableLine, case_words, setting_columns
 from proofroll.report.parts import Part, PartEntry, Tell, claims_sentence
 from proofroll.report.tradeoff import tables as tradeoff_tables
 from proofroll.report.tradeoff.tables import default_quantities
@@ -120,6 +121,8 @@ class TradeoffPart(Part):
         assert study is not None  # it was made
         scene = self.asked.swept.loaded
         group, place = group_of(scene), point_name(study.parameters)
+        case = case_words(scene.parameters, study.until)
+        own = dict(scene.parameters) == dict(load_scene(study.scene).parameters)
         units = {name: item.unit for name, item in scene.observables.items()}
         limits = {(item.curve, item.quantity): _limit(item, units[item.quantity]) for item in study.budgets}
         lines = []
@@ -128,6 +131,7 @@ class TradeoffPart(Part):
             low, high = point.interval or (None, None)
             run: dict[str, Any] = {
                 "study": self.asked.name, "group": group, "scene": study.scene, "place": place,
+                "case": case, "own_case": own,
                 "row": rows[point.curve], "version": study.measured.versions.get(point.engine, ""),
                 "own_equations": by_hand(point.level), "status": point.status,
                 "message": "" if point.status == Status.DONE else point.message, "verdict": "",

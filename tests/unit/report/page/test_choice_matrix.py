@@ -213,15 +213,28 @@ def test_a_cost_is_told_as_a_speed(cost: float, clean: bool, text: str) -> None:
 
 
 def test_a_scene_counts_once_however_many_studies_use_it() -> None:
-    """Two studies of one scene are one scene, whose cell is the worse; another scene is a second."""
+    """Two studies of one scene are one scene; another scene is a second."""
     again = [replace(item, study="chain") for item in ARM]
     other = [replace(item, study="ball", scene="ball") for item in ARM]
     found = choice_matrix([*ARM, *again, *other], STUDIES)
     assert [(item.name, item.whole, len(item.scenes)) for item in found.columns] == [
         ("trees", True, 2), ("arm", False, 1), ("ball", False, 1),
     ]  # fmt: skip
-    worse = [line(study="chain", error=4e-2)]
-    assert at([*ARM, *worse], 3)[:2] == (Verdict.CONVERGES, "0.04"), "no number of studies"
+
+
+def test_the_cheapest_run_of_all_studies_counts_at_the_same_case() -> None:
+    """Of one case the best of both studies; of two cases both have to be held, and the scene's own has the speed."""
+    better = line(study="chain", setting="fast", error=1e-9, cost=0.001)
+    assert at([*ARM, better], 3)[:2] == (Verdict.AGREES, "≥ 1000×")
+    worse = line(study="chain", error=4e-2)
+    assert at([*ARM, worse], 3).state == Verdict.AGREES
+    longer = {"study": "chain", "case": "speed=2, 1 s", "own_case": False}
+    assert at([*ARM, replace(better, **longer, cost=1.0)], 3)[:2] == (Verdict.AGREES, "≥ 100×"), "the scene's own"
+    assert at([*ARM, replace(worse, **longer)], 3)[:2] == (PARTLY, "1 of 2 cases")
+    once = [*ARM, replace(better, **longer, engine="beta")]
+    cell = at(once, 3)
+    assert (cell.state, cell.why) == (PARTLY, "was not run in the others; holds 1 of 2 cases")
+    assert answer(choice_matrix(once, STUDIES), 1e-3, False).kinds[0].taken is None
 
 
 def test_what_cannot_be_represented_is_told_from_what_was_not_run(whole: ChoiceMatrix) -> None:
@@ -291,14 +304,14 @@ def test_the_best_engine_of_a_kind_is_near_the_cheapest_in_most_scenes() -> None
 
 
 def test_a_speed_is_a_least_one_until_a_coarser_step_fails() -> None:
-    """Another row's coarser step, or one that was not run, tells nothing; one that diverged does."""
+    """Another setting's coarser step, or one that was not run, tells nothing; one that diverged does."""
     fine, coarse = line(error=1e-9, step=1e-3), line(error=1e-9, step=2e-3, cost=0.005)
     lost = replace(coarse, status="diverged", verdict="failed", error=None, cost=None)
     assert at([fine], 4).open
     assert at([fine, coarse], 4).open, "the coarsest of both"
     assert not at([fine, replace(coarse, error=0.5)], 4).open
     assert not at([fine, lost], 4).open
-    assert at([fine, replace(coarse, error=0.5, row=8)], 4).open
+    assert at([fine, replace(coarse, error=0.5, row=8, setting="tuned")], 4).open
     assert not at([replace(fine, step=None, resolution="")], 4).open, "a closed form has no steps"
 
 
