@@ -144,6 +144,17 @@ def test_recommend_for_a_person(proofroll: Proofroll, folder: Path) -> None:
         assert words in " ".join(out.split())
 
 
+def test_lines_of_a_choice_are_all_that_is_printed(proofroll: Proofroll, folder: Path) -> None:
+    """They are for a pipe: assignments to Exudyn's settings alone; without a choice there is one line of error."""
+    code, out, _ = proofroll(*asked(folder), "--lines")
+    assert code == 0
+    assert out.splitlines()
+    assert all(line.startswith(("simulationSettings.", "#")) for line in out.splitlines())
+    code, out, err = proofroll(*asked(folder), "--lines", "--tolerance", "1e-14")
+    assert (code, out) != (0, "")
+    assert "nothing that was measured holds the tolerance" in err
+
+
 def test_a_tolerance_that_nothing_holds(proofroll: Proofroll, folder: Path) -> None:
     """Beyond what was measured there is no choice: exit code 1, and the closest is named."""
     code, out, _ = proofroll(*asked(folder, tolerance="1e-15 m"))

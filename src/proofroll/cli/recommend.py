@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from proofroll.report.page.choice_matrix import ChoiceMatrix
     from proofroll.studies.tradeoff.claims import TradeoffClaims
     from proofroll.studies.tradeoff.curve import Question
+    from proofroll.studies.tradeoff.recommend import Recommendation
     from proofroll.studies.tradeoff.records import TradeoffStudy
 
 # A part of the path, as the first screen of a report has it.
@@ -53,6 +54,10 @@ def recommend(
     until: options.Until = None,
     measure_first: Annotated[
         bool, typer.Option("--measure", help="Measure first if no curves are stored, as tradeoff without --budget.")
+    ] = False,
+    lines: Annotated[
+        bool,
+        typer.Option("--lines", help="Print only the lines that make the choice in a model of your own, from curves."),
     ] = False,
     forces: Annotated[bool, typer.Option("--forces", help="Forces count as the motion does; from a report.")] = False,
     report: Annotated[
@@ -84,6 +89,7 @@ def recommend(
         "--over": over,
         "--until": until,
         "--measure": measure_first,
+        "--lines": lines,
     }
     asked = len(scenes) > 1 or forces or report is not None
     if asked or (not any(requirements.values()) and _is_in_report(scenes[0], report_file)):
@@ -112,8 +118,33 @@ def recommend(
     not_measured = [] if engine else [name for name in engine_names() if name not in names]
     omitted = list(question.loaded.omitted) or None
     recommendation = replace(answered(study, required), not_measured=not_measured, omitted=omitted)
-    options.show(recommendation, as_json, lambda: answer_lines(recommendation))
+    if lines and not as_json:
+        typer.echo("\n".join(_own_lines(recommendation)))  # unbroken, as a program reads them
+    else:
+        options.show(recommendation, as_json, lambda: answer_lines(recommendation))
     raise typer.Exit(options.OK if recommendation.answer.choice and recommendation.affordable else options.CONTRADICTED)
+
+
+def _own_lines(recommendation: Recommendation) -> list[str]:
+    """Lines of the chosen engine's own file or program that make the settings of the choice.
+
+    Raises:
+        ProofrollError: nothing was chosen, or the engine's adapter tells no lines.
+    """
+    from proofroll.core.engine_abilities import TellsLines
+    from proofroll.core.errors import ProofrollError
+    from proofroll.core.plugins import load_engine, resolve_settings
+
+    choice = recommendation.answer.choice
+    if choice is None:
+        raise ProofrollError(
+            "--lines: nothing that was measured holds the tolerance; without --lines the closest is told"
+        )
+    engine = load_engine(choice.point.engine)
+    if not isinstance(engine, TellsLines):
+        raise ProofrollError(f"--lines: the adapter of {choice.point.engine} tells none")
+    given = {name: value for name, value in choice.point.settings.items() if value is not None}
+    return engine.lines(resolve_settings(engine, given))
 
 
 def _is_in_report(name: str, path: Path) -> bool:

@@ -140,6 +140,15 @@ class LowersOrder(Protocol):
         """Capability, as in ``provides`` -> lower order of convergence that it causes."""
 
 
+@runtime_checkable
+class TellsLines(Protocol):
+    """Ability of an engine that says what a setting is in a user's own model of it."""
+
+    @staticmethod
+    def lines(settings: Any) -> list[str]:
+        """Lines of the engine's own file or program that make the settings; a comment for what none can set."""
+
+
 def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:
     """Order of convergence for a scene: the declared one, or the lowest that a required capability causes.
 

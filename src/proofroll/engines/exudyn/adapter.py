@@ -22,6 +22,7 @@ from proofroll.engines.exudyn.contact.discs import Discs
 from proofroll.engines.exudyn.contact.spheres import Spheres
 from proofroll.engines.exudyn.integration import ExudynModel
 from proofroll.engines.exudyn.native import exu
+from proofroll.engines.exudyn.own_lines import own_lines
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
 from proofroll.engines.exudyn.smooth import redundant, tree
 from proofroll.engines.exudyn.smooth.redundant import Redundant
@@ -101,6 +102,7 @@ class Exudyn:
             caveats.append("radii and softness of the spheres follow proofroll's own contact forces at the start")
         return "; ".join(caveats)
 
+    lines = staticmethod(own_lines)
     family = staticmethod(spheres.family)
 
     @staticmethod

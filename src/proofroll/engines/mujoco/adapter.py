@@ -17,6 +17,7 @@ from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.mujoco.ball import run as ball
 from proofroll.engines.mujoco.contact import mechanism_geoms
 from proofroll.engines.mujoco.contact.mechanism_geoms import MujocoGeoms
+from proofroll.engines.mujoco.own_lines import own_lines
 from proofroll.engines.mujoco.running import written
 from proofroll.engines.mujoco.settings import PRESETS, TERMS, MujocoSettings, lowered
 from proofroll.engines.mujoco.smooth import mechanism
@@ -44,6 +45,7 @@ class Mujoco:
         "geoms": mechanism_geoms.LACKING,
     }
     settings: ClassVar[type[Any]] = MujocoSettings
+    lines = staticmethod(own_lines)
     lowered = staticmethod(lowered)
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {

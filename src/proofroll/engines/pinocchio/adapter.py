@@ -16,6 +16,7 @@ from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.pinocchio.ball import formulations as ball
 from proofroll.engines.pinocchio.contact import impulses
 from proofroll.engines.pinocchio.contact.impulse_run import ImpulseRun
+from proofroll.engines.pinocchio.own_lines import own_lines
 from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings, lowered
 from proofroll.engines.pinocchio.smooth import constraint_dynamics, joint_tree
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
@@ -47,6 +48,7 @@ class Pinocchio:
         "impulses": impulses.LACKING,
     }
     settings: ClassVar[type[Any]] = PinocchioSettings
+    lines = staticmethod(own_lines)
     lowered = staticmethod(lowered)
     presets: ClassVar[Mapping[str, Mapping[str, PinocchioSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {

@@ -54,6 +54,14 @@ def part_names(joint: Joint) -> list[str]:
 _SHORTEST = 1e-9
 
 
+def set_integration(option: Any, settings: MujocoSettings) -> None:
+    """Sets step and integrator in the options of an MjSpec."""
+    option.timestep = settings.dt
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
+    if settings.damping_armature:
+        option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+
+
 def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     """MjSpec of a mechanism; joints are named by :func:`part_names`, joint k has a site ``k`` and two sensors.
 
@@ -64,12 +72,10 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False  # or springs of hinges would have their rest in degrees
     option = spec.option
-    option.timestep, option.gravity = settings.dt, mechanism.gravity
-    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
+    option.gravity = mechanism.gravity
+    set_integration(option, settings)
     # Without autoreset, a state that is not finite stays as it is instead of starting anew at time 0.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    if settings.damping_armature:
-        option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
     if not mechanism.contacts:
         option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     bodies, added = {WORLD: spec.worldbody}, damping_armatures(mechanism, settings)

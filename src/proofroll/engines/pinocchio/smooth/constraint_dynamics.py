@@ -25,8 +25,8 @@ LACKING: Mapping[str, str] = {
     **joint_tree.LACKING,
     **dict.fromkeys((ALL_LOOPS - _POINTS) | _COUPLINGS, _NO_ROWS),
 }
-_ITERATIONS = 50
-_ACCURACY = 1e-14
+# Of the proximal method.
+ITERATIONS, ACCURACY = 50, 1e-14
 
 
 class ConstraintDynamics:
@@ -41,7 +41,7 @@ class ConstraintDynamics:
     def __init__(self, tree: JointTree, proximal: float) -> None:
         """Builds the constraints; ``proximal`` is the regularisation μ of Pinocchio's proximal solver."""
         self._tree, self._model, self.on_couplings, self.on_motions = tree, tree.model, np.zeros(0), np.zeros(0)
-        self.proximal = _ACCURACY, proximal, _ITERATIONS
+        self.proximal = ACCURACY, proximal, ITERATIONS
         self._proximal = pin.ProximalSettings(*self.proximal)
         self.constraints, self._loops = pin.StdVec_RigidConstraintModel(), []
         for number, (loop, (a, b)) in enumerate(zip(tree.mechanism.loops, tree.loops, strict=True)):
