@@ -113,6 +113,11 @@ def case_words(parameters: Mapping[str, float], until: float) -> str:
     return ", ".join([*values, f"{until:.12g} s"])
 
 
+def case_duration(case: str) -> str:
+    """Length of the runs of a case, as ``0.5 s``."""
+    return case.rpartition(", ")[2]
+
+
 def setting_columns(name: str, engine: str, facts: EngineFacts | SweptSetting) -> dict[str, Any]:
     """Columns of a line about an engine's setting.
 

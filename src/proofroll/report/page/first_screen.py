@@ -47,7 +47,7 @@ _LOOKS = {
 # Most engines of which every choice has an answer of its own; of more, all but one, and each alone.
 _ALL_CHOICES = 4
 # Fastest speed of the bars.
-FASTEST = 300.0
+FASTEST = 1000.0
 # Looks of marks that a small picture leaves out: arrows of gravity and of forces.
 _NOT_SMALL = ("force", "force-head", "axis")
 
@@ -229,7 +229,7 @@ class FirstScreen:
 
 
 def bar(cell: ChoiceCell) -> int:
-    """Length of the bar of a speed [%], logarithmic from 1× to 300× real time; 0 where the tolerance is not held."""
+    """Length of the bar of a speed [%], logarithmic from 1× to 1000× real time; 0 where the tolerance is not held."""
     if not cell.holds or cell.cost <= 0:
         return 0
     part = math.log(max(1.0, 1 / cell.cost)) / math.log(FASTEST)
