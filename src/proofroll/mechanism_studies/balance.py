@@ -16,6 +16,7 @@ from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.commands import at_start
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.named_forces import lengths, named_forces, pick_named
+from proofroll.elements.mechanism.run.assembly import started
 from proofroll.elements.mechanism.run.dataset import along, reactions
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
@@ -124,7 +125,7 @@ def balance(
     resting = stilled(element.mechanism, hold)
     equations = JointCoordinates(resting)
     q = at_rest(equations)
-    posed = at_pose(resting, q, np.zeros(resting.nv))
+    posed = started(resting, q, np.zeros(resting.nv))
     if analyse(posed).singular_start:
         raise Refused(
             "the equilibrium is a singular pose of the loops, where no forces are determinate; start elsewhere"
@@ -176,15 +177,6 @@ def stilled(mechanism: Mechanism, hold: Sequence[str] = ()) -> Mechanism:
     return replace(mechanism, joints=tuple(rested(joint) for joint in mechanism.joints))
 
 
-def at_pose(mechanism: Mechanism, q: Array, v: Array) -> Mechanism:
-    """Mechanism that starts at coordinates, (nq), and velocities, (nv); joints that are held stay."""
-    joints = tuple(
-        joint if joint.motion is not None else replace(joint, q0=tuple(q[at_q]), v0=tuple(v[at_v]))
-        for joint, at_q, at_v in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
-    )
-    return replace(mechanism, joints=joints)
-
-
 def _with(scene: Scene, element: MechanismElement, mechanism: Mechanism) -> Scene:
     return replace(scene, elements=(replace(element, mechanism=mechanism),))
 
@@ -223,7 +215,7 @@ class _InEngine:
     def accelerations(self, displaced: Array, velocities: Array) -> Array:
         """See :class:`~proofroll.mechanism_studies.linearised.Displaced`."""
         q = self._place.pose(displaced)
-        built = self._made(at_pose(self._mechanism, q, velocities)).built()
+        built = self._made(started(self._mechanism, q, velocities)).built()
         if built.acceleration is None or built.angular_acceleration is None:
             raise Refused("it does not report its accelerations")
         reported = np.hstack([np.reshape(part, (-1, 3)) for part in (built.acceleration, built.angular_acceleration)])

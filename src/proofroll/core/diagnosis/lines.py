@@ -6,13 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line, distinct_texts, worst_numbers
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import factor_text
 
-# Lines with a larger tolerance are softened by the engine and prove nothing.
-_EXACT = 1e-6
 # Most numbers of a line that are shown in a cause; of more only the one that differs most.
 _SHOWN = 3
 # Relative deviation within which all numbers of a line are the scene's times one factor.
@@ -28,30 +25,6 @@ def scale_of(line: Mapping[str, Any]) -> float:
     """Scale of a line's difference, in its unit."""
     apart = float(np.max(np.abs(np.subtract(line["found"], line["expected"]))))
     return apart / line["difference"] if apart and line["difference"] else 1.0
-
-
-def relative_differences(
-    lines: Sequence[Mapping[str, Any]], expected: Mapping[str, Sequence[float]], names: Collection[str]
-) -> FloatArray:
-    """Relative differences of all reported quantities from those of another model, shape (numbers,).
-
-    Args:
-        lines: of the certificate.
-        expected: quantity -> numbers of the other model; the scene's where it is missing.
-        names: quantities that the adapter hands to the engine (a mass). Where they agree with the scene they are left
-            out, as an adapter may report what it meant to build.
-    """
-    parts = [np.zeros(0)]
-    for line in lines:
-        if line["quantity"] in names and line["holds"]:
-            continue
-        want = np.asarray(expected.get(line["quantity"], line["expected"]), dtype=np.float64)
-        got = np.asarray(line["found"], dtype=np.float64)
-        if line["difference"] is None or got.shape != want.shape:
-            continue
-        finite = np.isfinite(got) & np.isfinite(want)
-        parts.append((got - want)[finite] / scale_of(line) * (1 if line["tolerance"] <= _EXACT else 0))
-    return np.concatenate(parts)
 
 
 def built_otherwise(names: Collection[str], covers: tuple[str, ...]) -> Hypothesis:

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from proofroll.core.bounds import DENSEST
-from proofroll.elements.mechanism.run.plausibility import FAR, LARGE, TIMES
+from proofroll.elements.mechanism.run.plausibility import LARGE, doubtful_body
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots.files.mjcf.defaults import with_classes
 from proofroll.robots.files.robot_file import RobotFile, floats
@@ -35,24 +34,10 @@ def implausible(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]
 
 
 def _body(body: RobotBody, between: float) -> Iterator[str]:
-    if not body.mass > 0:
-        return
-    away = float(np.linalg.norm(body.com))
-    if away > LARGE or (between and away > max(FAR, TIMES * between)):
-        yield f"its centre of mass lies {away:.4g} m from its origin; lengths are metres"
-    largest = float(body.moments[-1])
-    if not np.any(body.inertia):
-        yield f"it has a mass of {body.mass:.4g} kg but no inertia: some engines refuse it, others invent one"
-    elif largest > 0:
-        gyration = math.sqrt(largest / body.mass)
-        smallest = math.sqrt(0.4) * (3 * body.mass / (4 * math.pi * DENSEST)) ** (1 / 3)
-        if gyration > LARGE:
-            yield f"its radius of gyration is {gyration:.4g} m; inertias are kg m²: 1 g mm² is 1e-9, 1 kg mm² is 1e-6"
-        elif gyration < smallest:
-            words = (
-                f"its radius of gyration of {1e3 * gyration:.4g} mm is that of {body.mass:.4g} kg denser than osmium"
-            )
-            yield f"{words}; inertias are kg m²"
+    if body.mass > 0:
+        yield from doubtful_body(body.mass, body.com, float(body.moments[-1]), between)
+        if not np.any(body.inertia):
+            yield f"it has a mass of {body.mass:.4g} kg but no inertia: some engines refuse it, others invent one"
 
 
 def _urdf_angles(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,10 +21,10 @@ from proofroll.robots.control.bookkeeping.mistakes import (
     SEARCH_TIME,
     Mistake,
     SearchTime,
-    fitted,
     mistakes,
     offsets_told,
 )
+from proofroll.robots.control.bookkeeping.search import MistakeExplanation, best_size, explanations, largest
 from proofroll.robots.control.motion import motion_layer
 from proofroll.robots.control.record import BASE, OBSERVED, ControlRecord
 from proofroll.robots.control.record_layer import Layer, LayerCause
@@ -34,7 +34,6 @@ from proofroll.robots.model import Array
 _ROUND_OFF = 1e-9
 # Number of random roundings of a record that give the bar of a layer, and the factor on their largest change.
 _ROUNDINGS, _SAFETY = 6, 3.0
-_FOR_A_SIZE = 3.0  # what a fitted size must be better by
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
 _HELPS = 0.1
 _SAME_TIME = 1e-6  # part of the time between instants that is round-off
@@ -89,6 +88,11 @@ class _Evidence:
     ) -> _Compared | str:
         """Differences of a layer, or the reason why there are none."""
         return _DIFFERENCES[name](record or self.record, law or self.law)
+
+    def left(self, name: str, law: ControlLaw) -> Array:
+        """Differences of a layer under a law in parts of the sizes of their columns; NaN where there are none."""
+        compared = self.difference(name, law)
+        return np.array(np.nan) if isinstance(compared, str) else (compared.difference / compared.sizes).ravel()
 
 
 def _layer(name: str, evidence: _Evidence) -> Layer:
@@ -161,18 +165,17 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
     shown = [*(name for name in order[: order.index(layer.name)] if name in skipped), layer.name]
     distance = _norm(evidence, layer.name, evidence.law)
     rounding = float((_bars(layer.name, evidence, compared) / compared.sizes).max())
-    ranked: list[tuple[float, LayerCause]] = []
+    most = max(_HELPS * distance, min(rounding, 0.5 * distance))
+
+    def explanation(mistake: Mistake) -> MistakeExplanation | None:
+        left, size = best_size(mistake, evidence.law, partial(evidence.left, layer.name))
+        return MistakeExplanation(mistake, size, left) if left <= most else None
+
+    candidates = [item for item in mistakes(evidence.law) if _shows(item, shown)]
+    several, tried = explanations(candidates, explanation, time)
+    ranked = [(item.rank, item.cause) for item in several]
     if "target" in shown and not isinstance(offset := _offset(evidence, layer.name), str):
         ranked.append((2 * offset.after, offset))  # a pose has many numbers: a mistake with fewer goes before
-    tried, candidates = 0, [item for item in mistakes(evidence.law) if _shows(item, shown)]
-    for mistake in candidates:
-        if time.over:
-            break
-        tried += 1
-        size, residual = _best_size(mistake, layer.name, evidence)
-        if residual <= max(_HELPS * distance, min(rounding, 0.5 * distance)):
-            cause = LayerCause(mistake.id, mistake.sentence(size), size if mistake.sized else None, residual)
-            ranked.append((residual * (_FOR_A_SIZE if mistake.sized else 1.0), cause))
     causes = [cause for _, cause in sorted(ranked, key=lambda item: item[0])]
     if layer.name == "instants" and not causes:
         causes = [*_missed(evidence)]
@@ -216,25 +219,9 @@ def _offset(evidence: _Evidence, name: str) -> LayerCause | str:
     return LayerCause("pose", offsets_told(law.joints, offsets), None, distance)
 
 
-def _best_size(mistake: Mistake, layer: str, evidence: _Evidence) -> tuple[float, float]:
-    """Size of a mistake that fits a record best, and the residual with it."""
-
-    def residual(size: float) -> Array:
-        compared = evidence.difference(layer, mistake.changed(evidence.law, size))
-        return np.array(np.nan) if isinstance(compared, str) else (compared.difference / compared.sizes).ravel()
-
-    sizes = [fitted(residual, start) for start in mistake.starts] if mistake.sized else [1.0]
-    pairs = [(_norm(evidence, layer, mistake.changed(evidence.law, size)), size) for size in sizes]
-    distance, size = min(pairs)
-    return size, distance
-
-
 def _norm(evidence: _Evidence, name: str, law: ControlLaw) -> float:
     """Largest difference of a layer in parts of the size of its column."""
-    compared = evidence.difference(name, law)
-    if isinstance(compared, str):
-        return math.inf
-    return float(np.abs(compared.difference / compared.sizes).max())
+    return largest(evidence.left(name, law))
 
 
 def _compared(columns: list[str], time: Array, recorded: Array, computed: Array) -> _Compared:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -13,15 +12,14 @@ from proofroll.robots.control.air_fit import AirFit, states_of
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw, RobotState
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, SEARCH_TIME, SearchTime, mistakes
-from proofroll.robots.control.bookkeeping.search import EXACT, Depth, MistakeSearch, explained
+from proofroll.robots.control.bookkeeping.search import EXACT, MistakeSearch, explained
 from proofroll.robots.control.bookkeeping.seen import SHOWN, WHOLE, LawMotions, SeenMotion
 from proofroll.robots.control.record import ControlRecord
-from proofroll.robots.control.record_layer import Layer, LayerCause
+from proofroll.robots.control.record_layer import Layer
 
 _STEPS, _LEAST_STEP = (1, 2, 5, 10), 4.9e-4  # steps between rows that are tried, and the shortest [s]
 # What no motion under a law has, and the fit of forces tells; damping moves the robot as more of kd does.
 _ONLY_FORCES = ("damping", "friction", "payload")
-_DEPTHS: tuple[Depth, ...] = ("a mistake", "a pair")
 _ON_INSTANT, _FEWEST = 1e-5, 4  # part of the time between instants that is round-off, and least rows of a motion
 
 
@@ -89,17 +87,15 @@ def _best(
     """
     if right := [step for step, distance in plain.items() if distance <= seen.bar]:
         return explained(mechanism, law, seen, right[0])
-    steps = sorted(plain, key=lambda step: plain[step])
-    searches: dict[float, MistakeSearch] = {}
-    for depth, step in itertools.product(_DEPTHS, steps):
+    searches: list[MistakeSearch] = []
+    for step in sorted(plain, key=lambda step: plain[step]):
         if time.over and searches:
             break
-        search = searches[step] = explained(mechanism, law, seen, step, depth, time)
-        if search.explanations and search.explanations[0].after <= max(EXACT * search.before, seen.bar):
-            return search
-    if not time.over and all(item.before > item.spread and not item.explanations for item in searches.values()):
-        return explained(mechanism, law, seen, steps[0], time=time)
-    return min(searches.values(), key=lambda item: item.explanations[0].after if item.explanations else item.before)
+        searches.append(explained(mechanism, law, seen, step, time))
+        last = searches[-1]
+        if last.explanations and last.explanations[0].after <= max(EXACT * last.before, seen.bar):
+            return last
+    return min(searches, key=lambda item: item.explanations[0].after if item.explanations else item.before)
 
 
 def motion_layer(
@@ -153,15 +149,7 @@ def motion_layer(
     bar = max(best.spread, seen.bar)
     if best.explanations or fitted:
         bar = min([item.after for item in best.explanations] or [seen.bar])
-    causes = (
-        LayerCause(
-            id=" + ".join(mistake.id for mistake in item.mistakes),
-            sentence=item.sentence,
-            size=item.sizes[0] if item.mistakes[0].sized else None,
-            after=item.after,
-        )
-        for item in best.explanations
-    )
+    causes = (item.cause for item in best.explanations)
     layer = Layer(
         name="motion",
         residual=best.before,

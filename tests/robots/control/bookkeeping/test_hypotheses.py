@@ -50,11 +50,6 @@ def _controlled(change: Callable[[Control], Control]) -> Callable[[Mechanism], M
         (_controlled(_with(delay=1)), "matched", "targets act one instant late"),
         (_controlled(_with(scale=0.61 * 0.5)), "default", "the scale of actions is 0.61"),
         (_servos(kd=0.7), "matched", "kd is 0.7 of the right one"),
-        (
-            lambda mechanism: _servos(kd=0.5)(_controlled(_with(delay=1))(mechanism)),
-            "matched",
-            "targets act one instant late; and kd is 0.5 of the right one",
-        ),
     ],
 )
 def test_a_comparison_names_a_mistake_in_a_loop(

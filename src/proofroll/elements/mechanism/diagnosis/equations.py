@@ -8,7 +8,7 @@ stiffnesses, damping and gravity, and needs no reactions.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,12 +21,13 @@ from proofroll.core.diagnosis import Evidence
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.dynamics.placed import Placed
-from proofroll.elements.mechanism.dynamics.point_loads import bushing_loads
+from proofroll.elements.mechanism.dynamics.point_loads import PointLoad, applied_loads, bushing_loads, spring_loads
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
 from proofroll.elements.mechanism.run.dataset import quaternions
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
 from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.parts import Spring
 from proofroll.elements.mechanism.scene.rotations import skews
 from proofroll.elements.mechanism.scene.signal import breaks, value_at
 
@@ -237,49 +238,23 @@ class Change:
         for joint, at_q, at_v in zip(mechanism.joints, m.q_slices, m.v_slices, strict=True):
             if joint.stiffness:
                 acts[at_v] -= self.stiffness * joint.stiffness * (state.q[at_q] - joint.rest)
-        acts = acts + self._spring_loads(states, state) + self._bushing_loads(motion)
-        acts = acts + self._applied_loads(states, state)
+        for factor, load in self._point_loads(state):
+            acts = acts + factor * load.along(motion)
         return np.array([sum(terms), acts, sum(map(np.abs, terms)) + np.abs(acts)])
 
-    def _spring_loads(self, states: MechanismStates, state: MechanismState) -> FloatArray:
-        load: FloatArray = np.zeros(self.mechanism.nv)
-        for spring in self.mechanism.springs:
-            (p_a, v_a, J_a, _), (p_b, v_b, J_b, _) = (
-                states.tree.point(state.motion, body, np.array(position))
-                for body, position in ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
-            )
-            length = float(np.linalg.norm(p_b - p_a))
-            axis = (p_b - p_a) / length
-            stretched = self.springs * spring.stiffness * (length - spring.length)
-            damped = self.spring_damping * spring.damping * float(axis @ (v_b - v_a))
-            further = 0.0
-            if spring.force is not None:
-                further = self.springs * float(spring.force.pull(length, float(axis @ (v_b - v_a))))
-            load += (stretched + damped + further) * axis @ (J_a - J_b)
-        return load
+    def _point_loads(self, state: MechanismState) -> Iterator[tuple[float, PointLoad]]:
+        """Loads of springs, bushings and applied forces, each with its factor."""
+        mechanism, motion, factors = self.mechanism, state.motion, dict(self.factors_of_forces)
 
-    def _bushing_loads(self, motion: BodyMotion) -> FloatArray:
-        """Loads of bushings along each velocity, shape (nv,)."""
-        load: FloatArray = np.zeros(self.mechanism.nv)
-        for i, arm, force, moment in bushing_loads(self.mechanism, motion):
-            load += np.concatenate([force, moment + cross(arm, force)]) @ motion.J[i]
-        return self.bushings * load
+        def pull(spring: Spring, length: float, rate: float) -> float:
+            damped = spring.damping * rate
+            return float(self.springs * (spring.pull(length, rate) - damped) + self.spring_damping * damped)
 
-    def _applied_loads(self, states: MechanismStates, state: MechanismState) -> FloatArray:
-        """Applied forces and moments along each velocity, shape (nv,)."""
-        load: FloatArray = np.zeros(self.mechanism.nv)
-        index, motion, factors = self.mechanism.body_index, state.motion, dict(self.factors_of_forces)
-        for number, applied in enumerate(self.mechanism.forces):
-            acting, reacting = index[applied.body], index[applied.reaction]
-            size = factors.get(number, 1.0) * np.array(applied.at(state.t), dtype=float)
-            size = motion.R_WB[acting] @ size if applied.frame == "body" else size
-            if applied.kind == "moment":
-                load += size @ (motion.J[acting, 3:] - motion.J[reacting, 3:])
-                continue
-            place, _, J_a, _ = states.tree.point(motion, applied.body, np.array(applied.position))
-            back = motion.R_WB[reacting].T @ (place - motion.p_WB[reacting])
-            load += size @ (J_a - states.tree.point(motion, applied.reaction, back)[2])
-        return load
+        yield from ((1.0, load) for load in spring_loads(mechanism, motion, pull))
+        yield from ((self.bushings, load) for load in bushing_loads(mechanism, motion))
+        for number, applied in enumerate(mechanism.forces):
+            factor = factors.get(number, 1.0)
+            yield from ((factor, load) for load in applied_loads(mechanism, applied, motion, state.t))
 
 
 def placed_of(mechanism: Mechanism, dataset: Any) -> Placed:

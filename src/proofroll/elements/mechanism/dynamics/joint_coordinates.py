@@ -111,8 +111,8 @@ class JointCoordinates:
         b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
         for stiffness, rest, at_q, at_v in self._springs:
             b[at_v] -= stiffness * (q[at_q] - rest)
-        for i, arm, force, moment in point_loads(self.mechanism, motion, time, self.functions):
-            b += np.concatenate([force, moment + cross(arm, force)]) @ motion.J[i]
+        for acting in point_loads(self.mechanism, motion, time, self.functions):
+            b += acting.along(motion)
         if self.switched:
             b += load_of(self.switched, mode, len(v))
         if load is not None:

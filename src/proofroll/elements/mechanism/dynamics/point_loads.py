@@ -1,6 +1,6 @@
 """Loads of springs between points, bushings and applied forces on the bodies of a mechanism, at one state."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion
 from proofroll.elements.mechanism.scene.bushing import LARGEST
 from proofroll.elements.mechanism.scene.kinks import Functions, Sides
 from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.parts import Force, Spring
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import FUNCTIONS, value_at
 
@@ -30,6 +31,10 @@ class PointLoad(NamedTuple):
     force: Array
     moment: Array
 
+    def along(self, motion: BodyMotion) -> Array:
+        """The load along the velocities of the tree, (nv)."""
+        return np.asarray(np.concatenate([self.force, self.moment + cross(self.arm, self.force)]) @ motion.J[self.body])
+
 
 def point_loads(
     mechanism: Mechanism, motion: BodyMotion, time: float, functions: Functions = FUNCTIONS
@@ -41,6 +46,21 @@ def point_loads(
     Raises:
         Diverged: a bushing turns too far.
     """
+    index = mechanism.body_index
+    yield from spring_loads(mechanism, motion, lambda spring, *state: spring.pull(*state, functions))
+    for bushing in mechanism.bushings:
+        if bushing.turned(motion.R_WB[index[bushing.body_a]], motion.R_WB[index[bushing.body_b]]) > LARGEST:
+            advice = "at half a turn its rotation vector is not unique; give a joint the spring"
+            raise Diverged(f"the bushing {bushing.name} turns by more than {LARGEST:g} rad: {advice}")
+    yield from bushing_loads(mechanism, motion)
+    for applied in mechanism.forces:
+        yield from applied_loads(mechanism, applied, motion, time, functions)
+
+
+def spring_loads(
+    mechanism: Mechanism, motion: BodyMotion, pull_of: Callable[[Spring, float, float], float]
+) -> Iterator[PointLoad]:
+    """Loads of springs, on both bodies of each; ``pull_of``: of a spring, its length [m] and its rate [m/s], N."""
     none, index = np.zeros(3), mechanism.body_index
     for spring in mechanism.springs:
         a, b = index[spring.body_a], index[spring.body_b]
@@ -49,22 +69,23 @@ def point_loads(
         slide = motion.v_WB[b] + cross(motion.w_WB[b], arm_b) - motion.v_WB[a] - cross(motion.w_WB[a], arm_a)
         length = float(np.linalg.norm(d))
         direction = d / length
-        pull = spring.pull(length, float(direction @ slide), functions)
+        pull = pull_of(spring, length, float(direction @ slide))
         yield PointLoad(a, arm_a, pull * direction, none)
         yield PointLoad(b, arm_b, -pull * direction, none)
-    for bushing in mechanism.bushings:
-        if bushing.turned(motion.R_WB[index[bushing.body_a]], motion.R_WB[index[bushing.body_b]]) > LARGEST:
-            advice = "at half a turn its rotation vector is not unique; give a joint the spring"
-            raise Diverged(f"the bushing {bushing.name} turns by more than {LARGEST:g} rad: {advice}")
-    yield from bushing_loads(mechanism, motion)
-    for applied in mechanism.forces:
-        acting, reacting = index[applied.body], index[applied.reaction]
-        size = np.array(applied.at(time, functions), dtype=float)
-        load = motion.R_WB[acting] @ size if applied.frame == "body" else size
-        force, moment = (load, none) if applied.kind == "force" else (none, load)
-        arm = motion.R_WB[acting] @ applied.position
-        yield PointLoad(acting, arm, force, moment)
-        yield PointLoad(reacting, motion.p_WB[acting] + arm - motion.p_WB[reacting], -force, -moment)
+
+
+def applied_loads(
+    mechanism: Mechanism, applied: Force, motion: BodyMotion, time: float, functions: Functions = FUNCTIONS
+) -> Iterator[PointLoad]:
+    """Loads of an applied force or moment at a time [s], on its body and on that of its reaction."""
+    none, index = np.zeros(3), mechanism.body_index
+    acting, reacting = index[applied.body], index[applied.reaction]
+    size = np.array(applied.at(time, functions), dtype=float)
+    load = motion.R_WB[acting] @ size if applied.frame == "body" else size
+    force, moment = (load, none) if applied.kind == "force" else (none, load)
+    arm = motion.R_WB[acting] @ applied.position
+    yield PointLoad(acting, arm, force, moment)
+    yield PointLoad(reacting, motion.p_WB[acting] + arm - motion.p_WB[reacting], -force, -moment)
 
 
 def kink_arguments(mechanism: Mechanism, motion: BodyMotion, time: float) -> Array:

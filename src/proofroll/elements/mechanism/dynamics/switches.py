@@ -68,11 +68,11 @@ class SwitchedJoint:
         """Mode that can hold the joint at a coordinate; ``free`` if none can."""
         return self.stop_at(q) or ("stick" if self.friction else "free")
 
-    def stop_at(self, q: float, error: float = 0.0) -> str:
-        """The stop, ``low`` or ``high``, that a coordinate is at within rounding and its error; empty: none."""
+    def stop_at(self, q: float) -> str:
+        """The stop, ``low`` or ``high``, that a coordinate is at within rounding; empty: none."""
         if math.isinf(self.low):
             return ""
-        near = NEAR * (self.high - self.low) + error
+        near = NEAR * (self.high - self.low)
         return "low" if q - self.low <= near else "high" if self.high - q <= near else ""
 
     def lasts(self, q: float, v: float, a: float) -> float:

@@ -49,8 +49,13 @@ def assemble(mechanism: Mechanism) -> Mechanism:
             break
     C = _finite(tree.loop_rows(tree.at(q, v))).C
     v[free] = -least_norm_solution(C[:, free], C[:, ~free] @ v[~free])
+    return started(mechanism, q, v)
+
+
+def started(mechanism: Mechanism, q: Array, v: Array) -> Mechanism:
+    """Mechanism that starts at coordinates, (nq), and velocities, (nv); joints whose motion is imposed keep theirs."""
     joints = tuple(
-        replace(joint, q0=tuple(q[at_q]), v0=tuple(v[at_v]), dependent=False)
+        joint if joint.motion is not None else replace(joint, q0=tuple(q[at_q]), v0=tuple(v[at_v]), dependent=False)
         for joint, at_q, at_v in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
     )
     return replace(mechanism, joints=joints)

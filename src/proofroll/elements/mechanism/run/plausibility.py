@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import DENSEST, LIGHTEST
 from proofroll.elements.mechanism.scene.joint import Joint
 from proofroll.elements.mechanism.scene.joint_kinds import TURNING, JointKind
@@ -52,20 +53,33 @@ def _joint(joint: Joint) -> Iterator[str]:
 
 
 def _body(body: Body, between: float) -> Iterator[str]:
-    if not body.mass > 0:
-        return
-    away = float(np.linalg.norm(body.com))
+    if body.mass > 0:
+        moments = np.linalg.eigvalsh(np.array(body.inertia))
+        yield from doubtful_body(body.mass, np.array(body.com), float(moments[-1]), between, least=0.1)
+
+
+def doubtful_body(mass: float, com: FloatArray, largest: float, between: float, least: float = 1.0) -> Iterator[str]:
+    """Sentences on a centre of mass and a moment of inertia that are probably in another unit.
+
+    Args:
+        mass: [kg].
+        com: centre of mass from the body's origin [m].
+        largest: moment of inertia [kg m²].
+        between: sum of the distances between joints [m].
+        least: smallest plausible radius of gyration, in parts of that of a ball of osmium.
+    """
+    away = float(np.linalg.norm(com))
     if away > LARGE or (between and away > max(FAR, TIMES * between)):
         yield f"its centre of mass lies {away:.4g} m from its origin; {_METRES}"
-    largest = float(np.linalg.eigvalsh(np.array(body.inertia))[-1])
-    if largest > 0:
-        gyration = math.sqrt(largest / body.mass)
-        smallest = math.sqrt(0.4) * (3 * body.mass / (4 * math.pi * DENSEST)) ** (1 / 3)
-        if gyration > LARGE:
-            yield f"its radius of gyration is {gyration:.4g} m; inertias are kg m²: 1 g mm² is 1e-9, 1 kg mm² is 1e-6"
-        elif gyration < 0.1 * smallest:
-            size = f"its radius of gyration of {1e3 * gyration:.3g} mm"
-            yield f"{size} is that of {body.mass:.4g} kg denser than osmium; inertias are kg m²"
+    if not largest > 0:
+        return
+    gyration = math.sqrt(largest / mass)
+    smallest = math.sqrt(0.4) * (3 * mass / (4 * math.pi * DENSEST)) ** (1 / 3)
+    if gyration > LARGE:
+        yield f"its radius of gyration is {gyration:.4g} m; inertias are kg m²: 1 g mm² is 1e-9, 1 kg mm² is 1e-6"
+    elif gyration < least * smallest:
+        size = f"its radius of gyration of {1e3 * gyration:.4g} mm"
+        yield f"{size} is that of {mass:.4g} kg denser than osmium; inertias are kg m²"
 
 
 def _volume(shape: Geometry) -> float:

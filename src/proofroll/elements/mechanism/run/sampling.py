@@ -146,6 +146,13 @@ def independent_anywhere(
     return max(row_rank(rows(start)[1]), row_rank(rows(near)[1]))
 
 
+def of_drives(mechanism: Mechanism, forces: Array) -> Array:
+    """Forces that impose motions, by joint [N, N m], from those of the prescribed ones; NaN for joints without."""
+    by_joint = np.full(len(mechanism.joints), np.nan)
+    by_joint[[mechanism.joint_index[joint.name] for joint, _, _ in mechanism.prescribed]] = forces
+    return by_joint
+
+
 def unsaid(mechanism: Mechanism) -> tuple[Array, Array]:
     """Unknown forces and moments of joints and loops: NaN, shape (joints + loops, 3) each."""
     count = len(mechanism.joints) + len(mechanism.loops)

@@ -12,7 +12,7 @@ import numpy as np
 from typing_extensions import override
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import WORLD, Mechanism, Tree
+from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contact.start import extent, touches
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
@@ -56,7 +56,7 @@ class Discs(Redundant):
     lacking: ClassVar[Mapping[str, str]] = LACKING
 
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:  # noqa: ARG002 -- softness alone needs settings
-        motion = Tree(mechanism).at(*mechanism.start())
+        motion = self._at_start
         size = extent(mechanism, motion) if mechanism.contacts else 0.0
         self._discs: list[_Made] = []
         for contact, state in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
@@ -70,8 +70,7 @@ class Discs(Redundant):
 
         With v of the centre of mass and a from there to the contact, d/dt (v + ω × a) = v̇ + ω̇ × a + ω × ȧ.
         """
-        mechanism, turning = self._mechanism, {}
-        motion = Tree(mechanism).at(*mechanism.start())
+        mechanism, motion, turning = self._mechanism, self._at_start, {}
         for made, state in zip(self._discs, touches(mechanism, motion), strict=True):
             k = mechanism.body_index[made.body]
             w = motion.w_WB[k]

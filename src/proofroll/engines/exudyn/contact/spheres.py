@@ -17,7 +17,7 @@ from typing_extensions import override
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import NotUnique, Refused
 from proofroll.core.events import Event
-from proofroll.elements.mechanism import WORLD, Mechanism, Tree
+from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contact.acting import OPEN
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.touching import Touching
@@ -220,8 +220,7 @@ class Spheres(Redundant):
         bodies = contact.body_a, contact.body_b
         self._resisting.append(friction)
         add_turning(self.system, friction, [self.marker(body, np.zeros(3)) for body in bodies], pressing, zone)
-        motion = Tree(self._mechanism).at(*self._mechanism.start())
-        w_a, w_b = (motion.w_WB[self._mechanism.body_index[body]] for body in bodies)
+        w_a, w_b = (self._at_start.w_WB[self._mechanism.body_index[body]] for body in bodies)
         turns = np.linalg.norm(friction.resisted(touch.normal, w_a - w_b)) >= zone
         return 0.0 if turns else float(np.linalg.norm(moment)) / radius
 
@@ -239,7 +238,7 @@ class Spheres(Redundant):
 
     def _seen_from(self, wall_body: str, body: str, sphere: SphereShape) -> Array:
         """Centre of a sphere at the start, in the frame of the wall's body [m]."""
-        index, motion = self._mechanism.body_index, Tree(self._mechanism).at(*self._mechanism.start())
+        index, motion = self._mechanism.body_index, self._at_start
         wall, ball = index[wall_body], index[body]
         centre = motion.p_WB[ball] + motion.R_WB[ball] @ sphere.centre
         return np.asarray(motion.R_WB[wall].T @ (centre - motion.p_WB[wall]))

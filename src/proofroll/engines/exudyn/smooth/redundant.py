@@ -82,9 +82,10 @@ class Redundant(ExudynModel):
         self.bodies: dict[str, Any] = {WORLD: self.system.CreateGround()}
         self._com = {WORLD: np.zeros(3)} | {body.name: np.array(body.com) for body in mechanism.bodies}
         self._turns = _turns(mechanism)
+        self._at_start = Tree(mechanism).at(*mechanism.start())
         self._add_bodies()
         self._connections = Connections(self.system, self.bodies, self._com, self._turns)
-        normals = _normals(mechanism)
+        normals = self._normals()
         self._joints = [
             self._connections.connect(between, joint, normals)
             for between, joint in zip_longest(mechanism.connections, mechanism.joints)  # loops follow the joints
@@ -114,7 +115,7 @@ class Redundant(ExudynModel):
         return self._connections.marker(body, position, np.eye(3))
 
     def _add_bodies(self) -> None:
-        system, motion = self.system, Tree(self._mechanism).at(*self._mechanism.start())
+        system, motion = self.system, self._at_start
         for number, body in enumerate(self._mechanism.bodies):
             turn, w = self._turns[body.name], motion.w_WB[number]
             R = motion.R_WB[number] @ turn.T
@@ -129,6 +130,13 @@ class Redundant(ExudynModel):
             self.bodies[body.name] = add_rigid_body(system, body.mass, [xx, yy, zz, yz, xz, xy], node)
             marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=self.bodies[body.name]))
             system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=self._mechanism.gravity))
+
+    def _normals(self) -> dict[str, Array]:
+        """Normal of the plane of motion in the frame of each body, by name; empty if there is none."""
+        normal = normal_of_plane(self._mechanism)
+        if normal is None:
+            return {}
+        return {name: self._at_start.R_WB[number].T @ normal for name, number in self._mechanism.body_index.items()}
 
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
         """Adds contacts; this formulation has none."""
@@ -214,15 +222,6 @@ class Redundant(ExudynModel):
             angular_acceleration=self._over_bodies(Output.AngularAcceleration),
             regularised=dict.fromkeys(("acceleration", "angular_acceleration"), _DIFFERENCED),
         )
-
-
-def _normals(mechanism: Mechanism) -> dict[str, Array]:
-    """Normal of the plane in which a mechanism moves, in the frame of each body, by name; empty if there is none."""
-    normal = normal_of_plane(mechanism)
-    if normal is None:
-        return {}
-    motion = Tree(mechanism).at(*mechanism.start())
-    return {name: motion.R_WB[number].T @ normal for name, number in mechanism.body_index.items()}
 
 
 def _turns(mechanism: Mechanism) -> dict[str, Array]:

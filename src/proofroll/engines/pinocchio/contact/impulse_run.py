@@ -69,7 +69,7 @@ class ImpulseRun(MechanismRun):
         """Data of the present state, q, v, accelerations, joint forces in the next step, and empty loop forces."""
         q, v, kick = self.steps.q, self.steps.v, self._kick()
         touching = self.steps.terms(q, v, self._dt).touching
-        self.tree.now = self.steps.t
+        self.tree.now, self.dynamics.on_motions = self.steps.t, kick.driving
         data = self._placed(kick.v)
         forces = self.tree.pulls(data)
         parts = zip(self.steps.contacts, touching, kick.impulse, kick.moment, strict=True)
@@ -96,11 +96,6 @@ class ImpulseRun(MechanismRun):
     def events(self) -> Sequence[Event] | None:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
         return self.steps.events.events()
-
-    @override
-    def _drives(self) -> Array:
-        self.dynamics.on_motions = self._kick().driving
-        return super()._drives()
 
     @override
     def built(self) -> MechanismBuilt:

@@ -10,7 +10,7 @@ from proofroll.core.integrators import INTEGRATORS
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.commands import drive
-from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, row_rank, unsaid
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, of_drives, row_rank, unsaid
 from proofroll.elements.mechanism.run.sentences import pose
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -131,15 +131,8 @@ class MechanismRun(MechanismMotion):
             joint_torque=torque,
             effort=self.tree.efforts(q, v) if self._mechanism.actuators else None,
             coupling=self.dynamics.on_couplings if self._mechanism.couplings else None,
-            drive=self._drives(),
+            drive=of_drives(self._mechanism, self.dynamics.on_motions),
         )
-
-    def _drives(self) -> Array:
-        """Forces that impose motions, by joint [N, N m]; NaN for joints without."""
-        forces = np.full(len(self._mechanism.joints), np.nan)
-        driven = [self._mechanism.joint_index[joint.name] for joint, _, _ in self._mechanism.prescribed]
-        forces[driven] = self.dynamics.on_motions
-        return forces
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""

@@ -24,6 +24,7 @@ from proofroll.elements.mechanism.run.sampling import (
     MechanismBuilt,
     MechanismSample,
     mechanism_of,
+    of_drives,
     row_rank,
     unsaid,
 )
@@ -191,17 +192,10 @@ class ProjectionMechanism:
             joint_torque=torque,
             effort=equations.efforts(solved.bodies) if self._mechanism.actuators else None,
             coupling=solved.multipliers[equations.loop_rows : equations.moved.start],
-            drive=self._drives(solved),
+            drive=of_drives(self._mechanism, solved.multipliers[equations.moved]),
             **(self._switched.along_joints(len(self._mechanism.joints)) if self._switched else {}),
             **(self._touching.sampled(len(self._mechanism.joints)) if self._touching else {}),
         )
-
-    def _drives(self, solved: SolvedState) -> Array:
-        """Forces that impose motions, by joint [N, N m]; NaN for joints without."""
-        forces = np.full(len(self._mechanism.joints), np.nan)
-        driven = [self._mechanism.joint_index[joint.name] for joint, _, _ in self._mechanism.prescribed]
-        forces[driven] = solved.multipliers[self._equations.moved]
-        return forces
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
+from proofroll.core.integrators import classical_step
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
@@ -39,7 +40,7 @@ class AirRobot:
         joints: all joints with one coordinate, in the mechanism's order.
     """
 
-    def __init__(self, mechanism: Mechanism, law: ControlLaw, rank: int | None = None) -> None:
+    def __init__(self, mechanism: Mechanism, law: ControlLaw) -> None:
         armature = dict(zip(law.joints, law.armature.tolist(), strict=True))
         self.mechanism = replace(
             mechanism,
@@ -50,7 +51,7 @@ class AirRobot:
             ),
             gravity=tuple(law.gravity * np.array(mechanism.gravity)),
         )
-        self.equations = JointCoordinates(self.mechanism, rank)
+        self.equations = JointCoordinates(self.mechanism)
         self.joints = tuple(joint.name for joint in mechanism.joints if joint.nq == 1)
         self.places = np.array([mechanism.place_of(name) for name in self.joints]).reshape(-1, 2)
         self.driven = np.array([mechanism.place_of(name) for name in law.joints])
@@ -208,9 +209,5 @@ def _rk4(
         solution = robot.equations.solve(q, v, load=robot.load(efforts))
         return np.concatenate([robot.equations.tree.rate(q, v), solution.acceleration])
 
-    y = np.concatenate(state)
-    k1 = rates(y)
-    k2 = rates(y + h / 2 * k1)
-    k3 = rates(y + h / 2 * k2)
-    y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(y + h * k3))
+    y = classical_step(rates, np.concatenate(state), h)
     return robot.equations.tree.normalised(y[:nq]), y[nq:]

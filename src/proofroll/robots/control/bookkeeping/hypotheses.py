@@ -15,8 +15,8 @@ from proofroll.elements.mechanism.diagnosis.residuals import COVERED
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, LAYERS
 from proofroll.robots.control.bookkeeping.search import (
+    MistakeExplanation,
     MistakeSearch,
-    MistakesFound,
     explained,
     explained_start,
 )
@@ -77,7 +77,7 @@ def _of_run(evidence: Evidence, law: ControlLaw) -> MistakeSearch | None:
     if not whole or float(np.ptp(np.diff(time))) > WHOLE * every:
         return None
     q, v = placed_of(mechanism, pair[0]).of_tree()
-    return explained(mechanism, law, SeenMotion(time, q, v).until(SHOWN), step, depth="a pair")
+    return explained(mechanism, law, SeenMotion(time, q, v).until(SHOWN), step)
 
 
 def _in_air(mechanism: Mechanism) -> bool:
@@ -87,18 +87,17 @@ def _in_air(mechanism: Mechanism) -> bool:
     return mechanism.control is not None and bool(mechanism.control.actuators) and not any((*others, moved))
 
 
-def _cause(item: MistakesFound, before: float, *, of_run: bool) -> Cause:
-    first_mistake = item.mistakes[0]
-    sized = [abs(size - 1) for mistake, size in zip(item.mistakes, item.sizes, strict=True) if mistake.sized]
+def _cause(item: MistakeExplanation, before: float, *, of_run: bool) -> Cause:
+    mistake = item.mistake
     return Cause(
-        id=_SAME.get(first_mistake.id, f"bookkeeping: {first_mistake.id}"),
+        id=_SAME.get(mistake.id, f"bookkeeping: {mistake.id}"),
         says=f"it moves as if {item.sentence}",
         quantity="motion" if of_run else "accelerations at time 0",
         unit="rad or m" if of_run else "1/s^2",
         before=before,
         after=item.after,
-        remedy=f"look at the {first_mistake.layer} ({LAYERS[first_mistake.layer]}) in the program around the engine",
+        remedy=f"look at the {mistake.layer} ({LAYERS[mistake.layer]}) in the program around the engine",
         fitted=item.fitted,
         covers=("motion", *COVERED, "effort"),
-        change=max(sized) if sized else np.inf,
+        change=abs(item.size - 1) if mistake.sized else np.inf,
     )

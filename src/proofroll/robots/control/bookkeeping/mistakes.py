@@ -64,7 +64,7 @@ class Mistake:
         starts: sizes from which a fit begins.
         numbers: count of further fitted numbers.
         none: size with which nothing is wrong.
-        trials: sizes that are tried where all are, before a fit; empty: the usual parts of the right one.
+        trials: sizes that a screen tries before a fit; empty: the usual parts of the right one.
         absent: clause that names it where its size is 0; empty: ``words`` do.
         later: True if a record may show it at the next layer, as where it lacks a part of an observation, or has an
             action before it is clipped.
@@ -92,13 +92,6 @@ class Mistake:
 def mistakes(law: ControlLaw) -> list[Mistake]:
     """All mistakes that change a law, in the order of layers."""
     return sorted(_mistakes(law), key=lambda item: list(LAYERS).index(item.layer))
-
-
-def changed(law: ControlLaw, chosen: Sequence[Mistake], sizes: Sequence[float]) -> ControlLaw:
-    """The law with some mistakes of these sizes."""
-    for item, size in zip(chosen, sizes, strict=True):
-        law = item.changed(law, size)
-    return law
 
 
 def _mistakes(law: ControlLaw) -> Iterator[Mistake]:

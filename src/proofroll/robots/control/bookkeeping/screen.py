@@ -1,12 +1,11 @@
-"""Screen of mistakes and of pairs of them, by what they do in each interval of a motion that was seen.
+"""Screen of mistakes by what they do in each interval of a motion that was seen.
 
 Each interval begins at the state that was seen, and has the masses and the forces of inertia of the motion that was
-seen. So errors do not add up, the state decides what a policy observes, and thousands of laws move at once.
+seen. So errors do not add up, the state decides what a policy observes, and hundreds of laws move at once.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -20,11 +19,11 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.bookkeeping.mistakes import Mistake, changed
+from proofroll.robots.control.bookkeeping.mistakes import Mistake
 
 _FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried, 1 being right
 _AT_ONCE = 500  # laws that move at once: some 100 MB
-_SLOPE, _ROUNDS, _REFINED = 1e-3, 3, 40  # part of a size for slopes, rounds of a fit, and choices that are fitted
+_SLOPE, _ROUNDS = 1e-3, 3  # part of a size for slopes, and rounds of a fit
 _ALONE = (-0.4, -0.2, -0.1, 0.1, 0.2, 0.4)  # values of a number that are tried [rad, m, or parts]
 _SWEEPS, _HELPS = 4, 0.7  # sweeps through these values, and the part that a sweep must leave at most
 # Treatments of gains: kd at the velocity before a step, or after it; or at four stages.
@@ -34,24 +33,19 @@ TREATMENTS: tuple[Treatment, ...] = ("explicit", "implicit", "rk4")
 
 @dataclass(frozen=True)
 class Screened:
-    """Choice of mistakes.
+    """Mistake as the screen sees it.
 
     Attributes:
-        mistakes: one or two.
-        sizes: of each.
+        mistake: the mistake.
+        size: its size that leaves least; 1 where it has none.
         treatment: of gains.
         left: mean square of the velocities that it leaves unexplained, weighted with masses.
     """
 
-    mistakes: tuple[Mistake, ...]
-    sizes: tuple[float, ...]
+    mistake: Mistake
+    size: float
     treatment: Treatment
     left: float
-
-    @property
-    def sized(self) -> list[int]:
-        """Indices of the mistakes whose sizes are fitted."""
-        return [k for k, item in enumerate(self.mistakes) if item.sized]
 
 
 class MistakeScreen:
@@ -213,53 +207,37 @@ class MistakeScreen:
             answer[:, k] = np.einsum("hij,hj->hi", self._inverse(M, free, kinds)[number.ravel()], load[:, k])
         return answer
 
-    def best(self, choices: Sequence[tuple[Mistake, ...]]) -> list[Screened]:
-        """Choices with their sizes in each treatment of gains, those that leave least first."""
-        trials = [(chosen, sizes) for chosen in choices for sizes in itertools.product(*map(self._sizes, chosen))]
-        laws = [changed(self.law, *trial) for trial in trials]
+    def best(self, candidates: Sequence[Mistake]) -> list[Screened]:
+        """Mistakes with their sizes in each treatment of gains, those that leave least first."""
+        trials = [(item, size) for item in candidates for size in (item.trials or _FACTORS if item.sized else (1.0,))]
+        laws = [item.changed(self.law, size) for item, size in trials]
         screened: list[Screened] = []
         for treatment in TREATMENTS:
-            left = np.square(self.left(laws, treatment)).mean(axis=1)
-            ranked: dict[tuple[str, ...], Screened] = {}
-            for number in np.argsort(left):
-                chosen, sizes = trials[number]
-                item = Screened(mistakes=chosen, sizes=sizes, treatment=treatment, left=float(left[number]))
-                ranked.setdefault(tuple(mistake.words for mistake in chosen), item)
-            several = [*ranked.values()]
-            screened += self._fitted(several[:_REFINED], treatment) + several[_REFINED:]
+            squares = np.square(self.left(laws, treatment)).mean(axis=1)
+            ranked: dict[str, Screened] = {}
+            for number in np.argsort(squares):
+                mistake, size = trials[number]
+                ranked.setdefault(mistake.words, Screened(mistake, size, treatment, float(squares[number])))
+            screened += self._fitted([*ranked.values()], treatment)
         return sorted(screened, key=lambda item: item.left)
 
-    def _sizes(self, item: Mistake) -> tuple[float, ...]:
-        return item.trials or _FACTORS if item.sized else (1.0,)
-
     def _fitted(self, items: list[Screened], treatment: Treatment) -> list[Screened]:
-        """Choices with sizes that fit best, by Gauss-Newton, all at once."""
-        for _ in range(_ROUNDS):
-            trials = []  # number of the choice, number of the changed size or -1, and sizes
-            for number, item in enumerate(items):
-                for k in [-1, *item.sized] if item.sized else []:
-                    sizes = [size + _change(size) * (place == k) for place, size in enumerate(item.sizes)]
-                    trials.append((number, k, sizes))
-            if not trials:
-                break
-            left = self.left([changed(self.law, items[trial[0]].mistakes, trial[2]) for trial in trials], treatment)
-            better = []
-            for number, item in enumerate(items):
-                rows = {trial[1]: row for trial, row in zip(trials, left, strict=True) if trial[0] == number}
-                sizes = [*item.sizes]
-                if rows:
-                    slopes = [(rows[k] - rows[-1]) / _change(item.sizes[k]) for k in item.sized]
-                    step = np.linalg.lstsq(np.stack(slopes, axis=1), -rows[-1], rcond=None)[0]
-                    for k, change in zip(item.sized, step.tolist(), strict=True):
-                        sizes[k] = max(0.0, sizes[k] + change)
-                better.append(sizes)
-            laws = [changed(self.law, item.mistakes, sizes) for item, sizes in zip(items, better, strict=True)]
-            squares = np.square(self.left(laws, treatment)).mean(axis=1).tolist()
-            items = [
-                replace(item, sizes=tuple(sizes), left=square) if square < item.left else item
-                for item, sizes, square in zip(items, better, squares, strict=True)
+        """Mistakes with sizes that fit best, by Gauss-Newton, all at once."""
+        fixed, sized = ([item for item in items if item.mistake.sized is kind] for kind in (False, True))
+        for _ in range(_ROUNDS if sized else 0):
+            sizes = np.array([item.size for item in sized])
+            changes = _SLOPE * np.maximum(sizes, _SLOPE)
+            left, moved = (self.left(_laws(self.law, sized, tried), treatment) for tried in (sizes, sizes + changes))
+            slopes = (moved - left) / changes[:, None]
+            squares = np.square(slopes).sum(axis=1)
+            steps = -np.divide((slopes * left).sum(axis=1), squares, out=np.zeros_like(squares), where=squares > 0)
+            better = np.maximum(0.0, sizes + steps)
+            unexplained = np.square(self.left(_laws(self.law, sized, better), treatment)).mean(axis=1).tolist()
+            sized = [
+                replace(item, size=size, left=square) if square < item.left else item
+                for item, size, square in zip(sized, better.tolist(), unexplained, strict=True)
             ]
-        return items
+        return fixed + sized
 
     def numbers(self, law: Callable[[Array], ControlLaw], count: int, treatment: Treatment) -> tuple[Array, float]:
         """Numbers of a law with which it leaves least, and what it leaves.
@@ -298,5 +276,6 @@ class MistakeScreen:
         return values, least
 
 
-def _change(size: float) -> float:
-    return _SLOPE * max(size, _SLOPE)
+def _laws(law: ControlLaw, screened: Sequence[Screened], sizes: Array) -> list[ControlLaw]:
+    """The law with each of some mistakes, of these sizes."""
+    return [item.mistake.changed(law, size) for item, size in zip(screened, sizes.tolist(), strict=True)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,7 +16,6 @@ from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, Join
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.robots.control.bookkeeping.air import SCHEMES, AirRobot, Scheme, steps_in_air
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.bookkeeping.mistakes import Mistake, changed
 
 SHOWN = 0.1  # s: a mistake of bookkeeping shows in the air within it
 WHOLE = 1e-6  # part of a step by which an interval may miss a whole number of steps
@@ -83,6 +82,10 @@ class LawMotions:
                 self.quaternions.append(slice(place.stop - 4, place.stop))
         self.schemes: list[Scheme] = [name for name in SCHEMES if self.quaternions or not name.endswith("_base")]
 
+    def schemes_of(self, treatment: str) -> list[Scheme]:
+        """Schemes that treat gains in one way."""
+        return [name for name in self.schemes if name.startswith(treatment)]
+
     def robot(self, law: ControlLaw) -> AirRobot:
         """Robot with the armature and the gravity of a law."""
         key = (law.armature.tobytes(), law.gravity)
@@ -112,6 +115,14 @@ class LawMotions:
             pass
         return differences
 
+    def left(self, law: ControlLaw, scheme: Scheme, count: int | None = None, bound: float = math.inf) -> Array:
+        """Differences at the first ``count`` samples, by default at all, one after another; NaN beyond the bound."""
+        count = count or len(self.seen.time)
+        differences = self.differences(law, scheme, count, bound)
+        if len(differences) < count or not np.abs(differences[-1]).max() <= bound:
+            return np.array(np.nan)
+        return np.concatenate(differences)
+
     def spread(self) -> float:
         """Distance between motions under the law by explicit and by implicit steps."""
         differences_a, differences_b = (
@@ -132,34 +143,14 @@ class LawMotions:
 
     def distance(self, law: ControlLaw, scheme: Scheme, bound: float = math.inf) -> float:
         """Largest difference at all samples; infinite if it exceeds the bound."""
-        count = len(self.seen.time)
-        differences = self.differences(law, scheme, count, bound)
-        if len(differences) < count:
-            return math.inf
-        largest = max(float(np.abs(item).max()) for item in differences)
-        return largest if largest <= bound else math.inf
-
-    def fitted(
-        self, chosen: Sequence[Mistake], sizes: Sequence[float], scheme: Scheme, count: int, rounds: int = 8
-    ) -> tuple[float, ...]:
-        """Sizes of mistakes with which the first samples fit best."""
-        sized, fitted_sizes = [k for k, item in enumerate(chosen) if item.sized], np.array(sizes, dtype=float)
-
-        def law(values: Array) -> ControlLaw:
-            trial = fitted_sizes.copy()
-            trial[sized] = np.maximum(values, 0.0)
-            return changed(self.law, chosen, trial.tolist())
-
-        if sized:
-            fitted_sizes[sized] = np.maximum(self.fit(law, fitted_sizes[sized], scheme, count, rounds), 0.0)
-        return tuple(fitted_sizes.tolist())
+        largest = float(np.abs(self.left(law, scheme, bound=bound)).max())
+        return largest if math.isfinite(largest) else math.inf
 
     def fit(self, law: Callable[[Array], ControlLaw], start: Array, scheme: Scheme, count: int, rounds: int) -> Array:
         """Numbers of a law with which the first samples fit best."""
         scale = np.maximum(np.abs(start), _SMALL)
 
         def left(parts: Array) -> Array:
-            differences = self.differences(law(scale * parts), scheme, count)
-            return np.concatenate(differences) if len(differences) == count else np.array(np.nan)
+            return self.left(law(scale * parts), scheme, count)
 
         return np.asarray(scale * least_squares_parameters(left, start / scale, 1.0, rounds))

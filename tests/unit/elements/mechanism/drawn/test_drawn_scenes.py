@@ -12,13 +12,39 @@ import pytest
 
 from proofroll.core.drawing import Choices, drawn_scene
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.drawn.families import FAMILIES, NOT_DRAWN, WITHOUT_FEATURE
+from proofroll.elements.mechanism.drawn.families import FAMILIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.fuzz.evaluation import write_scene
 from proofroll.vocabulary.document import CHAPTERS
 
 SEEDS = range(10)
+# Capability that no family has as a feature -> how it is drawn, or why not.
+WITHOUT_FEATURE: Mapping[str, str] = {
+    MechanismCapability.CONTACT: "every scene of contact has it",
+    MechanismCapability.MASSLESS: "not drawn: every drawn body has mass and moments",
+    MechanismCapability.REDUNDANT: "planar loops have it; an analysis of the scene finds it, not its keys",
+    MechanismCapability.ORIENTATION: "asked for; no part of a scene",
+    MechanismCapability.COUPLINGS_OF_MANY: "not drawn: its rows are those of a coupling of two",
+}
+# Keys of the vocabulary that are not drawn, as table.key -> reason.
+NOT_DRAWN: Mapping[str, str] = {
+    "bushings.position_b": "position_a places a bushing",
+    "bushings.orientation_b": "orientation_a turns a bushing",
+    "couplings.joints": "see couplings of three or more joints",
+    "couplings.coefficients": "see couplings of three or more joints",
+    "couplings.offset": "coupled joints start at zero",
+    "forces.reaction": "an opposite force of equal size adds no term",
+    "geometries.orientation": "bodies are turned, not their shapes in them",
+    "geometries.slope": "cones are not drawn",
+    "geometries.ring_radius": "tori are not drawn",
+    "loops.at_most": "cables are not drawn",
+    "loops.restitution": "cables are not drawn",
+    "pairs.static_friction": "friction as a table says it",
+    "points.name": "points are only reported",
+    "points.body": "points are only reported",
+    "points.position": "points are only reported",
+}
 
 
 def read(folder: Path, tables: Mapping[str, Any]) -> Scene:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN
-from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.on_wall import OnWall, energy, wall_velocity
 from proofroll.elements.mechanism.run.contacts.stretches import (
     DEGREE,
@@ -19,13 +18,9 @@ from proofroll.elements.mechanism.run.contacts.stretches import (
     carried,
     stretches,
 )
-from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from proofroll.elements.mechanism.scene.model import Mechanism
-    from proofroll.elements.mechanism.scene.parts import Body
 
 # Number of steps that integrate the turning from one sample to the next.
 _SUBSTEPS = 16
@@ -181,55 +176,3 @@ def _apart(q_WB: FloatArray, times: tuple[FloatArray, FloatArray], spin: tuple[F
 
     start, end = (Rotation.from_quat(quaternions, scalar_first=True) for quaternions in q_WB)
     return np.asarray((end * carried(start, *spin, _SUBSTEPS, times).inv()).magnitude())
-
-
-def contact_audits(mechanism: Mechanism, dataset: xr.Dataset) -> dict[str, FloatArray]:
-    """Audits of a run of a mechanism with contacts, as far as its samples allow; zero for a perfect run.
-
-    ``force_audit`` [N]: sum of the reported contact forces on a body minus the force that its motion needs, of bodies
-    that nothing but contacts and gravity move. ``rate_audit`` [m/s]: velocities minus the rates of the positions, of
-    all bodies. Both are largest components in stretches between events, without the ends of these.
-    """
-    forces, rates = list[FloatArray](), list[FloatArray]()
-    complete = all(np.isfinite(dataset[name].to_numpy()).all() for name in ("p_WB", "v_WB", "w_WB"))
-    if "contact_forces" not in dataset or not complete:
-        return {}
-    alone = _moved_by_contacts(mechanism)
-    for part in stretches(dataset):
-        placed = Placed(mechanism, *(part[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB")))
-        rates.append(_longest(placed.v_WB - _derivative(placed.time, placed.p_WB)))
-        pressed = part["contact_forces"].to_numpy()
-        if alone and not np.isnan(pressed[ENDS:-ENDS]).any():
-            forces.append(_longest(_unexplained(placed, pressed, alone)))
-    audits = {"force_audit": _joined(forces), "rate_audit": _joined(rates)}
-    return {name: values for name, values in audits.items() if values.size}
-
-
-def _moved_by_contacts(mechanism: Mechanism) -> list[Body]:
-    """Bodies that nothing but contacts and gravity move."""
-    held = {name for joint in mechanism.joints if joint.kind != JointKind.FREE for name in (joint.parent, joint.child)}
-    held |= {name for link in (*mechanism.loops, *mechanism.links) for name in (link.body_a, link.body_b)}
-    held |= {name for force in mechanism.forces for name in (force.body, force.reaction)}
-    touching = {name for contact in mechanism.contacts for name in (contact.body_a, contact.body_b)}
-    return [body for body in mechanism.bodies if body.name in touching - held]
-
-
-def _unexplained(placed: Placed, pressed: FloatArray, bodies: Sequence[Body]) -> FloatArray:
-    """Reported contact forces minus those that the motion of bodies needs [N], shape (time, bodies, 3)."""
-    mechanism, left = placed.mechanism, list[FloatArray]()
-    for body in bodies:
-        needed = _derivative(placed.time, placed.velocity(body.name, body.com)) - np.array(mechanism.gravity)
-        signs = [(contact.body_a == body.name) - (contact.body_b == body.name) for contact in mechanism.contacts]
-        left.append(np.einsum("k,tki->ti", signs, pressed) - body.mass * needed)
-    return np.stack(left, axis=1)
-
-
-def _derivative(t: FloatArray, values: FloatArray) -> FloatArray:
-    from scipy.interpolate import make_interp_spline
-
-    return np.asarray(make_interp_spline(t, values, k=DEGREE).derivative()(t))
-
-
-def _longest(vectors: FloatArray) -> FloatArray:
-    """Longest vector at each sample without the ends, shape (time - 2 ENDS,)."""
-    return np.asarray(np.linalg.norm(vectors, axis=-1).max(axis=1)[ENDS:-ENDS])

@@ -286,11 +286,11 @@ class Pair:
         """Coefficient of a contact that sticks."""
         return self.friction if self.static_friction is None else self.static_friction
 
-    def with_friction(self, friction: float, static: float | None = None) -> Pair:
-        """The pair with other coefficients; without ``static``, its static one changes by the same factor."""
+    def with_friction(self, friction: float) -> Pair:
+        """The pair with another coefficient; its static one changes by the same factor."""
         if self.static_friction is None or not friction:
             return replace(self, friction=friction, static_friction=None)
-        return replace(self, friction=friction, static_friction=static or self.static * friction / self.friction)
+        return replace(self, friction=friction, static_friction=self.static * friction / self.friction)
 
 
 @dataclass(frozen=True)
