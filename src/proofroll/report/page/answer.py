@@ -12,7 +12,7 @@ from functools import cached_property
 
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
-from proofroll.report.page.choice_cell import CANNOT, NO_RUN, ChoiceCell, cell_of, speeds
+from proofroll.report.page.choice_cell import CANNOT, NO_RUN, TIE, ChoiceCell, cell_of, speeds
 from proofroll.report.page.choice_matrix import ChoiceColumn, ChoiceMatrix, ChoiceRow
 
 # Lengths per metre of path, in words, by negative power of ten of the tolerance.
@@ -90,16 +90,16 @@ class ColumnAnswer:
 
     @property
     def exceptions(self) -> list[str]:
-        """For each scene that the engine to take does not hold: which one does, or what comes closest."""
+        """For each scene that the engine to take does not hold, or where another is cheaper: which, or the closest."""
         taken = self.taken
-        if taken is None or taken.held == len(taken.each):
+        if taken is None or not taken.by_scene:
             return []
         alone = [item for item in self.matrix.columns if not item.whole and item.group == self.column.group]
         texts = []
         for column, cell in zip(alone, taken.each, strict=True):
-            if cell.holds:
-                continue
             there = replace(self, column=column)
+            if cell.holds and there.taken is not None and cell.cost <= TIE * there.taken.cost:
+                continue
             if there.taken is not None:
                 texts.append(f"{column.title}: {take_words(self.matrix, there.taken)}, {there.taken.text}")
             else:

@@ -68,6 +68,9 @@ def test_scenes_that_the_engine_to_take_does_not_hold_name_their_own() -> None:
     item = answer(choice_matrix([LINE, wrong, other], STUDIES), 1e-3, False)
     assert item.kinds[0].exceptions == ["chain: beta joints, ≥ 2×"]
     assert item.kinds[0].next_words == "beta joints"
+    dear = replace(LINE, study="chain", scene="chain", cost=5.0)
+    item = answer(choice_matrix([LINE, dear, other], STUDIES), 1e-3, False)
+    assert item.kinds[0].exceptions == ["chain: beta joints, ≥ 2×"], "a tenth of the cost"
 
 
 def test_forces_are_told_where_they_change_the_choice() -> None:
