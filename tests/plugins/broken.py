@@ -18,9 +18,9 @@ from placed_balls import gravity_of, placed, scene_with
 from proofroll.core.arrays import FloatArray
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.projection import Projection
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 
 
 def _ball(**factors: float) -> Callable[[Scene], Scene]:

@@ -16,9 +16,9 @@ from placed_balls import of_ball, placed, run_of, scene_with
 
 from proofroll.core.certificate import certify, first_difference
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.mechanism.run.contacts.audits import energy_balance
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.running.simulation import build, simulate
 
 Changes = Mapping[str, float]

@@ -124,7 +124,7 @@ def test_imports_lead_one_way(folder: str) -> None:
 @pytest.mark.parametrize(
     ("place", "text", "line"),
     [
-        ("studies/a.py", "def f():\n    from proofroll.elements.ball_on_surface import model\n", 2),
+        ("studies/a.py", "def f():\n    from proofroll.elements.mechanism import model\n", 2),
         ("core/a.py", "if TYPE_CHECKING:\n    import proofroll.engines.mujoco as m\n", 2),
         ("core/a.py", "from proofroll import elements\n", 1),
         ("core/a.py", "from ..truth import onset\n", 1),
@@ -132,7 +132,7 @@ def test_imports_lead_one_way(folder: str) -> None:
         ("running/a.py", "import proofroll.testing\n", 1),
         ("report/a.py", 'x = 1\nimport_module("proofroll.elements.mechanism.run.kind")\n', 2),
         ("running/a.py", 'import_module(f"proofroll.engines.{name}")\n', 1),
-        ("cli/a.py", 'TEXT = "import x\\nfrom proofroll.truth.ball_on_surface.onset import onset"\n', 1),
+        ("cli/a.py", 'TEXT = "import x\\nfrom proofroll.papers.blajer_2006.truth.onset import onset"\n', 1),
         ("cli/templates/a.txt", "\nfrom proofroll.elements.mechanism import model\n", 2),
         ("studies/a.py", "import proofroll_drill.row\n", 1),
         ("engines/a.py", 'import_module("proofroll_drill.row")\n', 1),

@@ -141,8 +141,8 @@ class MechanismTruth:
         Raises:
             InputError: ``parameter`` is not ``mu_static``, or the element is no ball in an upright cylinder.
         """
-        from proofroll.elements.ball_on_surface.as_body import ball_of
-        from proofroll.truth.ball_on_surface.onset import edge_between
+        from proofroll.papers.blajer_2006.ball.as_body import ball_of
+        from proofroll.papers.blajer_2006.truth.onset import edge_between
 
         ball = ball_of(element)
         if parameter != "mu_static" or ball is None:
@@ -153,8 +153,8 @@ class MechanismTruth:
 
 def _with_onset(element: MechanismElement, dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with the conditioning of the first slip of a ball in an upright cylinder."""
-    from proofroll.elements.ball_on_surface.as_body import ball_of
-    from proofroll.truth.ball_on_surface.onset import onset
+    from proofroll.papers.blajer_2006.ball.as_body import ball_of
+    from proofroll.papers.blajer_2006.truth.onset import onset
 
     ball = ball_of(element)
     if ball is None or np.isinf(ball.contact.mu_static):

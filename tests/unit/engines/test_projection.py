@@ -10,9 +10,9 @@ from true_runs import true_run
 import proofroll
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.plugins import resolve_settings
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.engines.projection import Projection
-from proofroll.engines.projection.ball.orientation import EulerAngles
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.projection.orientation import EulerAngles
 from proofroll.running.simulation import build, simulate
 
 CYLINDER = {"name": "sphere_in_cylinder"}

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import proofroll
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
-from proofroll.elements.ball_on_surface.surfaces import Cylinder
-from proofroll.engines.projection.ball.geometry import GeneralSurface, Uniform, matrix
-from proofroll.engines.projection.ball.method import ProjectedBall
-from proofroll.engines.projection.ball.orientation import EulerAngles, RotatingFrame
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
+from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates
+from proofroll.papers.blajer_2006.projection.geometry import GeneralSurface, Uniform, matrix
+from proofroll.papers.blajer_2006.projection.method import ProjectedBall
+from proofroll.papers.blajer_2006.projection.orientation import EulerAngles, RotatingFrame
 
 BODY = rolling_ball(proofroll.load_scene("sphere_in_cylinder", rolling_resistance=5e-4))
 A, C, M, J = BODY.ball.radius, BODY.surface.radius, BODY.ball.mass, BODY.ball.inertia
@@ -162,7 +162,7 @@ class Torus:
 
 
 @pytest.mark.parametrize("u", [(0.3, 0.4), (-2.0, 2.5)])
-@pytest.mark.parametrize("surface", [Torus(), Cylinder("wall", 0.2, 0.3)])
+@pytest.mark.parametrize("surface", [Torus(), UprightCylinder("wall", 0.2, 0.3)])
 def test_turning_of_the_frame_follows_from_its_definition(surface, u):
     """Fᵀ ∂F/∂u, which is derived from tangents and second derivatives, is what differences of the frame give."""
     u = np.asarray(u)
@@ -176,7 +176,7 @@ def test_turning_of_the_frame_follows_from_its_definition(surface, u):
 
 @SEEDS
 @pytest.mark.parametrize("orientation", [EulerAngles, RotatingFrame])
-@pytest.mark.parametrize("surface", [Cylinder("wall", 0.2), Cylinder("wall", 0.2, 0.3)])
+@pytest.mark.parametrize("surface", [UprightCylinder("wall", 0.2), UprightCylinder("wall", 0.2, 0.3)])
 def test_any_axis_any_orientation(surface, orientation, seed):
     """Wherever the axis points both formulations give what the reduced equations give."""
     rng = np.random.default_rng(seed)
@@ -195,7 +195,7 @@ def test_any_axis_any_orientation(surface, orientation, seed):
 
 
 @pytest.mark.parametrize("u", [(0.0, 0.0), (40.0, -3.0)])
-@pytest.mark.parametrize("surface", [Cylinder("wall", 0.2), Cylinder("wall", 0.2, 0.3)])
+@pytest.mark.parametrize("surface", [UprightCylinder("wall", 0.2), UprightCylinder("wall", 0.2, 0.3)])
 def test_uniform_geometry_is_the_general_one(surface, u):
     """On a cylinder the precomputed geometry equals the one evaluated on the spot."""
     found, expected = Uniform(surface).at(u), GeneralSurface(surface).at(u)

@@ -10,9 +10,9 @@ import pytest
 from source_code import nodes
 
 import proofroll.engines
-from proofroll.elements.ball_on_surface.surfaces import surface_kinds
-from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
+from proofroll.elements.balls.surfaces import surface_kinds
 from proofroll.files.scene_file import scene_names
+from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
 
 ENGINES = Path(proofroll.engines.__path__[0])
 
@@ -44,7 +44,7 @@ def test_no_adapter_knows_a_scene_or_a_surface(engine: str) -> None:
     # One word alone may mean anything else, as MuJoCo's cone of friction; compared with something it does not.
     scene = re.compile(rf"\b({'|'.join(name for name in scene_names() if '_' in name)})\b")
     for path in sorted((ENGINES / engine).rglob("*.py")):
-        own = {Cylinder.__name__} if "ball" in path.parts else set()
+        own = {UprightCylinder.__name__} if "ball" in path.parts else set()
         for node in without_docstrings(nodes(path)):
             where = f"{path.name}:{getattr(node, 'lineno', 0)}"
             if isinstance(node, (ast.Name, ast.Attribute, ast.alias)):

@@ -12,11 +12,8 @@ from typing import Any, ClassVar
 from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.exudyn.ball import formulations as ball
 from proofroll.engines.exudyn.contact import discs, spheres
 from proofroll.engines.exudyn.contact.discs import Discs
 from proofroll.engines.exudyn.contact.spheres import Spheres
@@ -26,6 +23,9 @@ from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
 from proofroll.engines.exudyn.smooth import redundant, tree
 from proofroll.engines.exudyn.smooth.redundant import Redundant
 from proofroll.engines.exudyn.smooth.tree import KinematicTree
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.papers.blajer_2006.ball.model import NO_OTHER_BODIES
+from proofroll.papers.blajer_2006.exudyn import formulations as ball
 
 OF_MECHANISMS: Mapping[str, type[Redundant | KinematicTree]] = {
     "redundant": Redundant,

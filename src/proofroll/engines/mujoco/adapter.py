@@ -10,17 +10,17 @@ from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body
-from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.mujoco.ball import run as ball
 from proofroll.engines.mujoco.contact import mechanism_geoms
 from proofroll.engines.mujoco.contact.mechanism_geoms import MujocoGeoms
 from proofroll.engines.mujoco.running import written
 from proofroll.engines.mujoco.settings import PRESETS, TERMS, MujocoSettings, lowered
 from proofroll.engines.mujoco.smooth import mechanism
 from proofroll.engines.mujoco.smooth.mechanism import MujocoMechanism
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body
+from proofroll.papers.blajer_2006.ball.model import NO_OTHER_BODIES
+from proofroll.papers.blajer_2006.mujoco import run as ball
 
 _MECHANISMS: Mapping[str, type[MujocoMechanism]] = {"joints": MujocoMechanism, "geoms": MujocoGeoms}
 

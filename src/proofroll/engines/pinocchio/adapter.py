@@ -9,16 +9,16 @@ from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody
-from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.pinocchio.ball import formulations as ball
 from proofroll.engines.pinocchio.contact import impulses
 from proofroll.engines.pinocchio.contact.impulse_run import ImpulseRun
 from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings, lowered
 from proofroll.engines.pinocchio.smooth import constraint_dynamics, joint_tree
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody
+from proofroll.papers.blajer_2006.ball.model import NO_OTHER_BODIES
+from proofroll.papers.blajer_2006.pinocchio import formulations as ball
 
 # Before 4.0 the constraints had other signatures and other results.
 _OF_PINOCCHIO_4 = {"constraint_dynamics", "impulses"}

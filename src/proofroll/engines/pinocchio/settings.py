@@ -109,9 +109,8 @@ class PinocchioSettings:
     def order(self) -> int | None:
         """See :class:`proofroll.core.engine.Settings`.
 
-        rk4 is of order 4 only if configurations form a vector space, that is without the orientation: see
-        :mod:`proofroll.engines.pinocchio.ball.integrators`. Where the scene decides, :func:`lowered` gives the order
-        with it.
+        rk4 is of order 4 only if configurations form a vector space, that is without the orientation. Where the scene
+        decides, :func:`lowered` gives the order with it.
         """
         if self.formulation in OF_MECHANISMS and self.formulation != "impulses":
             return 4 if self.integrator == "rk4" else None

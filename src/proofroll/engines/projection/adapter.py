@@ -7,13 +7,13 @@ import proofroll
 from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.heyoka_library import with_heyoka
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody
-from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
-from proofroll.engines.projection.ball import run as ball
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.smooth import mechanism
 from proofroll.engines.projection.smooth.mechanism import ProjectionMechanism
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody
+from proofroll.papers.blajer_2006.ball.model import NO_OTHER_BODIES
+from proofroll.papers.blajer_2006.projection import run as ball
 
 
 class Projection:

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body
-from proofroll.elements.ball_on_surface.sampling import BallBuilt
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.settings import ProjectionSettings
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt
 
 STEP = 2e-3
 
