@@ -13,7 +13,7 @@ from proofroll import load_scene
 from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.gravity import Gravity
-from proofroll.core.plugins import resolve_settings
+from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.running.simulation import build, simulate
 
@@ -114,7 +114,7 @@ def test_step_that_does_not_divide_the_interval() -> None:
 
 def test_another_integrator_over_a_preset() -> None:
     """The damping of a preset goes with its integrator, and comes with the engine's own value with the other one."""
-    from proofroll.engines.exudyn import Exudyn
+    Exudyn = load_engine("exudyn")
 
     tuned = {"formulation": "carrier", "preset": "tuned"}
     undamped = resolve_settings(Exudyn, {**tuned, "integrator": "trapezoidal_index2"})
@@ -127,7 +127,7 @@ def test_another_integrator_over_a_preset() -> None:
 
 def test_summary_is_one_sentence() -> None:
     """What is shown of the engine is a sentence about it."""
-    from proofroll.engines.exudyn import Exudyn
+    Exudyn = load_engine("exudyn")
 
     assert (Exudyn.__doc__ or "").startswith("Exudyn")
     assert "\n" not in (Exudyn.__doc__ or "\n")

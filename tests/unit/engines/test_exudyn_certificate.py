@@ -11,9 +11,8 @@ from proofroll.running.simulation import build
 
 pytest.importorskip("exudyn")
 
-from proofroll.engines.exudyn.settings import PRESETS
 from proofroll.papers.blajer_2006.exudyn import ball as ball_module
-from proofroll.papers.blajer_2006.exudyn.formulations import RUNS
+from proofroll.papers.blajer_2006.exudyn.formulations import PRESETS, RUNS
 
 MODELS = [(formulation, preset) for formulation in RUNS for preset in PRESETS[formulation]]
 # Nothing is zero or symmetric.

@@ -9,11 +9,12 @@ from true_runs import true_run
 
 import proofroll
 from proofroll.core.errors import Diverged, InputError
-from proofroll.core.plugins import resolve_settings
-from proofroll.engines.projection import Projection
+from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.projection.orientation import EulerAngles
 from proofroll.running.simulation import build, simulate
+
+Projection = load_engine("projection")
 
 CYLINDER = {"name": "sphere_in_cylinder"}
 EXACT = ["projection[formulation=euler]", "projection[formulation=rotating_frame]"]

@@ -14,11 +14,12 @@ from true_runs import true_run
 from proofroll.core import heyoka_library as library
 from proofroll.core.errors import Missing
 from proofroll.core.gravity import Gravity
-from proofroll.core.plugins import resolve_settings
+from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.engines.projection import Projection
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
+
+Projection = load_engine("projection")
 
 needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from proofroll.core.engine import Regularised
-from proofroll.engines.mujoco.settings import MujocoSettings
 from proofroll.papers.blajer_2006.ball.mechanics import natural_acceleration, newton_euler
 from proofroll.papers.blajer_2006.ball.model import RollingBall
+from proofroll.papers.blajer_2006.mujoco.settings import ChartSettings
 
 _FORCES = ("acceleration", "N", "F2", "F3")
 _MORE = "friction against turning or rolling, which the scene does not ask for, turns the ball otherwise"
@@ -18,7 +18,7 @@ _SOLVER = 1e-8
 _ROUND_OFF = 1e-12
 
 
-def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regularised]:
+def softness(body: RollingBall, settings: ChartSettings) -> Mapping[str, Regularised]:
     """Certificate quantity -> its tolerance with the reason."""
     a = body.ball.radius
     bend = abs(float(body.v0 @ body.surface.normal_gradient(body.p0) @ body.v0))
@@ -57,7 +57,7 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     }
 
 
-def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str) -> dict[str, Regularised]:
+def _dynamics(body: RollingBall, settings: ChartSettings, soft: float, why: str) -> dict[str, Regularised]:
     """Tolerances of accelerations and forces; ``soft`` is that of the centre, relative to the natural acceleration.
 
     An error F of friction changes the acceleration by F/m, and a times the angular acceleration by a² F/J: m a²/J times
@@ -75,7 +75,7 @@ def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str
     return dict.fromkeys(_FORCES, Regularised(soft, why)) | {"angular acceleration": Regularised(turning, why)}
 
 
-def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str, Regularised]]:
+def _computed(body: RollingBall, settings: ChartSettings) -> Iterator[tuple[str, Regularised]]:
     """Tolerances of the coefficient that stands for unbounded friction, of rolling resistance and of the velocity."""
     stands = f"MuJoCo has no unbounded friction: a coefficient of {settings.friction:g} stands for it"
     for name in ("1 / static friction", "1 / kinetic friction"):
@@ -84,7 +84,7 @@ def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str
         yield "rolling resistance", Regularised(_SOLVER, "its torque uses the normal force of the evaluation before")
 
 
-def _law_of_friction(body: RollingBall, settings: MujocoSettings, N: float) -> float:
+def _law_of_friction(body: RollingBall, settings: ChartSettings, N: float) -> float:
     """Bound of the error of the acceleration at time 0 from MuJoCo's law of friction [m/s²]; 0 if the ball sticks.
 
     ``N`` is the normal force of a contact at depth zero, which has not its full load yet [N].

@@ -12,9 +12,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.engines.mujoco.settings import MujocoSettings
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.mujoco.contact import MEMORY
+from proofroll.papers.blajer_2006.mujoco.settings import ChartSettings
 
 # How much of the wall's tangent plane is drawn, in radii of the ball; for MuJoCo it has no end.
 _SEEN = 4.0
@@ -64,7 +64,7 @@ def read_spec(scene: Scene, body: RollingBall) -> Any:
         raise Refused(f"MuJoCo cannot read {path.name}: {' '.join(str(error).split())}") from None
 
 
-def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> None:
+def write_physics(spec: Any, body: RollingBall, settings: ChartSettings) -> None:
     """Sets the numbers of ball, gravity, contact and solver."""
     ball = spec.body("ball")
     ball.explicitinertial = True

@@ -1,31 +1,30 @@
-"""Run of a ball on a surface in MuJoCo."""
+"""Formulation ``chart``: run of a ball that rolls in a cylinder in MuJoCo."""
 
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any
 
 import mujoco
 import numpy as np
 
+from proofroll.core.engine_abilities import Level
+from proofroll.core.formulations import Formulation
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
-from proofroll.engines.mujoco.settings import ROLLS, MujocoSettings, check
-from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.engines.mujoco.settings import check
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
 from proofroll.papers.blajer_2006.ball.mechanics import natural_acceleration
-from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL, RollingBall
+from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL, NO_OTHER_BODIES, RollingBall
 from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
 from proofroll.papers.blajer_2006.mujoco.certificate_bounds import softness
 from proofroll.papers.blajer_2006.mujoco.chart import Chart
 from proofroll.papers.blajer_2006.mujoco.contact import contact_coefficient, contact_force
 from proofroll.papers.blajer_2006.mujoco.model import read_spec, write_physics
+from proofroll.papers.blajer_2006.mujoco.settings import PRESETS, ROLLS, TERMS, ChartSettings
 from proofroll.papers.blajer_2006.mujoco.start import EVALUATIONS, accelerations, start
 
 # Part of the natural force above which a normal force is more than round-off.
 _PRESSED = 1e-6
-PROVIDES: Mapping[str, frozenset[str]] = {"chart": ALL_OF_A_BALL}
-INHERENT: Mapping[str, Mapping[str, str]] = {
-    "chart": {MechanismCapability.ORIENTATION: "the ball's joint has it in qpos"}
-}
 
 
 class MujocoBall(SteppedModel):
@@ -34,7 +33,15 @@ class MujocoBall(SteppedModel):
     The ball's orientation is in every model, asked for or not: the ball's joint has it in its state.
     """
 
-    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
+    _settings: ChartSettings
+
+    def __init__(self, scene: Scene, settings: ChartSettings) -> None:
+        """Ball of the scene at time 0. Raises InputError or Refused for settings that it cannot have."""
+        body = rolling_ball(scene)
+        check(settings)
+        forget_callbacks()
+        self._scene = scene
+        model = compiled(_spec(scene, body, settings))
         super().__init__(model, settings)
         self._body = body
         self._formulation = Chart(model, body)
@@ -44,21 +51,12 @@ class MujocoBall(SteppedModel):
         with silent():
             start(model, self._data, body, settings, self._formulation)
 
-    @classmethod
-    def of(cls, scene: Scene, settings: MujocoSettings) -> Self:
-        """Run of the scene's ball. Raises InputError or Refused for settings that it cannot have."""
-        body = rolling_ball(scene)
-        check(settings)
-        forget_callbacks()
-        return cls(compiled(_spec(scene, body, settings)), body, settings)
-
-    @classmethod
-    def startable(cls, scene: Scene, settings: MujocoSettings) -> Any:
-        """MjSpec of a scene, whose keyframe ``start`` is time 0."""
-        engine, spec = cls.of(scene, settings), _spec(scene, rolling_ball(scene), settings)
+    def spec(self) -> Any:
+        """MjSpec of the scene, whose keyframe ``start`` is the present state."""
+        spec = _spec(self._scene, self._body, self._settings)
         for key in list(spec.keys):
             spec.delete(key)
-        spec.add_key(name="start", qpos=engine._data.qpos, qvel=engine._data.qvel)
+        spec.add_key(name="start", qpos=self._data.qpos, qvel=self._data.qvel)
         compiled(spec)
         return spec
 
@@ -122,9 +120,26 @@ class MujocoBall(SteppedModel):
         return self._formulation.resistance.lever()
 
 
-def _spec(scene: Scene, body: RollingBall, settings: MujocoSettings) -> Any:
+def _spec(scene: Scene, body: RollingBall, settings: ChartSettings) -> Any:
     """The model with all its numbers, before it is compiled."""
     spec = read_spec(scene, body)
     write_physics(spec, body, settings)
     Chart.write(spec, body)
     return spec
+
+
+def _run(scene: Scene, settings: ChartSettings) -> RunOnBody:
+    return on_body(MujocoBall(scene, settings), scene)
+
+
+FORMULATIONS: Mapping[str, Formulation] = {
+    "chart": Formulation(
+        presets=PRESETS,
+        provides=ALL_OF_A_BALL,
+        level=Level.CONTACT,
+        build=_run,
+        lacking=NO_OTHER_BODIES,
+        inherent={MechanismCapability.ORIENTATION: "the ball's joint has it in qpos"},
+        terms=TERMS,
+    )
+}

@@ -9,9 +9,9 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.engines.mujoco.settings import MujocoSettings
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.mujoco.chart import Chart
+from proofroll.papers.blajer_2006.mujoco.settings import ChartSettings
 
 # Evaluations until the resistance's torque, which uses the normal force of the evaluation before, has converged.
 EVALUATIONS = 3
@@ -46,7 +46,7 @@ def put_ball(model: Any, data: Any, body: RollingBall, depth: float) -> None:
     data.qvel[:] = np.linalg.solve(jacobian, np.concatenate([body.v0, w]))
 
 
-def start(model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Chart) -> None:
+def start(model: Any, data: Any, body: RollingBall, settings: ChartSettings, formulation: Chart) -> None:
     """Writes the state at time 0 into ``data`` and computes its forces.
 
     Raises:

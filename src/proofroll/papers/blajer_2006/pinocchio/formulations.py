@@ -1,30 +1,29 @@
-"""Formulations of a ball on a surface with Pinocchio, and what each has and lacks."""
+"""Formulation of a ball that rolls in a cylinder with Pinocchio, and what it has."""
 
 import dataclasses
 from collections.abc import Mapping
 
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
+from proofroll.core.formulations import Formulation
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL
+from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL, NO_OTHER_BODIES
 from proofroll.papers.blajer_2006.pinocchio.rows_run import RowsRun
+from proofroll.papers.blajer_2006.pinocchio.settings import PRESETS, CompositeSettings
 
-PROVIDES: Mapping[str, frozenset[str]] = {"composite": ALL_OF_A_BALL}
-
-
-def ball_run(scene: Scene, settings: PinocchioSettings) -> RunOnBody:
-    """Run of the scene's ball.
-
-    Raises:
-        Refused: the scene requires the orientation, and the settings exclude it.
-    """
-    return on_body(RowsRun(rolling_ball(scene), _decided(scene, settings)), scene)
+_ORIENTATION = Term(
+    name="orientation",
+    formulations=("composite",),
+    on={"orientation": True},
+    off={"orientation": False},
+    because="turns the ball's own axes; its inertia is the same about all of them, so the motion does not ask for it",
+)
 
 
-def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
-    """Settings with the orientation as the scene requires.
+def _run(scene: Scene, settings: CompositeSettings) -> RunOnBody:
+    """Run of the scene's ball, with the orientation if the scene requires it.
 
     Raises:
         Refused: the scene requires the orientation, and the settings exclude it.
@@ -32,4 +31,18 @@ def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
     asked = MechanismCapability.ORIENTATION in scene.requires
     if asked and settings.orientation is False:
         raise Refused(f"needs {MechanismCapability.ORIENTATION}, which orientation=false leaves out")
-    return dataclasses.replace(settings, orientation=asked) if settings.orientation is None else settings
+    if settings.orientation is None:
+        settings = dataclasses.replace(settings, orientation=asked)
+    return on_body(RowsRun(rolling_ball(scene), settings), scene)
+
+
+FORMULATIONS: Mapping[str, Formulation] = {
+    "composite": Formulation(
+        presets=PRESETS["composite"],
+        provides=ALL_OF_A_BALL,
+        level=Level.CONSTRAINT,
+        build=_run,
+        lacking=NO_OTHER_BODIES,
+        terms=(_ORIENTATION, "projection"),
+    )
+}

@@ -10,9 +10,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import controlled_step, solver_from
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.tangent_map import require_tangent_map
 from proofroll.papers.blajer_2006.pinocchio.composite import Composite
+from proofroll.papers.blajer_2006.pinocchio.settings import CompositeSettings
 
 
 class TangentIntegrator(ABC):
@@ -23,7 +23,7 @@ class TangentIntegrator(ABC):
         turns: True if the orientation of the ball is integrated.
     """
 
-    def __init__(self, mechanism: Composite, settings: PinocchioSettings) -> None:
+    def __init__(self, mechanism: Composite, settings: CompositeSettings) -> None:
         self._mechanism, self._settings = mechanism, settings
         self._model, self._data = mechanism.model, mechanism.model.createData()
         self.turns = bool(settings.orientation)
@@ -54,7 +54,7 @@ class TangentIntegrator(ABC):
 class FixedStep(TangentIntegrator):
     """Base of methods with a fixed step ``dt``; subclasses define one step."""
 
-    def __init__(self, mechanism: Composite, settings: PinocchioSettings) -> None:
+    def __init__(self, mechanism: Composite, settings: CompositeSettings) -> None:
         super().__init__(mechanism, settings)
         # Factors on the joint velocity that moves the configuration: 0 freezes the ball's orientation. The ball's
         # inertia is the same in all axes, so at each instant axes may be chosen that coincide with the carriage's. The
@@ -125,7 +125,7 @@ class Adaptive(TangentIntegrator):
     lower order.
     """
 
-    def __init__(self, mechanism: Composite, settings: PinocchioSettings) -> None:
+    def __init__(self, mechanism: Composite, settings: CompositeSettings) -> None:
         super().__init__(mechanism, settings)
         if self.turns:
             require_tangent_map()

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pinocchio as pin
 
-from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
 from proofroll.papers.blajer_2006.pinocchio.composite import Composite
@@ -15,8 +14,9 @@ from proofroll.papers.blajer_2006.pinocchio.integrators import (
     TangentIntegrator,
     TangentRungeKutta4,
 )
+from proofroll.papers.blajer_2006.pinocchio.settings import CompositeSettings
 
-_INTEGRATORS: Mapping[str, Callable[[Composite, PinocchioSettings], TangentIntegrator]] = {
+_INTEGRATORS: Mapping[str, Callable[[Composite, CompositeSettings], TangentIntegrator]] = {
     "dop853": Adaptive,
     "semi_implicit_euler": SemiImplicitEuler,
     "rk4": TangentRungeKutta4,
@@ -27,7 +27,7 @@ _INTEGRATORS: Mapping[str, Callable[[Composite, PinocchioSettings], TangentInteg
 class RowsRun:
     """Run of a ball with constraint rows; see :class:`proofroll.core.engine.Engine` for the methods."""
 
-    def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
+    def __init__(self, body: RollingBall, settings: CompositeSettings) -> None:
         """Starts at time 0; ``settings.orientation`` decides if the orientation is integrated, not the scene."""
         self.mechanism = Composite(body, bool(settings.orientation))
         self.motion = _INTEGRATORS[settings.integrator](self.mechanism, settings)

@@ -1,4 +1,4 @@
-"""Run of a ball on a surface by the projection method."""
+"""Formulations ``euler`` and ``rotating_frame``: run of a ball by the projection method, as in the article."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,32 +6,34 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.formulations import Formulation
 from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.engines.projection.settings import ProjectionSettings
+from proofroll.engines.projection.adapter import ELIMINATION
 from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL, RollingBall
+from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL, NO_OTHER_BODIES, RollingBall
 from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
 from proofroll.papers.blajer_2006.projection.geometry import Uniform, matrix
 from proofroll.papers.blajer_2006.projection.method import ProjectedBall, start_and_scales
 from proofroll.papers.blajer_2006.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
+from proofroll.papers.blajer_2006.projection.settings import PRESETS, ProjectionBallSettings
 from proofroll.papers.blajer_2006.projection.taylor import TaylorSeries
 
 # Components of the state without the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7
-FORMULATIONS = ("euler", "rotating_frame")
-PROVIDES: Mapping[str, frozenset[str]] = dict.fromkeys(FORMULATIONS, ALL_OF_A_BALL)
-INHERENT: Mapping[str, Mapping[str, str]] = {
-    "euler": {MechanismCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
+_INHERENT: Mapping[str, Mapping[str, str]] = {
+    "euler": {MechanismCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"},
+    "rotating_frame": {},
 }
 
 
 class ProjectionBall:
     """A ball on any surface that guides it; see :class:`proofroll.core.engine.Engine` for the methods."""
 
-    def __init__(self, body: RollingBall, settings: ProjectionSettings, *, follow: bool = False) -> None:
+    def __init__(self, body: RollingBall, settings: ProjectionBallSettings, *, follow: bool = False) -> None:
         """Ball at time 0; ``follow``: integrate its orientation too if the formulation does not need it."""
         self._surface = body.surface
         geometry = Uniform(body.surface)
@@ -49,7 +51,6 @@ class ProjectionBall:
         resolution, (x, scales) = getattr(settings, settings.resolution), start_and_scales(body, self._orientation)
         self._motion: Integrator | TaylorSeries
         if settings.integrator == "taylor":
-            assert settings.formulation != "dependent"  # refused by the settings
             self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
         else:
             self._motion = INTEGRATORS[settings.integrator](resolution)
@@ -143,9 +144,23 @@ class ProjectionBall:
         )
 
 
-def ball_run(scene: Scene, settings: ProjectionSettings) -> RunOnBody:
+def _run(scene: Scene, settings: ProjectionBallSettings) -> RunOnBody:
     """Run of the scene's ball. Raises Refused: the compiled series do not follow the orientation."""
     follow = MechanismCapability.ORIENTATION in scene.requires
     if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
         raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
     return on_body(ProjectionBall(rolling_ball(scene), settings, follow=follow), scene)
+
+
+FORMULATIONS: Mapping[str, Formulation] = {
+    name: Formulation(
+        presets=presets,
+        provides=ALL_OF_A_BALL,
+        level=Level.PROJECTION,
+        build=_run,
+        lacking=NO_OTHER_BODIES,
+        inherent=_INHERENT[name],
+        terms=(ELIMINATION,),
+    )
+    for name, presets in PRESETS.items()
+}

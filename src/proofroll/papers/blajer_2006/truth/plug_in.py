@@ -1,7 +1,9 @@
-"""Truth of a ball that rolls evenly in an upright cylinder, by two routes of its own."""
+"""Truth of a ball in an upright cylinder: by two routes of its own if it rolls evenly, else with its first slip."""
 
 from __future__ import annotations
 
+import dataclasses
+import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,7 +12,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import ENDED, ENDS, LAWS
 from proofroll.core.element import Element
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Diverged, InputError
 from proofroll.core.events import with_events
 from proofroll.core.heyoka_library import available
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
@@ -18,11 +20,14 @@ from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.dataset import columns, unturned
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.papers.blajer_2006.ball.as_body import ball_of
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.motion import BallMotion
 from proofroll.papers.blajer_2006.ball.rolling_equations import closed_form
 from proofroll.papers.blajer_2006.truth import series
+from proofroll.papers.blajer_2006.truth.onset import edge_between, onset
 from proofroll.papers.blajer_2006.truth.rolling import reduced, unreduced
 from proofroll.truth import SAFETY
+from proofroll.truth.plug_in import MechanismTruth
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +37,7 @@ if TYPE_CHECKING:
 _ROUND_OFF, _SHARED = 4 * float(np.finfo(float).eps), 1e-12
 # Variables that are small differences of large variables, by the start of their name, with the large one.
 _DIFFERENCE_OF = {"gap": "p_WB", "slip": "v_WB", "energy_": "energy", "drift": "p_WB"}
+_ILL_POSED = "a change of the parameters within their accuracy changes the time of the first slip"
 # Below this many of its own error bars the normal force is zero, and the needed friction 0/0.
 _NOTHING = 10.0
 
@@ -41,14 +47,15 @@ class BallOnSurfaceTruth:
 
     @staticmethod
     def covers(element: Element) -> bool:
-        """True for every ball that rolls evenly in an upright cylinder."""
-        return isinstance(element, MechanismElement) and element.rolls_evenly and ball_of(element) is not None
+        """True for every ball in an upright cylinder."""
+        return ball_of(element) is not None
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
         """Motion of the ball and force of the wall on it, with error bars.
 
-        The first route is the closed form, or with rolling resistance the reduced equations; the second is Newton-Euler
+        One that may slip has the general truth and the conditioning of its first slip. Of one that rolls evenly the
+        first route is the closed form, or with rolling resistance the reduced equations; the second is Newton-Euler
         in the world, derived and integrated independently. They do not turn with the ball, however small and fast that
         is: its orientation, if asked for, is that of the general truth.
 
@@ -58,6 +65,8 @@ class BallOnSurfaceTruth:
         assert isinstance(element, MechanismElement)  # by ``covers``
         body, instants = ball_of(element), np.asarray(times, dtype=np.float64)
         assert body is not None
+        if not element.rolls_evenly:
+            return _with_onset(body, MechanismTruth.truth(element, times, asks))
         by_series = available() and (not body.contact.rolling_resistance or bool(body.udot0[0]))
         first_route, second_route = (series.reduced, series.unreduced) if by_series else (reduced, unreduced)
         with np.errstate(invalid="ignore", divide="ignore"):  # values that are not finite are refused by name below
@@ -68,6 +77,31 @@ class BallOnSurfaceTruth:
         result.attrs |= {"route": first.route, "second_route": second.route}
         result = _with_orientation(result, element, times, asks) if "orientation" in asks else result
         return with_events(result, ())
+
+    @staticmethod
+    def edge_between(element: Element, parameter: str, low: float, high: float, until: float) -> float | None:
+        """Value of static friction at which the first slip jumps, see :func:`.onset.edge_between`.
+
+        Raises:
+            InputError: ``parameter`` is not ``mu_static``.
+        """
+        ball = ball_of(element)
+        assert ball is not None  # by ``covers``
+        if parameter != "mu_static":
+            advice = "an edge can be found only for mu_static of a ball in an upright cylinder"
+            raise InputError(parameter, "edge_between", advice)
+        return edge_between(ball, low, high, until)
+
+
+def _with_onset(ball: RollingBall, dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset of a motion that is unique, with the conditioning of the first slip of the ball."""
+    if not dataset.attrs["second_route"]:
+        return dataset
+    first = onset(ball, min(float(dataset["time"][-1]), float(dataset.attrs.get(ENDS, np.inf))))
+    dataset.attrs["onset"] = json.dumps(dataclasses.asdict(first))
+    if first.verdict == "ill-posed":
+        dataset.attrs.setdefault("ill_posed", _ILL_POSED)
+    return dataset
 
 
 def _dataset(element: MechanismElement, times: FloatArray, solved: BallMotion) -> xr.Dataset:
@@ -122,8 +156,6 @@ def _with_orientation(
     Raises:
         Diverged: the general truth moves in another way.
     """
-    from proofroll.truth.plug_in import MechanismTruth
-
     turning = MechanismTruth.truth(element, times, asks)
     result = result.isel(time=slice(len(turning["time"])))
     for name in ("p_WB", "w_WB"):
