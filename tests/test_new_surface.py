@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from proofroll.core import plugins
-from proofroll.elements.balls import kind
+from proofroll.elements.balls import kind, reader
 from proofroll.elements.balls.surfaces import surface_kinds
 from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.elements.mechanism.run.element import MechanismElement
@@ -86,6 +86,7 @@ ladder = [2, 1, 0.5]
 def _look_again() -> None:
     """What is installed is looked up once in a process."""
     surface_kinds.cache_clear()
+    importlib.reload(reader)
     importlib.reload(kind)
     plugins.load_element_kinds.cache_clear()
 

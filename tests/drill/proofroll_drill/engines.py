@@ -190,7 +190,7 @@ class Drill:
     @staticmethod
     def version() -> str:
         """See :class:`proofroll.core.engine.Engine`."""
-        return Projection.version()
+        return str(Projection.version())
 
     @classmethod
     def build(cls, scene: Scene, settings: DrillSettings) -> Self:
@@ -223,7 +223,7 @@ class Drill:
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`."""
-        right = self._inner.sample()
+        right: Sample = self._inner.sample()
         if self._t == 0:
             return right
         self._do("sample")

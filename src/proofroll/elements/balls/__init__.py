@@ -1,1 +1,1 @@
-"""A ball that rolls or slips on a surface."""
+"""Reader of balls on surfaces, which are bodies with spheres that touch walls."""

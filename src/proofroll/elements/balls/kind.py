@@ -1,38 +1,15 @@
 """Tables of a ball on a surface in a scene file, and the scenes on which engines are checked."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
-
-from pydantic import Field
+from typing import Any, ClassVar
 
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
-from proofroll.core.validation import strict, units_of, validated
-from proofroll.elements.balls.surfaces import Cylinder, surface_kinds
-from proofroll.elements.mechanism.run.balls import BallTables, PlacedBall, ball_as_body, placed_balls
+from proofroll.elements.balls.reader import UNITS, PlacedBall, ball_as_body, placed_balls
+from proofroll.elements.balls.surfaces import Cylinder
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
-from proofroll.elements.mechanism.scene.shapes.walls import Declared
-
-if TYPE_CHECKING:
-    AnySurface = Any
-else:
-    AnySurface = Union[surface_kinds()]  # noqa: UP007 -- of a tuple
-
-
-@dataclass(frozen=True)
-class _Tables(BallTables):
-    """Tables of a scene file that describe balls on surfaces."""
-
-    surfaces: tuple[Annotated[AnySurface, Field(discriminator="kind")], ...] = field(default=())
-
-
-strict(_Tables, Ball, Contact, InitialMotion, *surface_kinds())
 
 
 class BallOnSurfaceKind:
@@ -40,12 +17,12 @@ class BallOnSurfaceKind:
 
     name: ClassVar[str] = "ball_on_surface"
     tables: ClassVar[tuple[str, ...]] = ("balls", "surfaces", "contacts", "initial")
-    units: ClassVar[Mapping[str, str]] = units_of(Ball, Contact, InitialMotion, *surface_kinds())
+    units: ClassVar[Mapping[str, str]] = UNITS
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[Element]:
-        """See :func:`proofroll.elements.mechanism.run.balls.ball_as_body`: a mechanism for each contact."""
-        return [ball_as_body(placed, gravity, where) for placed in _placed(tables, numbers, where)]
+        """See :func:`proofroll.elements.balls.reader.ball_as_body`: a mechanism for each contact."""
+        return [ball_as_body(placed, gravity, where) for placed in placed_balls(tables, numbers, where)]
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
@@ -69,21 +46,3 @@ def _rolling(start: InitialMotion, rolling_resistance: float) -> Scene:
         start,
     )
     return Scene("rolling_ball", "", (ball_as_body(placed, Gravity(9.81), "scene"),))
-
-
-def _placed(tables: Mapping[str, Any], numbers: Parameters, where: str) -> list[PlacedBall]:
-    """Each contact of a file with its ball, surface and start. Raises InputError for a mistake, with its location."""
-    units = BallOnSurfaceKind.units
-    filled = {key: numbers.filled(table, f"{where}: {key}", units) for key, table in tables.items()}
-    contents = validated(_Tables, filled, where)
-    placed = list(placed_balls(contents, contents.surfaces, tables.get("initial", []), numbers, where))
-    for ball, wall, contact, _, index in placed:
-        try:
-            if isinstance(wall, Cylinder):
-                wall.offset(ball.radius)
-        except InputError as error:
-            raise error.within(f"{where}: contacts.{index}", contact.body) from None
-    for surface in contents.surfaces:
-        if isinstance(surface, Declared):
-            surface.checked()
-    return placed

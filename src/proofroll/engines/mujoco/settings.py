@@ -97,9 +97,23 @@ class MujocoSettings:
         turning: dict[str, int] = dict.fromkeys(_QUATERNIONS, ORDER_OF_TURNING)
         return turning | dict.fromkeys((*ALL_LOOPS, *_FIRST_ORDER), 1)
 
-    def own_rules(self) -> Iterator[tuple[bool, str, str]]:
-        """Rules of a formulation of its own: True if one is broken, name of the setting, advice."""
-        yield from ()
+    def rules(self) -> Iterator[tuple[bool, str, str]]:
+        """Combinations that MuJoCo would ignore or misread: True if there, name of the setting, advice."""
+        plain, formulation = type(self)(self.formulation), self.formulation
+        reason = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
+        for name in self.unused:
+            yield getattr(self, name) != getattr(plain, name), name, f"{reason}; leave it out"
+        # The other integrators have the implicit damping of their own, or none.
+        explicit = self.damping_armature and self.integrator != "Euler"
+        yield explicit, "integrator", "damping_armature=true needs integrator=Euler"
+        if self.cone_correction:
+            # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
+            yield self.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"
+            yield self.cone == "pyramidal", "cone", "cone_correction=true of a mechanism needs cone=elliptic"
+        if self.curvature:
+            yield self.integrator != "Euler", "integrator", "curvature=true needs integrator=Euler"
+            # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
+            yield self.cone == "pyramidal", "cone", "curvature=true needs cone=elliptic"
 
     @property
     def scheme(self) -> Scheme | str:
@@ -168,30 +182,11 @@ def check(settings: MujocoSettings) -> None:
     Raises:
         InputError: the first such combination.
     """
-    refuse_first("mujoco", settings, _rules(settings))
+    refuse_first("mujoco", settings, settings.rules())
     if settings.own_share >= 1:
         # MuJoCo's damping would supply all of J̇v or more of it: nothing is left to add.
         advice = f"curvature=true needs impedance times time_constant above 1, not {1 / settings.own_share:.4g}"
         raise InputError("mujoco: impedance", settings.impedances[1], advice)
-
-
-def _rules(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
-    yield from settings.own_rules()
-    plain, formulation = type(settings)(settings.formulation), settings.formulation
-    reason = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
-    for name in settings.unused:
-        yield getattr(settings, name) != getattr(plain, name), name, f"{reason}; leave it out"
-    # The other integrators have the implicit damping of their own, or none.
-    explicit = settings.damping_armature and settings.integrator != "Euler"
-    yield explicit, "integrator", "damping_armature=true needs integrator=Euler"
-    if settings.cone_correction:
-        # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
-        yield settings.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"
-        yield settings.cone == "pyramidal", "cone", "cone_correction=true of a mechanism needs cone=elliptic"
-    if settings.curvature:
-        yield settings.integrator != "Euler", "integrator", "curvature=true needs integrator=Euler"
-        # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
-        yield settings.cone == "pyramidal", "cone", "curvature=true needs cone=elliptic"
 
 
 def check_restitution(settings: MujocoSettings) -> None:

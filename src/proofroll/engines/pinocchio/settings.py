@@ -37,6 +37,7 @@ class PinocchioSettings:
             ``semi_implicit_euler`` and Moreau's ``midpoint``, with all terms at half a step.
         dt: step [s]; None with ``dop853``.
         rtol: relative tolerance [1] of ``dop853``; None with the others.
+        orientation: None: a mechanism always has its orientations.
         projection: put the state back on the constraints after each step; not in ``impulses``, where the solver does.
         solver: of ``impulses``: projected Gauss-Seidel or alternating directions (ADMM), which diverges in wide cones
             and is given each cone no wider than its impulse asks for; None with the others.
@@ -52,6 +53,7 @@ class PinocchioSettings:
     integrator: Literal["semi_implicit_euler", "midpoint", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
     dt: Annotated[float, Gt(0)] | None = None
     rtol: Annotated[float, Ge(TIGHTEST)] | None = 1e-13
+    orientation: bool | None = None
     projection: bool = True
     solver: Literal["pgs", "admm"] | None = None
     solver_tolerance: Annotated[float, Gt(0)] | None = None
@@ -78,6 +80,8 @@ class PinocchioSettings:
         yield self.convex and not solves, "convex", "only impulses has it; leave it out"
         yield solves and self.projection, "projection", "the solver corrects the contacts; leave it out"
         if integrators is not None:
+            advice = "a mechanism always has its orientations; leave it out"
+            yield self.orientation is not None, "orientation", advice
             yield integrator not in integrators, "integrator", f"{self.formulation} has {' and '.join(integrators)}"
         advice = "constraint_dynamics needs a number, and nothing else has one"
         yield (self.formulation == "constraint_dynamics") != (self.proximal is not None), "proximal", advice

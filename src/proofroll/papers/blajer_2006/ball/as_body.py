@@ -18,6 +18,7 @@ from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 
+__tracebackhide__ = True  # whatever goes wrong goes wrong in the run of the ball
 # What a ball's certificate calls a quantity that a body's calls otherwise.
 _NAMES: Mapping[str, tuple[str, ...]] = {
     "gap in the engine": ("gaps",),

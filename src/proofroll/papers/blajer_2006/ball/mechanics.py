@@ -13,11 +13,6 @@ from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment 
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 
 
-def normal_force(body: RollingBall, p_WB: FloatArray, force: FloatArray) -> FloatArray:
-    """Normal force N [N], shape (...), of the wall's force on the ball [N], shape (..., 3)."""
-    return np.asarray(-np.sum(force * body.surface.normal(p_WB), axis=-1))
-
-
 def natural_acceleration(body: RollingBall) -> float:
     """Scale of accelerations at time 0, max(g, |p̈|) [m/s²], never zero; times the mass it is that of forces.
 
@@ -44,26 +39,13 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     return acceleration, force
 
 
-def initial_angular_acceleration(body: RollingBall) -> FloatArray:
-    """Angular acceleration at time 0 in the world [rad/s²], shape (3,)."""
-    return newton_euler(body, body.p0, body.v0, body.w0)[1]
-
-
 def newton_euler(
-    body: RollingBall,
-    p_WB: FloatArray,
-    v_WB: FloatArray,
-    w_WB: FloatArray,
-    *,
-    force: FloatArray | float = 0.0,
-    moment: FloatArray | float = 0.0,
-    resistance: FloatArray | None = None,
+    body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """p̈ [m/s²], ω̇ [rad/s²] and the wall's force on the ball [N] while rolling without slip, each shape (3,).
 
     Unreduced: six equations of motion and three acceleration constraints, in the world frame, with no
-    parametrisation of the surface. ``force`` [N] and ``moment`` [N m] are additional loads; ``resistance`` replaces the
-    moment of rolling resistance for N = 1 [m].
+    parametrisation of the surface.
     """
     a, m, J, f = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
     e1 = body.surface.normal(p_WB)
@@ -73,17 +55,15 @@ def newton_euler(
     # v + a ω × e1 = 0 holds along the tangents only by rolling, along e1 by the wall: both are one vector equation,
     # since (ω × e1) · e1 = 0. Its derivative is the last block.
     cross_e1 = np.array([[0, -e1[2], e1[1]], [e1[2], 0, -e1[0]], [-e1[1], e1[0], 0]])  # [e1]× y = e1 × y
-    if resistance is None and f:
-        resistance = resistance_moment(f, 1.0, e1, v_WB)
     matrix = np.zeros((9, 9))
     matrix[:3, :3] = m * np.eye(3)
     matrix[:3, 6:] = -np.eye(3)
     matrix[3:6, 3:6] = J * np.eye(3)
     matrix[3:6, 6:] = -a * cross_e1
-    if resistance is not None:  # it is linear in N, and -N = R · e1: M = f (v/V) × (R·e1) e1
-        matrix[3:6, 6:] += np.outer(resistance, e1)
+    if f:  # the resistance is linear in N, and -N = R · e1: M = f (v/V) × (R·e1) e1
+        matrix[3:6, 6:] += np.outer(resistance_moment(f, 1.0, e1, v_WB), e1)
     matrix[6:, :3] = np.eye(3)
     matrix[6:, 3:6] = -a * cross_e1
-    right = np.concatenate([m * body.gravity + force, np.zeros(3) + moment, -a * cross(w_WB, e1_rate)])
+    right = np.concatenate([m * body.gravity, np.zeros(3), -a * cross(w_WB, e1_rate)])
     solution = np.linalg.solve(matrix, right)
     return solution[:3], solution[3:6], solution[6:]

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment
 from proofroll.elements.mechanism.scene.balls import Ball, Contact
 from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
 
@@ -37,8 +35,6 @@ class RollingBall:
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
         u0: initial surface coordinates, shape (2,).
         p0, v0, w0: initial centre [m], velocity [m/s] and angular velocity [rad/s] in the world, shape (3,).
-        flies: False, as the ball starts on the wall and does not land again.
-        wall_rate: None, as the wall is at rest.
     """
 
     ball: Ball
@@ -51,17 +47,10 @@ class RollingBall:
     v0: FloatArray
     w0: FloatArray
 
-    flies: ClassVar[bool] = False
-    wall_rate: ClassVar[FloatArray | None] = None
-
     def __post_init__(self) -> None:
         """Keeps read-only copies of the arrays."""
         for name in ("gravity", "u0", "p0", "v0", "w0"):
             object.__setattr__(self, name, read_only(np.array(getattr(self, name), dtype=np.float64)))
-
-    def resisting(self, N: FloatArray, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:  # noqa: ARG002 -- the protocol's
-        """Moment of the rolling resistance, against the velocity of the centre [N m], shape (..., 3)."""
-        return resistance_moment(self.contact.rolling_resistance, N, e1, v_WB)
 
     @property
     def udot0(self) -> FloatArray:

@@ -21,9 +21,6 @@ RUNS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
     "carrier": Carrier,
     "rolling_disc": RollingDisc,
 }
-_INHERENT: Mapping[str, str] = {
-    MechanismCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"
-}
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,7 @@ FORMULATIONS: Mapping[str, Formulation] = {
         level=Level.CONSTRAINT,
         build=_run,
         lacking=NO_OTHER_BODIES,
-        inherent=_INHERENT,
+        inherent={MechanismCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"},
         terms=(NEW_JACOBIAN,),
     )
     for name in RUNS

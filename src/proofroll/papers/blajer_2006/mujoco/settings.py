@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Gt
 from pydantic import BeforeValidator
+from typing_extensions import override
 
 from proofroll.core.engine_abilities import Term
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
@@ -51,8 +52,8 @@ class ChartSettings(MujocoSettings):
     condim: Annotated[Literal[3, 4, 6], BeforeValidator(_digits_as_number)] = 3
 
     @property
+    @override
     def unused(self) -> tuple[str, ...]:
-        """See :class:`proofroll.core.engine.Settings`."""
         return ("damping_armature", "cone_correction", "curvature")
 
     @property
@@ -74,11 +75,12 @@ class ChartSettings(MujocoSettings):
         """
         return {MechanismCapability.TURNING_FRICTION: 2}
 
-    def own_rules(self) -> Iterator[tuple[bool, str, str]]:
-        """See :meth:`MujocoSettings.own_rules`."""
+    @override
+    def rules(self) -> Iterator[tuple[bool, str, str]]:
         soft = self.cone == "pyramidal" and self.friction > LARGEST_PYRAMIDAL_FRICTION
         advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
         yield soft, "friction", advice
+        yield from super().rules()
 
     def friction_coefficients(self, mu: float) -> tuple[float, float, float]:
         """MuJoCo's coefficients of sliding [1], of turning about the normal [m] and of rolling [m]; 0 where unused."""

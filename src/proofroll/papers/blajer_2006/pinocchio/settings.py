@@ -10,8 +10,7 @@ from proofroll.core.engine import presets_of
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.engines.pinocchio.settings import FREE, PinocchioSettings
 
-# Order of each integrator where the orientation is integrated.
-_ORDERS = {"semi_implicit_euler": 1, "rk4": 2, "rk4_dexpinv": 4}
+_ORDERS = {"semi_implicit_euler": 1, "rk4": 2, "rk4_dexpinv": 4}  # with the orientation
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,6 @@ class CompositeSettings(PinocchioSettings):
     """
 
     formulation: Literal["composite"] = "composite"
-    orientation: bool | None = None
 
     @override
     def _rules(self) -> Iterator[tuple[bool, str, str]]:
@@ -43,8 +41,8 @@ class CompositeSettings(PinocchioSettings):
         return 4 if self.integrator == "rk4" and not self.orientation else _ORDERS.get(self.integrator)
 
     @property
+    @override
     def lowered(self) -> Mapping[str, int]:
-        """See :class:`proofroll.core.engine_abilities.LowersOrder`."""
         return {MechanismCapability.ORIENTATION: _ORDERS["rk4"]} if self.integrator == "rk4" else {}
 
 

@@ -29,7 +29,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.papers.blajer_2006.ball.mechanics import natural_speed
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.projection.geometry import Frame, Shape, Uniform, Vector, along
+from proofroll.papers.blajer_2006.projection.geometry import Frame, Uniform, Vector, along
 from proofroll.papers.blajer_2006.projection.orientation import Orientation
 
 
@@ -37,25 +37,21 @@ class Kinematics(NamedTuple):
     """Kinematics of the ball in the velocities s: v = D s and v̇ = D ṡ + Ḋ s.
 
     Attributes:
-        frame, shape: geometry at the ball's position.
+        frame: at the ball's position.
         rates: rates of the coordinates: u̇, and of the angles if there are any.
         r: velocities of the rotation.
         pose: numbers of the rotation, see :meth:`Orientation.pose`.
         v: D s, six numbers.
-        drift: Ḋ s of the centre, along e1, e2, e3 [m/s²].
-        convected: acceleration of the centre along e2, e3 by the turning of the axes alone, which changes no slip
-            [m/s²].
-        turned: rate of ω' by the turning of the axes alone [rad/s²].
+        drift: Ḋ s of the centre, along e1 alone [m/s²].
+        turned: rate of ω' by the turning of the axes alone, zero along e3 [rad/s²].
     """
 
     frame: Frame
-    shape: Shape
     rates: tuple[float, ...]
     r: Sequence[float]
     pose: tuple[float, ...]
     v: tuple[float, ...]
-    drift: Vector
-    convected: tuple[float, float]
+    drift: float
     turned: Vector
 
 
@@ -93,7 +89,7 @@ class ProjectedBall:
         self.gravity = body.gravity
         self.rolling_resistance = body.contact.rolling_resistance
         self._g = body.gravity.tolist()
-        self._geometry = geometry
+        self._geometry, self._c, self._per_c = geometry, geometry.radius, 1 / geometry.radius
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
 
@@ -102,29 +98,17 @@ class ProjectedBall:
         n = self._coordinates
         state = x.tolist()
         angles, (s_1, s_2, *r) = state[2:n], state[n:]
-        frame, shape = self._geometry.at(state)
-        (t2u, t2v, t3u, t3v), _, second_derivatives, (p1, p2, p3, q1, q2, q3) = shape
-        uu1, uv1, vv1, uu2, uv2, vv2, uu3, uv3, vv3 = second_derivatives
-        uu, uv, vv = s_1 * s_1, s_1 * s_2, s_2 * s_2
-        drift = uu1 * uu + uv1 * uv + vv1 * vv, uu2 * uu + uv2 * uv + vv2 * vv, uu3 * uu + uv3 * uv + vv3 * vv
-        o1, o2, o3 = p1 * s_1 + q1 * s_2, p2 * s_1 + q2 * s_2, p3 * s_1 + q3 * s_2
+        frame = self._geometry.at(state)
         pose = self._orientation.pose(angles)
         w1, w2, w3 = self._orientation.angular_velocity(pose, r, frame)
-        v2, v3 = t2u * s_1 + t2v * s_2, t3u * s_1 + t3v * s_2
-        v = (0.0, v2, v3, w1, w2, w3)
-        convected = (-o1 * v3, o1 * v2)
-        turned = (o2 * w3 - o3 * w2, o3 * w1 - o1 * w3, o1 * w2 - o2 * w1)
-        rates = (s_1, s_2, *self._orientation.rates(angles, r, frame))
         return Kinematics(
             frame=frame,
-            shape=shape,
-            rates=rates,
+            rates=(s_1, s_2, *self._orientation.rates(angles, r, frame)),
             r=r,
             pose=pose,
-            v=v,
-            drift=drift,
-            convected=convected,
-            turned=turned,
+            v=(0.0, self._c * s_1, s_2, w1, w2, w3),
+            drift=-self._c * (s_1 * s_1),
+            turned=(-s_1 * w2, s_1 * w1, 0.0),
         )
 
     def weight(self, kin: Kinematics) -> Vector:
@@ -146,25 +130,23 @@ class ProjectedBall:
         a, m, J = self.radius, self.mass, self.inertia
         # a2, a3: translational part of M⁻¹ f along e2 and e3; b2, b3: rotational part, zero along e1
         g1, a2, a3 = self.weight(kin)
-        (d1, d2, d3), (r2, r3), (_, q2, q3) = kin.drift, kin.convected, kin.turned
-        N, b2, b3 = m * (g1 - d1), 0.0, 0.0
+        N, b2, b3 = m * (g1 - kin.drift), 0.0, 0.0
         if self.rolling_resistance:
             M2, M3 = self.resistance(kin, N)
             b2, b3 = M2 / J, M3 / J
-        F2, F3 = -(a2 - r2 + a * (b3 - q3)) / self.mobility, -(a3 - r3 - a * (b2 - q2)) / self.mobility
+        F2, F3 = -(a2 + a * b3) / self.mobility, -(a3 - a * (b2 - kin.turned[1])) / self.mobility
         a2, a3, b2, b3 = a2 + F2 / m, a3 + F3 / m, b2 - a * F3 / J, b3 + a * F2 / J
-        p2, p3, (first2, first3, second2, second3) = a2 - d2, a3 - d3, kin.shape.inverse
         spin = self._orientation.acceleration(kin.pose, kin.r, (0.0, b2, b3), kin.turned, kin.frame)
-        acceleration = (first2 * p2 + first3 * p3, second2 * p2 + second3 * p3, *spin)
-        return Response(acceleration=acceleration, rate=(d1, a2, a3, 0.0, b2, b3), N=N, F2=F2, F3=F3)
+        rate = (kin.drift, a2, a3, 0.0, b2, b3)
+        return Response(acceleration=(self._per_c * a2, a3, *spin), rate=rate, N=N, F2=F2, F3=F3)
 
     def velocity_rate(self, kin: Kinematics, acceleration: Sequence[float]) -> FloatArray:
         """Rate v̇ = D ṡ + Ḋ s for accelerations ṡ, shape (6,)."""
-        (t2u, t2v, t3u, t3v), (d1, d2, d3), (rate_1, rate_2, *spin) = kin.shape.tangents, kin.drift, acceleration
+        rate_1, rate_2, *spin = acceleration
         still = self._orientation.acceleration(kin.pose, kin.r, (0.0, 0.0, 0.0), kin.turned, kin.frame)
         spin = [turn - still_turn for turn, still_turn in zip(spin, still, strict=True)]  # ω̇ = A (ṙ - ṙ where ω̇ = 0)
         rotation = self._orientation.angular_velocity(kin.pose, spin, kin.frame)
-        return np.array((d1, t2u * rate_1 + t2v * rate_2 + d2, t3u * rate_1 + t3v * rate_2 + d3, *rotation))
+        return np.array((kin.drift, self._c * rate_1, rate_2, *rotation))
 
     @staticmethod
     def contact_force(response: Response) -> FloatArray:
@@ -192,11 +174,9 @@ class ProjectedBall:
         F2, F3 = slip2 / self.mobility, slip3 / self.mobility
         v2, v3, lever = F2 / self.mass, F3 / self.mass, self.radius / self.inertia
         w2, w3 = -lever * F3, lever * F2
-        first2, first3, second2, second3 = kin.shape.inverse
         spin1, spin2, spin3 = self._orientation.solved(kin.pose, (0.0, w2, w3), kin.frame)
         *q, s_1, s_2, r1, r2, r3 = x.tolist()
-        s_1, s_2 = s_1 - first2 * v2 - first3 * v3, s_2 - second2 * v2 - second3 * v3
-        return np.array((*q, s_1, s_2, r1 - spin1, r2 - spin2, r3 - spin3))
+        return np.array((*q, s_1 - self._per_c * v2, s_2 - v3, r1 - spin1, r2 - spin2, r3 - spin3))
 
 
 def start_and_scales(body: RollingBall, orientation: Orientation) -> tuple[FloatArray, FloatArray]:

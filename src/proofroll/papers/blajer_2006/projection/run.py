@@ -24,10 +24,7 @@ from proofroll.papers.blajer_2006.projection.taylor import TaylorSeries
 
 # Components of the state without the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7
-_INHERENT: Mapping[str, Mapping[str, str]] = {
-    "euler": {MechanismCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"},
-    "rotating_frame": {},
-}
+_ANGLES = {MechanismCapability.ORIENTATION.value: "the Euler angles are coordinates of the equations of motion"}
 
 
 class ProjectionBall:
@@ -36,7 +33,6 @@ class ProjectionBall:
     def __init__(self, body: RollingBall, settings: ProjectionBallSettings, *, follow: bool = False) -> None:
         """Ball at time 0; ``follow``: integrate its orientation too if the formulation does not need it."""
         self._surface = body.surface
-        geometry = Uniform(body.surface)
         self._orientation: Orientation
         if settings.formulation == "euler":
             self._orientation = EulerAngles(renews=settings.singularity == "renew")
@@ -45,7 +41,7 @@ class ProjectionBall:
         self._coordinates = 2 + self._orientation.size
         periodic = [True, False, *self._orientation.periodic]
         self._angles = [index for index, whole in enumerate(periodic) if whole]
-        self._ball = ProjectedBall(body, geometry, self._orientation)
+        self._ball = ProjectedBall(body, Uniform(body.surface), self._orientation)
         self._eliminate = settings.eliminates
         self._fixed_step = settings.dt if settings.resolution == "dt" else 0.0
         resolution, (x, scales) = getattr(settings, settings.resolution), start_and_scales(body, self._orientation)
@@ -159,7 +155,7 @@ FORMULATIONS: Mapping[str, Formulation] = {
         level=Level.PROJECTION,
         build=_run,
         lacking=NO_OTHER_BODIES,
-        inherent=_INHERENT[name],
+        inherent=_ANGLES if name == "euler" else {},
         terms=(ELIMINATION,),
     )
     for name, presets in PRESETS.items()

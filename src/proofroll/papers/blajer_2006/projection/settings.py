@@ -38,8 +38,8 @@ class ProjectionBallSettings(ProjectionSettings):
         yield self.singularity == "stop" and self.formulation != "euler", "singularity", advice
 
     @property
+    @override
     def unused(self) -> tuple[str, ...]:
-        """See :class:`proofroll.core.engine.Settings`."""
         without = () if self.formulation == "euler" else ("singularity",)
         return (*super().unused, *without, "equations")
 

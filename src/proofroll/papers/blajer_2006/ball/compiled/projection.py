@@ -1,4 +1,4 @@
-"""Blajer's projection method for a ball on a cylinder or plane, in symbols and compiled.
+"""Blajer's projection method for a ball in a cylinder, in symbols and compiled.
 
 The matrices are those of the engine ``projection``, but share no code with it: the velocities s move the ball by
 v = D s, with v = [v1 v2 v3 ω1 ω2 ω3] along the local axes; a dot is a rate seen from the world. The system of the
@@ -19,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.papers.blajer_2006.ball.compiled.rolling import CompiledEquations, Function
-from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 
 Formulation = Literal["euler", "rotating_frame"]
@@ -39,14 +38,12 @@ class Structure:
 
     Attributes:
         formulation: as in the engine ``projection``.
-        curved: True on a cylinder, False on a plane.
         resistance: True with rolling resistance.
-        frame: F = F0 + cos γ Fc + sin γ Fs, columns e1, e2, e3 in the world: entries of F0, Fc, Fs; on a plane F0.
+        frame: F = F0 + cos γ Fc + sin γ Fs, columns e1, e2, e3 in the world: entries of F0, Fc, Fs.
         gravity: True for each nonzero component of gravity in the world.
     """
 
     formulation: Formulation
-    curved: bool
     resistance: bool
     frame: tuple[float, ...]
     gravity: tuple[bool, ...]
@@ -54,20 +51,18 @@ class Structure:
     @property
     def upright(self) -> bool:
         """True if F is a rotation about the vertical by γ."""
-        return self.curved and self.frame == _UPRIGHT
+        return self.frame == _UPRIGHT
 
 
 def structure(body: RollingBall, formulation: Formulation) -> Structure:
-    """Form of the equations of a scene on a cylinder or plane, for which :func:`rolling.supports` is true."""
-    curved = isinstance(body.surface, UprightCylinder)
+    """Form of the equations of a scene."""
     frame_at_zero, quarter, half = (body.surface.frame(np.array([angle, 0.0])) for angle in (0.0, np.pi / 2, np.pi))
-    constant = (frame_at_zero + half) / 2 if curved else frame_at_zero
+    constant = (frame_at_zero + half) / 2
     parts = np.stack([constant, frame_at_zero - constant, quarter - constant])
     whole = np.round(parts)
     parts = np.where(np.abs(parts - whole) < _ZERO, whole, parts) + 0.0  # -0 is 0
     return Structure(
         formulation=formulation,
-        curved=curved,
         resistance=body.contact.rolling_resistance > 0,
         frame=tuple(parts.ravel().tolist()),
         gravity=tuple(bool(component) for component in body.gravity),
@@ -76,8 +71,7 @@ def structure(body: RollingBall, formulation: Formulation) -> Structure:
 
 def parameters(body: RollingBall) -> list[float]:
     """Values of :data:`PARAMETERS`."""
-    c = body.surface.radius if isinstance(body.surface, UprightCylinder) else 1.0
-    ball = body.ball
+    ball, c = body.ball, body.surface.radius
     j = ball.inertia_ratio * ball.radius**2
     per_S = 1 / (1 + ball.radius**2 / j)
     return [j, 1 / j, per_S, ball.radius, body.contact.rolling_resistance, *body.gravity.tolist(), c, 1 / c**2]
@@ -112,10 +106,8 @@ def equations(form: Structure) -> ProjectionEquations:
     angles = hy.make_vars("phi", "theta", "psi") if form.formulation == "euler" else []
     s = np.array(hy.make_vars("s1", "s2", "s3", "s4", "s5"), dtype=object)
     constant, cosine, sine = np.array(form.frame).reshape(3, 3, 3).astype(object)
-    frame = constant + hy.cos(u[0]) * cosine + hy.sin(u[0]) * sine if form.curved else constant
-    scale = c if form.curved else 1.0
-    spinning = s[0] if form.curved else 0.0
-    turning = np.array([[0.0, -spinning, 0.0], [spinning, 0.0, 0.0], [0.0, 0.0, 0.0]], dtype=object)  # FᵀḞ
+    frame = constant + hy.cos(u[0]) * cosine + hy.sin(u[0]) * sine
+    turning = np.array([[0.0, -s[0], 0.0], [s[0], 0.0, 0.0], [0.0, 0.0, 0.0]], dtype=object)  # FᵀḞ
     if form.formulation == "rotating_frame":
         A, drift_of_spin, inverse = np.eye(3).astype(object), turning @ s[2:], np.eye(3).astype(object)
     elif form.upright:  # F turns the axes of the angles about the vertical, as ψ does
@@ -125,9 +117,9 @@ def equations(form: Structure) -> ProjectionEquations:
         A, drift_of_spin = frame.T @ axes, frame.T @ drift_of_axes
 
     D = np.full((6, 5), 0.0, dtype=object)
-    D[1, 0], D[2, 1], D[3:, 2:] = scale, 1.0, A
+    D[1, 0], D[2, 1], D[3:, 2:] = c, 1.0, A
     drift = np.full(6, 0.0, dtype=object)  # Ḋ s
-    drift[0] = -c * s[0] ** 2 if form.curved else 0.0
+    drift[0] = -c * s[0] ** 2
     drift[3:] = drift_of_spin
     v = D @ s
     M = np.array([1.0] * 3 + [j] * 3, dtype=object)  # over m, and so are all forces
@@ -138,7 +130,7 @@ def equations(form: Structure) -> ProjectionEquations:
         lever = N * f / hy.sqrt(v[1] ** 2 + v[2] ** 2)
         force[4], force[5] = -lever * v[2], lever * v[1]
     mobility = np.full((5, 5), 0.0, dtype=object)  # M̄⁻¹
-    mobility[0, 0], mobility[1, 1], mobility[2:, 2:] = per_c2 if form.curved else 1.0, 1.0, inverse * per_j
+    mobility[0, 0], mobility[1, 1], mobility[2:, 2:] = per_c2, 1.0, inverse * per_j
     projector = np.array([0.0, 1.0, 1.0, per_j, per_j, per_j], dtype=object)  # diagonal of D M̄⁻¹ Dᵀ
     rows = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, a], [0.0, 0.0, 1.0, 0.0, -a, 0.0]], dtype=object)
     seen_from_frame = np.concatenate([turning @ v[:3], turning @ v[3:]])

@@ -19,6 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grid
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.run.contacts.audits import energy_balance, force_audit, rate_audit
+from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.mechanics import natural_acceleration
@@ -35,6 +36,11 @@ def case() -> tuple[Scene, xr.Dataset]:
     return scene, run_of(scene, TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
 
 
+def on_wall(scene: Scene) -> BodyOnWall:
+    """The ball of a scene on its wall."""
+    return scene.elements[0].on_wall  # type: ignore[attr-defined,no-any-return]
+
+
 def largest(values: np.ndarray) -> float:
     """Largest absolute value."""
     return float(np.max(np.abs(values)))
@@ -45,22 +51,20 @@ def test_energy_balance_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     scene, dataset = case
     lost = float(dataset["energy"][0] - dataset["energy"][-1])
     assert lost > 0.1
-    assert largest(energy_balance(rolling_ball(scene), of_ball(dataset))) < 1e-9 * lost
+    assert largest(energy_balance(on_wall(scene), of_ball(dataset))) < 1e-9 * lost
 
 
 def test_energy_balance_sees_lost_energy(case: tuple[Scene, xr.Dataset]) -> None:
     """Energy that vanishes, and a resistance twice too strong or absent, show in the balance by their size."""
     scene, dataset = case
     leak = dataset.assign(energy=dataset["energy"] - 1e-4 * dataset["time"])
-    assert energy_balance(rolling_ball(scene), of_ball(leak))[-1] == pytest.approx(
-        -1e-4 * (TIMES[-1] - TIMES[1]), rel=1e-4
-    )
+    assert energy_balance(on_wall(scene), of_ball(leak))[-1] == pytest.approx(-1e-4 * (TIMES[-1] - TIMES[1]), rel=1e-4)
     lost = float(dataset["energy"][1] - dataset["energy"][-1])
     other = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=1e-3)
-    assert energy_balance(rolling_ball(other), of_ball(dataset))[-1] == pytest.approx(lost, rel=1e-6)
+    assert energy_balance(on_wall(other), of_ball(dataset))[-1] == pytest.approx(lost, rel=1e-6)
     without = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0)
     whole = float(dataset["energy"][0] - dataset["energy"][-1])  # nothing takes power there: no force counts
-    assert energy_balance(rolling_ball(without), of_ball(dataset))[-1] == pytest.approx(-whole, rel=1e-6)
+    assert energy_balance(on_wall(without), of_ball(dataset))[-1] == pytest.approx(-whole, rel=1e-6)
 
 
 def test_energy_balance_does_not_rest_on_forces_at_the_start(case: tuple[Scene, xr.Dataset]) -> None:
@@ -69,13 +73,13 @@ def test_energy_balance_does_not_rest_on_forces_at_the_start(case: tuple[Scene, 
     late = dataset.copy(deep=True)
     for name in ("N", "F2", "F3"):
         late[name].to_numpy()[0] = 0.0
-    assert largest(energy_balance(rolling_ball(scene), of_ball(late))) < 1e-9 * float(dataset["energy"][0])
+    assert largest(energy_balance(on_wall(scene), of_ball(late))) < 1e-9 * float(dataset["energy"][0])
 
 
 def test_force_audit_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     """Forces recomputed from a right motion are those that were reported, within 1e-6 of the normal force."""
     scene, dataset = case
-    audit = force_audit(rolling_ball(scene), of_ball(dataset))
+    audit = force_audit(on_wall(scene), of_ball(dataset))
     assert len(audit) == len(TIMES) - 10
     assert largest(audit) < 1e-6 * float(dataset["N"].max())
 
@@ -85,9 +89,9 @@ def test_force_audit_sees_a_wrong_force(case: tuple[Scene, xr.Dataset], name: st
     """A force that does not belong to the motion shows by its size, whichever component it is."""
     scene, dataset = case
     wrong = dataset.assign({name: dataset[name] + 0.01})
-    assert force_audit(rolling_ball(scene), of_ball(wrong)) == pytest.approx(0.01, abs=1e-4)
+    assert force_audit(on_wall(scene), of_ball(wrong)) == pytest.approx(0.01, abs=1e-4)
     reversed_sign = dataset.assign({name: -dataset[name]})
-    assert largest(force_audit(rolling_ball(scene), of_ball(reversed_sign))) == pytest.approx(
+    assert largest(force_audit(on_wall(scene), of_ball(reversed_sign))) == pytest.approx(
         2 * largest(dataset[name][5:-5]), rel=1e-3
     )
 
@@ -96,21 +100,21 @@ def test_force_audit_sees_a_wrong_mass(case: tuple[Scene, xr.Dataset]) -> None:
     """Reported forces of a ball twice as heavy do not fit the motion of this one."""
     scene, dataset = case
     heavy = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=5e-4, mass=1.034)
-    assert largest(force_audit(rolling_ball(heavy), of_ball(dataset))) > 0.9 * float(dataset["N"].min())
+    assert largest(force_audit(on_wall(heavy), of_ball(dataset))) > 0.9 * float(dataset["N"].min())
     assert rolling_ball(scene).ball.mass == 0.517
 
 
 def test_rate_audit_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     """Velocities of a right motion are the rates of its positions, to what the splines leave."""
     scene, dataset = case
-    assert largest(rate_audit(rolling_ball(scene), of_ball(dataset))) < 1e-8
+    assert largest(rate_audit(on_wall(scene), of_ball(dataset))) < 1e-8
 
 
 def test_rate_audit_sees_a_velocity_of_its_own(case: tuple[Scene, xr.Dataset]) -> None:
     """A velocity that is not the rate of the position shows by its size, also where it is constant."""
     scene, dataset = case
     drifting = dataset.assign(v_WB=dataset["v_WB"] + xr.DataArray([0, 0, 0.01], dims="xyz"))
-    assert rate_audit(rolling_ball(scene), of_ball(drifting)) == pytest.approx(0.01, rel=1e-4)
+    assert rate_audit(on_wall(scene), of_ball(drifting)) == pytest.approx(0.01, rel=1e-4)
 
 
 def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
@@ -123,8 +127,8 @@ def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
         return dataset.assign({"between.p_WB": dataset["between.p_WB"] + beat})
 
     # Near what is seen, 4.5e-8 with every kind of arithmetic that was tried: the error of the interpolation.
-    assert largest(rate_audit(rolling_ball(scene), of_ball(with_beat(0.0)))) < 1e-7
-    assert largest(rate_audit(rolling_ball(scene), of_ball(with_beat(1e-5)))) > 1e-5 / 0.005 / 2
+    assert largest(rate_audit(on_wall(scene), of_ball(with_beat(0.0)))) < 1e-7
+    assert largest(rate_audit(on_wall(scene), of_ball(with_beat(1e-5)))) > 1e-5 / 0.005 / 2
 
 
 @cache
@@ -171,7 +175,7 @@ def test_rate_audit_sees_an_orientation_of_its_own() -> None:
         found = list(accumulate(between, lambda attitude, turn: turn * attitude, initial=Rotation.identity()))
         q = np.array([one.as_quat(scalar_first=True) for one in found])
         run = run_of(scene, TIMES, motion.p_WB, motion.v_WB, motion.w_WB, q_WB=q)
-        return largest(rate_audit(rolling_ball(scene), of_ball(run)))
+        return largest(rate_audit(on_wall(scene), of_ball(run)))
 
     turning = 0.025 * largest(np.linalg.norm(motion.w_WB, axis=1))
     assert audited(1.0) < 1e-5 * turning
@@ -188,10 +192,10 @@ def test_absent_forces_at_time_0_are_left_out(case: tuple[Scene, xr.Dataset]) ->
     assert np.isnan(dataset["N"][0])
     assert dataset["N"].to_numpy()[1:] == pytest.approx(whole["N"].to_numpy()[1:], rel=1e-14)
     lost = float(whole["energy"][0] - whole["energy"][-1])
-    balance = energy_balance(rolling_ball(scene), of_ball(dataset))
+    balance = energy_balance(on_wall(scene), of_ball(dataset))
     assert len(balance) == len(TIMES) - 1
     assert largest(balance) < 1e-9 * lost
-    assert largest(force_audit(rolling_ball(scene), of_ball(dataset))) < 1e-6 * float(whole["N"].max())
+    assert largest(force_audit(on_wall(scene), of_ball(dataset))) < 1e-6 * float(whole["N"].max())
     samples[1] = dataclasses.replace(samples[1], contact_force=np.full((1, 3), np.nan))
     assert "N" not in from_samples(scene, TIMES, samples), "only time 0 may lack a force"
 

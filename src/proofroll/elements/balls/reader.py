@@ -6,24 +6,25 @@ Each ball is a mechanism of its own: a free body, a sphere, a wall in the world 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Union
 
 import numpy as np
+from pydantic import Field
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
+from proofroll.core.validation import strict, units_of, validated
+from proofroll.elements.balls.surfaces import Cylinder, surface_kinds
+from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.contacts.on_wall import LocalStart
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.run.reader import started
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
-from proofroll.elements.mechanism.scene.checks import WORLD, Vector
-from proofroll.elements.mechanism.scene.joint import Joint
+from proofroll.elements.mechanism.scene.checks import Vector
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.elements.mechanism.scene.model import Mechanism
-from proofroll.elements.mechanism.scene.parts import Body
 from proofroll.elements.mechanism.scene.rotations import Array, cross
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair, declared_wall
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace
@@ -31,33 +32,26 @@ from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, Declared
 from proofroll.elements.mechanism.scene.shapes.walls.charts import WallCoordinates, wall_coordinates
 from proofroll.elements.mechanism.scene.signal import Formula
 
+if TYPE_CHECKING:
+    AnySurface = Any
+else:
+    AnySurface = Union[surface_kinds()]  # noqa: UP007 -- of a tuple
 # Slip at the start, relative to the speed of the ball, that counts as round-off of rolling.
 _ROUND_OFF = 1e-12
 
 
-class SurfaceTable(Protocol):
-    """A table of ``[[surfaces]]``; its further fields are those of its kind."""
-
-    @property
-    def name(self) -> str:
-        """Name that contacts use."""
-
-    @property
-    def kind(self) -> str:
-        """Kind of wall."""
-
-    @property
-    def units(self) -> tuple[str, str]:
-        """Units of its coordinates."""
-
-
 @dataclass(frozen=True)
-class BallTables:
-    """Tables of a scene file that describe balls on walls, but for the surfaces, whose kinds packages may add."""
+class _Tables:
+    """Tables of a scene file that describe balls on surfaces."""
 
     balls: tuple[Ball, ...]
     contacts: tuple[Contact, ...]
     initial: tuple[InitialMotion, ...]
+    surfaces: tuple[Annotated[AnySurface, Field(discriminator="kind")], ...] = field(default=())
+
+
+strict(_Tables, Ball, Contact, InitialMotion, *surface_kinds())
+UNITS: Mapping[str, str] = units_of(Ball, Contact, InitialMotion, *surface_kinds())
 
 
 class PlacedBall(NamedTuple):
@@ -70,58 +64,61 @@ class PlacedBall(NamedTuple):
     number: int = 0
 
 
-def placed_balls(
-    contents: BallTables,
-    surfaces: Sequence[SurfaceTable],
-    initial: Sequence[Mapping[str, Any]],
-    numbers: Parameters,
-    where: str,
-) -> Iterator[PlacedBall]:
-    """Each contact of the tables with the ball, the surface and the start that it names.
+def placed_balls(tables: Mapping[str, Any], numbers: Parameters, file: str) -> Iterator[PlacedBall]:
+    """Each contact of a file with the ball, the surface and the start that it names.
 
     Args:
-        contents: the tables.
-        surfaces: of the file.
-        initial: the tables of starts as the file writes them.
+        tables: of balls, surfaces, contacts and starts as the file writes them.
         numbers: the parameters.
-        where: the file, for messages.
+        file: its name, for messages.
 
     Raises:
-        InputError: a name is missing or used twice, or a coordinate has another unit than its surface.
+        InputError: a value is wrong, a name is missing or used twice, a coordinate has another unit than its surface,
+            or a ball is larger than its cylinder.
     """
-    _check_names(contents, surfaces, where)
-    balls, walls = {ball.name: ball for ball in contents.balls}, {surface.name: surface for surface in surfaces}
+    filled = {key: numbers.filled(table, f"{file}: {key}", UNITS) for key, table in tables.items()}
+    contents = validated(_Tables, filled, file)
+    _check_names(contents, file)
+    for surface in contents.surfaces:
+        if isinstance(surface, Declared):
+            surface.checked()
+    balls, walls = {ball.name: ball for ball in contents.balls}, {wall.name: wall for wall in contents.surfaces}
     starts = {start.body: (index, start) for index, start in enumerate(contents.initial)}
     for index, contact in enumerate(contents.contacts):
         if contact.body not in starts:
-            raise InputError(f"{where}: initial", contact.body, "say how this ball starts; add an [[initial]] of it")
+            raise InputError(f"{file}: initial", contact.body, "say how this ball starts; add an [[initial]] of it")
         if any(contact.body == earlier.body for earlier in contents.contacts[:index]):
-            raise InputError(f"{where}: contacts.{index}.body", contact.body, "a ball touches one surface")
-        surface, (number, start) = walls[contact.surface], starts[contact.body]
+            raise InputError(f"{file}: contacts.{index}.body", contact.body, "a ball touches one surface")
+        ball, surface, (number, start) = balls[contact.body], walls[contact.surface], starts[contact.body]
         # Only with the surface are the units of its coordinates known.
-        place = f"{where}: initial.{number}.coordinates"
-        numbers.filled(initial[number].get("coordinates", []), place, {}, surface.units)
-        yield PlacedBall(ball=balls[contact.body], surface=surface, contact=contact, start=start, number=index)
+        place = f"{file}: initial.{number}.coordinates"
+        numbers.filled(tables["initial"][number].get("coordinates", []), place, {}, surface.units)
+        if isinstance(surface, Cylinder):
+            try:
+                surface.offset(ball.radius)
+            except InputError as error:
+                raise error.within(f"{file}: contacts.{index}", contact.body) from None
+        yield PlacedBall(ball=ball, surface=surface, contact=contact, start=start, number=index)
     for name in balls.keys() - {contact.body for contact in contents.contacts}:
-        raise InputError(f"{where}: contacts", name, "this ball touches no surface; add a contact or remove the ball")
+        raise InputError(f"{file}: contacts", name, "this ball touches no surface; add a contact or remove the ball")
 
 
-def _check_names(contents: BallTables, surfaces: Sequence[SurfaceTable], where: str) -> None:
+def _check_names(contents: _Tables, file: str) -> None:
     """Raises InputError unless contacts and starts name balls and surfaces of the file, and all names are unique."""
-    balls, walls = [ball.name for ball in contents.balls], [surface.name for surface in surfaces]
+    balls, walls = [ball.name for ball in contents.balls], [surface.name for surface in contents.surfaces]
     for kind, names in (("balls", balls), ("surfaces", walls)):
         for index, name in enumerate(names):
             if name in names[:index]:
-                raise InputError(f"{where}: {kind}.{index}.name", name, "two have this name; rename one")
+                raise InputError(f"{file}: {kind}.{index}.name", name, "two have this name; rename one")
     for kind, items in (("contacts", contents.contacts), ("initial", contents.initial)):
         for index, item in enumerate(items):
             for key, known_names in (("body", balls), ("surface", walls)):
                 named = getattr(item, key, None)
                 if named is not None:
-                    require_known(f"{where}: {kind}.{index}.{key}", named, known_names)
+                    require_known(f"{file}: {kind}.{index}.{key}", named, known_names)
 
 
-def ball_as_body(placed: PlacedBall, gravity: Gravity, where: str) -> MechanismElement:
+def ball_as_body(placed: PlacedBall, gravity: Gravity, file: str) -> MechanismElement:
     """Mechanism of a ball on its wall.
 
     A restitution that is left out is 0: the ball stays where it lands.
@@ -137,7 +134,7 @@ def ball_as_body(placed: PlacedBall, gravity: Gravity, where: str) -> MechanismE
             pair = _pair(placed, wall)
         else:
             advice = "what holds by friction slides with some: give a number above 0, or mu_static = 0"
-            raise InputError("mu_kinetic", contact.mu_kinetic, advice).of(f"{where}: contacts.{placed.number}")
+            raise InputError("mu_kinetic", contact.mu_kinetic, advice).of(f"{file}: contacts.{placed.number}")
         free = _free_joint(placed, wall, turning)
         moving = _turning_wall(ball, wall, turning, free)
         mechanism = Mechanism(
@@ -151,21 +148,16 @@ def ball_as_body(placed: PlacedBall, gravity: Gravity, where: str) -> MechanismE
         local = LocalStart(ball.name, placed.start.coordinates, flies)
         return MechanismElement(started(mechanism), local=local)
     except InputError as error:
-        if error.field.startswith(where):
+        if error.field.startswith(file):
             raise
         table = f"contacts.{placed.number}" if error.field.startswith("pairs.") else "initial"
-        raise error.within(f"{where}: {table}", ball.name) from None
-
-
-def wall_name(placed: PlacedBall) -> str:
-    """Name of the wall among the bodies and shapes of its mechanism: the surface's, unless the ball has it."""
-    name: str = placed.surface.name
-    return f"{name}_wall" if name == placed.ball.name else name
+        raise error.within(f"{file}: {table}", ball.name) from None
 
 
 def _wall(placed: PlacedBall) -> tuple[Geometry, float]:
     """Shape of a surface, and the rate at which it turns about its axis [rad/s]."""
-    surface, name = placed.surface, wall_name(placed)
+    surface = placed.surface
+    name = f"{surface.name}_wall" if surface.name == placed.ball.name else surface.name  # of a body and a shape
     if isinstance(surface, Declared):
         return declared_wall(name, surface), 0.0
     turning, tilt = float(getattr(surface, "turning", 0.0)), float(getattr(surface, "tilt", 0.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ import proofroll
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
 from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates
-from proofroll.papers.blajer_2006.projection.geometry import GeneralSurface, Uniform, matrix
+from proofroll.papers.blajer_2006.projection.geometry import Uniform, matrix
 from proofroll.papers.blajer_2006.projection.method import ProjectedBall
 from proofroll.papers.blajer_2006.projection.orientation import EulerAngles, RotatingFrame
 
@@ -133,47 +133,6 @@ def test_without_resistance_no_moment_is_modelled(monkeypatch):
         euler_ball().response(euler_ball().kinematics(x))
 
 
-@dataclass(frozen=True)
-class Torus:
-    """Inside of a ring-shaped tube: curved both ways, by different amounts from point to point; not homogeneous."""
-
-    ring: float = 0.5
-    tube: float = 0.2
-    generators = None
-    length_scales = (0.7, 0.2)
-
-    def frame(self, u):
-        """Columns: out of the tube's middle, along the ring, around the tube."""
-        (ca, sa), (cb, sb) = ((np.cos(angle), np.sin(angle)) for angle in u)
-        return np.array([[cb * ca, -sa, -sb * ca], [cb * sa, ca, -sb * sa], [sb, 0, cb]])
-
-    def tangents(self, u):
-        """Along the frame's e2 and e3."""
-        return self.frame(u)[:, 1:] * [self.ring + self.tube * np.cos(u[1]), self.tube]
-
-    def second(self, u):
-        """Derivatives of the tangents."""
-        frame, (a, b) = self.frame(u), u
-        result = np.zeros((3, 2, 2))
-        result[:, 0, 0] = -(self.ring + self.tube * np.cos(b)) * np.array([np.cos(a), np.sin(a), 0])
-        result[:, 0, 1] = result[:, 1, 0] = -self.tube * np.sin(b) * frame[:, 1]
-        result[:, 1, 1] = -self.tube * frame[:, 0]
-        return result
-
-
-@pytest.mark.parametrize("u", [(0.3, 0.4), (-2.0, 2.5)])
-@pytest.mark.parametrize("surface", [Torus(), UprightCylinder("wall", 0.2, 0.3)])
-def test_turning_of_the_frame_follows_from_its_definition(surface, u):
-    """Fᵀ ∂F/∂u, which is derived from tangents and second derivatives, is what differences of the frame give."""
-    u = np.asarray(u)
-    steps = 1e-6 * np.eye(2)
-    slopes = np.stack([(surface.frame(u + h) - surface.frame(u - h)) / 2e-6 for h in steps], axis=-1)
-    expected = np.einsum("ji,jkl->ikl", surface.frame(u), slopes)
-    found = np.reshape(GeneralSurface(surface).at(u)[1].turning, (2, 3))
-    axes = np.stack([expected[2, 1], expected[0, 2], expected[1, 0]], axis=1)
-    np.testing.assert_allclose(found, axes, atol=1e-9)  # 1e-16 / 1e-6, with a margin
-
-
 @SEEDS
 @pytest.mark.parametrize("orientation", [EulerAngles, RotatingFrame])
 @pytest.mark.parametrize("surface", [UprightCylinder("wall", 0.2), UprightCylinder("wall", 0.2, 0.3)])
@@ -196,9 +155,6 @@ def test_any_axis_any_orientation(surface, orientation, seed):
 
 @pytest.mark.parametrize("u", [(0.0, 0.0), (40.0, -3.0)])
 @pytest.mark.parametrize("surface", [UprightCylinder("wall", 0.2), UprightCylinder("wall", 0.2, 0.3)])
-def test_uniform_geometry_is_the_general_one(surface, u):
-    """On a cylinder the precomputed geometry equals the one evaluated on the spot."""
-    found, expected = Uniform(surface).at(u), GeneralSurface(surface).at(u)
-    close(found[0], expected[0])
-    for one, other in zip(found[1], expected[1], strict=True):
-        close(one, other)
+def test_the_frame_is_that_of_the_surface(surface, u):
+    """The frame at a place is the one at the start, turned about the axis."""
+    close(matrix(Uniform(surface).at(u)), surface.frame(u))
