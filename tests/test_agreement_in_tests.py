@@ -21,9 +21,9 @@ import proofroll
 from proofroll.cli import app
 from proofroll.core.errors import InputError
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read, write
+from proofroll.papers.blajer_2006.ball.sampling import BallSample
 from proofroll.running.simulation import build, simulate
 from proofroll.testing import assert_agrees
 

@@ -17,10 +17,10 @@ import yaml
 
 from proofroll.cli.report import report
 from proofroll.core.engine import Sample
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.files.comparison_file import comparison_names, further_comparison_names
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 from proofroll.running.idle_workers import Workers
 
 ROOT = Path(__file__).resolve().parents[1]

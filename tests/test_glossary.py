@@ -13,7 +13,7 @@ import pytest
 
 from proofroll.core.plugins import engine_names
 from proofroll.core.verdict import Verdict
-from proofroll.elements.ball_on_surface.surfaces import surface_kinds
+from proofroll.elements.balls.surfaces import surface_kinds
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.walls.charts import wall_coordinates
 from proofroll.files.scene_file import load_scene

@@ -19,6 +19,7 @@ from proofroll.core.comparison import Band, ExceptAt, Row, Tolerance
 from proofroll.core.diagnosis import Cause
 from proofroll.files.json_data import MERGED
 from proofroll.papers.blajer_2006.slip.onset import EngineOnset, OnsetStudy
+from proofroll.papers.blajer_2006.truth.onset import Onset
 from proofroll.report.comparison.records import (
     ReportedComparison,
     ReportedRow,
@@ -65,7 +66,6 @@ from proofroll.studies.tradeoff.records import (
     TradeoffStudy,
     TruthCost,
 )
-from proofroll.truth.ball_on_surface.onset import Onset
 from proofroll_drill.mutants.drilling import Mutated
 from proofroll_drill.row import Drilled
 

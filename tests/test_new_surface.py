@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from proofroll.core import plugins
-from proofroll.elements.ball_on_surface import kind
-from proofroll.elements.ball_on_surface.surfaces import surface_kinds
+from proofroll.elements.balls import kind, reader
+from proofroll.elements.balls.surfaces import surface_kinds
 from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.json_data import plain
@@ -86,6 +86,7 @@ ladder = [2, 1, 0.5]
 def _look_again() -> None:
     """What is installed is looked up once in a process."""
     surface_kinds.cache_clear()
+    importlib.reload(reader)
     importlib.reload(kind)
     plugins.load_element_kinds.cache_clear()
 

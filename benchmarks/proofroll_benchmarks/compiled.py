@@ -12,8 +12,8 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.heyoka_library import TIGHTEST
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.running.simulation import build
 from proofroll_benchmarks.first_slip import FirstSlip, Model, first_slip
 from proofroll_benchmarks.first_slips import first_slips

@@ -17,9 +17,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.heyoka_library import TIGHTEST, require_heyoka
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.compiled import projection, rolling
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.compiled import projection, rolling
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 
 Model = Literal["reduced", "rotating_frame", "euler"]
 

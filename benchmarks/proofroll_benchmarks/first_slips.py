@@ -19,9 +19,9 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.compiled import rolling
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.compiled import rolling
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll_benchmarks.first_slip import UNREACHABLE, margins, require_supported, slips_at_once
 
 # Parameters of the equations, and the friction.

@@ -17,14 +17,14 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.heyoka_library import require_heyoka
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.truth.onset import first_slip as true_first_slip
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.store import Store
 from proofroll.running.timing import Interval, Timing, machine, ratio, time_in_rounds
-from proofroll.truth.ball_on_surface.onset import first_slip as true_first_slip
 from proofroll_benchmarks.compiled import Onsets, Timed, compiled, numeric
 from proofroll_benchmarks.first_slip import first_slip
 from proofroll_benchmarks.search import SAMPLES, Configuration, search

@@ -10,10 +10,10 @@ from annotated_types import Gt
 
 from proofroll.core.engine import whole_steps
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import newton_euler
-from proofroll.elements.ball_on_surface.model import ROLLS, RollingBall
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.papers.blajer_2006.ball.mechanics import newton_euler
+from proofroll.papers.blajer_2006.ball.model import ROLLS, RollingBall
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 
 
 @dataclass(frozen=True)

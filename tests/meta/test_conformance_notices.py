@@ -27,7 +27,7 @@ from proofroll.conformance import Check, checks, motion, run_check
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.papers.blajer_2006.ball.sampling import BallSample
 from proofroll.running.simulation import simulate
 
 

@@ -13,8 +13,8 @@ from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody
-from proofroll.elements.ball_on_surface.model import ROLLS
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody
+from proofroll.papers.blajer_2006.ball.model import ROLLS
 
 DISTRIBUTION = "aged"
 

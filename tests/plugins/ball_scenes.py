@@ -6,11 +6,11 @@ import pytest
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.ball_on_surface.polar import first_route
-from proofroll.truth.ball_on_surface.switching import follow
+from proofroll.papers.blajer_2006.ball.model import RollingBall
+from proofroll.papers.blajer_2006.ball.motion import BallMotion
+from proofroll.papers.blajer_2006.truth.polar import first_route
+from proofroll.papers.blajer_2006.truth.switching import follow
 
 # Nothing about this motion is zero or symmetric, so a lost sign or a swapped axis shows.
 GENERAL = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}

@@ -17,10 +17,13 @@ from placed_balls import gravity_of, placed, scene_with
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.gravity import Gravity
+from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
-from proofroll.engines.projection import Projection
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
+from proofroll.papers.blajer_2006.projection.settings import ProjectionBallSettings
+
+Projection = load_engine("projection")
 
 
 def _ball(**factors: float) -> Callable[[Scene], Scene]:
@@ -103,7 +106,7 @@ class Broken:
     def __init__(self, scene: Scene, settings: BrokenSettings) -> None:
         kind, self.defect = settings.formulation.split("_")
         self.hidden = kind == "hidden"
-        inner = Projection.settings(formulation="rotating_frame", rtol=settings.rtol)
+        inner = ProjectionBallSettings(formulation="rotating_frame", rtol=settings.rtol)
         self.wrong = Projection.build(BUILT[self.defect](scene), inner).own
         self.right = Projection.build(scene, inner).own
         self.t = 0.0

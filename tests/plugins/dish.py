@@ -7,7 +7,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, Literal
 
-from proofroll.elements.ball_on_surface.surfaces import Revolved
+from proofroll.elements.mechanism.scene.shapes.walls.revolved import Revolved
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,13 +17,13 @@ import numpy as np
 from proofroll.core import certificate
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import initial_response
-from proofroll.elements.ball_on_surface.model import ROLLS
-from proofroll.elements.ball_on_surface.rolling_equations import closed_form
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.elements.mechanism.run import certificate as body_certificate
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.papers.blajer_2006.ball.mechanics import initial_response
+from proofroll.papers.blajer_2006.ball.model import ROLLS
+from proofroll.papers.blajer_2006.ball.rolling_equations import closed_form
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 
 _LEAKED: list[int] = []  # descriptors that an engine keeps
 

@@ -12,9 +12,9 @@ from proofroll.core.engine import whole_steps
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody
-from proofroll.elements.ball_on_surface.model import ROLLS
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody
+from proofroll.papers.blajer_2006.ball.model import ROLLS
 
 # Time at which the wind starts [s].
 _CALM = 0.01

@@ -15,11 +15,13 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.conformance.subject import truth_scenes
 from proofroll.core.events import Event
+from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.element import MechanismElement
-from proofroll.engines.projection import Projection
 from proofroll.engines.projection.settings import ProjectionSettings
 from proofroll.files.scene_file import load_scene
+
+Projection = load_engine("projection")
 
 EVERY = 0.01
 

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.mechanism.run.element import the_mechanism
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 
 
 def gravity(magnitude: float) -> Callable[[Scene], Scene]:

@@ -15,10 +15,10 @@ from tiny import Tiny, TinySettings
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody
-from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody
+from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 
 FAILS: dict[type[Tiny], str] = {}
 

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.surfaces import Cylinder
-from proofroll.elements.ball_on_surface.surfaces.formula import Jet, sqrt, variables
 from proofroll.elements.mechanism import WORLD, Mechanism
+from proofroll.elements.mechanism.scene.shapes.walls.formula import Jet, sqrt, variables
+from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
 from proofroll.truth.bodies.constraint_rows import AXES, NONE, ConstraintRow, ConstraintRows
 from proofroll.truth.bodies.maximal_bodies import BodyInScalars
 from proofroll.truth.bodies.maximal_equations import MaximalEquations
@@ -37,7 +37,7 @@ class RollingContact:
 
     body: str
     radius: float
-    path: Cylinder
+    path: UprightCylinder
 
     def normal(self, r: Sequence[Scalar], v: Sequence[Scalar]) -> tuple[Scalar, list[Scalar], list[Scalar]]:
         """Gap [m], normal e1 towards the wall and its rate [1/s], of a centre at r with velocity v; any scalar type."""

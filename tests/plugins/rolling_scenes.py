@@ -8,11 +8,11 @@ from rolling_rows import RollingContact
 
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import ball_of
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.checks import Vector
+from proofroll.papers.blajer_2006.ball.as_body import ball_of
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 
 
 def rolling_scene(scene: Scene) -> tuple[Mechanism, tuple[RollingContact, ...]]:

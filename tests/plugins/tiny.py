@@ -14,12 +14,12 @@ from placed_balls import placed
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import initial_response
-from proofroll.elements.ball_on_surface.model import ROLLS
-from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.papers.blajer_2006.ball.mechanics import initial_response
+from proofroll.papers.blajer_2006.ball.model import ROLLS
+from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 
 
 @dataclass(frozen=True)

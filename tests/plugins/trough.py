@@ -8,8 +8,8 @@ import dataclasses
 import math
 from typing import Any, Literal
 
-from proofroll.elements.ball_on_surface.surfaces import Declared
-from proofroll.elements.ball_on_surface.surfaces.formula import cos, sin, sqrt
+from proofroll.elements.mechanism.scene.shapes.walls import Declared
+from proofroll.elements.mechanism.scene.shapes.walls.formula import cos, sin, sqrt
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from proofroll.core import heyoka_library as library
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.compiled import rolling
-from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.elements.mechanism.run.contacts.on_wall import energy
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.compiled import rolling
+from proofroll.papers.blajer_2006.ball.rolling_equations import closed_form
 from proofroll.running.simulation import build
 
 needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")

@@ -14,8 +14,8 @@ from proofroll.core.events import events_of
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Plane, Torus
-from proofroll.elements.mechanism.run.balls import PlacedBall, ball_as_body
+from proofroll.elements.balls.reader import PlacedBall, ball_as_body
+from proofroll.elements.balls.surfaces import Bowl, Cone, Plane, Torus
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 from proofroll.elements.mechanism.scene.shapes.walls import BowlWall

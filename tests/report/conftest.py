@@ -28,6 +28,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
 from proofroll.papers.blajer_2006.report.onsets import RunSlips, TrueSlips
+from proofroll.papers.blajer_2006.truth.onset import Onset
 from proofroll.report.comparison.plots import PointCurves
 from proofroll.report.page.growing import begun
 from proofroll.report.page.html import page
@@ -37,7 +38,6 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
-from proofroll.truth.ball_on_surface.onset import Onset
 
 UNTIL, EVERY = 1.0, 0.02
 

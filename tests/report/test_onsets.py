@@ -19,6 +19,7 @@ from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
 from proofroll.papers.blajer_2006.report.onsets import CURVE, bracket, clock, conditioning, mark, slip_table
+from proofroll.papers.blajer_2006.truth.onset import Onset
 from proofroll.report.comparison.plots import Bound, point_curves
 from proofroll.report.comparison.records import ReportedRun
 from proofroll.report.comparison.scores import scores
@@ -31,7 +32,6 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
-from proofroll.truth.ball_on_surface.onset import Onset
 
 UNTIL, EVERY = 2.1, 0.05
 WELL = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.35}

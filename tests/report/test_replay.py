@@ -20,10 +20,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import StoredTrajectory
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.report.kind import BallReport
 from proofroll.papers.blajer_2006.report.replay import AWAY, LENGTH, SLIPS, STICKS, poses
 from proofroll.papers.blajer_2006.report.replay_wall import middle, wall

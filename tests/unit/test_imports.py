@@ -8,6 +8,7 @@ import importlib
 import re
 from collections.abc import Iterator
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from source_code import nodes, statements, tree
 import proofroll
 from proofroll.core.engine import Sample
 from proofroll.core.events import EVENT_ORDER
-from proofroll.core.plugins import load_element_kinds
+from proofroll.core.plugins import load_element_kinds, load_engine
 
 ROOT = Path(proofroll.__file__).parent
 # What may import what. The harness knows neither a kind of element nor an engine nor a truth; these are plug-ins.
@@ -32,12 +33,15 @@ MAY: dict[str, set[str]] = {
     "elements": {"core", "files", "elements"},
     "truth": {"core", "elements", "truth"},
     "mechanism_studies": HARNESS | {"elements", "truth", "mechanism_studies"},
-    "papers": HARNESS | {"elements", "truth", "mechanism_studies", "papers"},  # as a package of somebody else would be
-    "vocabulary": HARNESS | {"elements", "vocabulary"},
     "engines": {"core", "elements", "engines"},
+    # as a package of somebody else would be
+    "papers": HARNESS | {"elements", "truth", "mechanism_studies", "engines", "papers"},
+    "vocabulary": HARNESS | {"elements", "vocabulary"},
     # A plug-in: scenes of mechanisms to be run, and the engines' own importers of robot files.
     "robots": {"core", "files", "running", "studies", "report", "cli", "robots", "elements", "engines"},
 }
+# Engines to which a package adds formulations.
+ENGINES = ["projection", *(name for name in ("exudyn", "mujoco", "pinocchio") if find_spec(name))]
 # Rooms of robots -> those that each builds on, beside the robot as data.
 ROOMS_OF_ROBOTS: dict[str, set[str]] = {
     "files": set(),
@@ -124,7 +128,7 @@ def test_imports_lead_one_way(folder: str) -> None:
 @pytest.mark.parametrize(
     ("place", "text", "line"),
     [
-        ("studies/a.py", "def f():\n    from proofroll.elements.ball_on_surface import model\n", 2),
+        ("studies/a.py", "def f():\n    from proofroll.elements.mechanism import model\n", 2),
         ("core/a.py", "if TYPE_CHECKING:\n    import proofroll.engines.mujoco as m\n", 2),
         ("core/a.py", "from proofroll import elements\n", 1),
         ("core/a.py", "from ..truth import onset\n", 1),
@@ -132,7 +136,7 @@ def test_imports_lead_one_way(folder: str) -> None:
         ("running/a.py", "import proofroll.testing\n", 1),
         ("report/a.py", 'x = 1\nimport_module("proofroll.elements.mechanism.run.kind")\n', 2),
         ("running/a.py", 'import_module(f"proofroll.engines.{name}")\n', 1),
-        ("cli/a.py", 'TEXT = "import x\\nfrom proofroll.truth.ball_on_surface.onset import onset"\n', 1),
+        ("cli/a.py", 'TEXT = "import x\\nfrom proofroll.papers.blajer_2006.truth.onset import onset"\n', 1),
         ("cli/templates/a.txt", "\nfrom proofroll.elements.mechanism import model\n", 2),
         ("studies/a.py", "import proofroll_drill.row\n", 1),
         ("engines/a.py", 'import_module("proofroll_drill.row")\n', 1),
@@ -282,11 +286,24 @@ def test_no_modules_import_each_other() -> None:
     assert circle(leading(ROOT)) == []
 
 
-def test_only_an_adapter_imports_the_balls_of_its_engine() -> None:
-    """Formulations of a ball on a surface are a room that nothing but the engine's table of formulations knows."""
-    files = [file for file in _files(ROOT / "engines") if "ball" not in file.parts and file.name != "adapter.py"]
-    found = [f"{file}:{line}" for file in files for line, name in _imported(file) if ".ball." in f"{name}."]
-    assert found == []
+@pytest.mark.parametrize("engine", ENGINES)
+def test_no_engine_knows_what_is_added_to_it(engine: str) -> None:
+    """No adapter names a formulation that a package adds to it."""
+    added = load_engine(engine).added
+    assert added
+    files = (ROOT / "engines" / engine).rglob("*.py")
+    assert [f"{file}:{line}" for file in files for line, text in _texts(file) if text in added] == []
+
+
+def test_only_their_reader_knows_balls_on_surfaces() -> None:
+    """Of the elements nobody but the vocabulary, which lists its tables, imports the reader of balls on surfaces."""
+    knowing = {
+        file.relative_to(ROOT).parts[0] + "/" + file.stem
+        for file in ROOT.rglob("*.py")
+        for _, name in _imported(file)
+        if name.startswith("proofroll.elements.balls") and ROOT / "elements" / "balls" not in file.parents
+    }
+    assert knowing == {"papers/cylinder", "vocabulary/document"}
 
 
 def test_no_folders_of_studies_import_each_other() -> None:
@@ -294,14 +311,15 @@ def test_no_folders_of_studies_import_each_other() -> None:
     assert circle(folders_of(leading(ROOT), "proofroll.studies")) == []
 
 
-def test_nothing_imports_robots() -> None:
-    """Robots are a plug-in, found by entry points: no module outside their folder imports one of it."""
+@pytest.mark.parametrize("plug_in", ["papers", "robots"])
+def test_nothing_imports_papers_and_robots(plug_in: str) -> None:
+    """Articles and robots are plug-ins, found by entry points: no module outside their folder imports one of it."""
     wrong = [
         f"{file.relative_to(ROOT)}:{line} imports {name}"
         for file in _files(ROOT)
-        if ROOT / "robots" not in file.parents
+        if ROOT / plug_in not in file.parents
         for line, name in _imported(file)
-        if name.split(".")[1:2] == ["robots"]
+        if name.split(".")[1:2] == [plug_in]
     ]
     assert wrong == []
 

@@ -18,9 +18,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 
 GROUP = "proofroll.bare_loops"
 
@@ -65,7 +65,7 @@ def in_vertical_cylinder(scene: Scene) -> RollingBall:
         Refused: the scene is another one.
     """
     body = rolling_ball(scene)
-    vertical = isinstance(body.surface, Cylinder) and body.surface.tilt == 0 and not body.gravity[:2].any()
+    vertical = isinstance(body.surface, UprightCylinder) and body.surface.tilt == 0 and not body.gravity[:2].any()
     if not vertical or body.u0.any():
         raise Refused("the bare loop is written for a vertical cylinder and a start at its zero of angle and height")
     return body

@@ -15,13 +15,13 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.exudyn.ball.carrier import Carrier
-from proofroll.engines.exudyn.ball.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.integration import simulation_settings
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.smooth.redundant import Redundant
+from proofroll.papers.blajer_2006.ball.model import RollingBall
+from proofroll.papers.blajer_2006.exudyn.carrier import Carrier
+from proofroll.papers.blajer_2006.exudyn.rolling_disc import RollingDisc
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 
 Start = tuple[FloatArray, FloatArray]

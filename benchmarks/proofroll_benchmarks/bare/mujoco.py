@@ -15,12 +15,14 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
+from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.mujoco import Mujoco
 from proofroll.engines.mujoco.reproducer import stepped
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
+
+Mujoco = load_engine("mujoco")
 
 _FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 

@@ -17,12 +17,12 @@ from scipy.integrate import DOP853
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.elements.mechanism.scene.joint_kinds import FACTS
 from proofroll.engines.pinocchio.smooth.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 from proofroll_benchmarks.bare.mechanism_loop import MechanismLoop
 from proofroll_benchmarks.bare.steps import dop853

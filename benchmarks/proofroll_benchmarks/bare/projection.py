@@ -15,12 +15,12 @@ from scipy.integrate import DOP853
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.projection.ball.geometry import Uniform
-from proofroll.engines.projection.ball.method import ProjectedBall, start_and_scales
-from proofroll.engines.projection.ball.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates
+from proofroll.papers.blajer_2006.ball.model import RollingBall
+from proofroll.papers.blajer_2006.projection.geometry import Uniform
+from proofroll.papers.blajer_2006.projection.method import ProjectedBall, start_and_scales
+from proofroll.papers.blajer_2006.projection.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 from proofroll_benchmarks.bare.steps import dop853, rk4
 

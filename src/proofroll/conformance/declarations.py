@@ -10,6 +10,7 @@ from proofroll.conformance.subject import require
 from proofroll.core.engine import EPSILON
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError
+from proofroll.core.formulations import extended
 from proofroll.core.plugins import GROUP, resolve_settings
 
 
@@ -18,7 +19,7 @@ def name_is_the_entry_point(engine: Any) -> None:
     points = [point for point in announced(GROUP) if point.name == engine.name]
     require(points, f"no installed package has the entry point {GROUP}: {engine.name}; add it and install the package")
     kind = points[0].load()
-    require(kind is engine, f"the entry point {engine.name} leads to {kind!r} instead of {engine!r}")
+    require(engine in (kind, extended(kind)), f"the entry point {engine.name} leads to {kind!r} instead of {engine!r}")
 
 
 def version_is_told(engine: Any) -> None:

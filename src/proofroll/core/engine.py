@@ -131,6 +131,18 @@ def scheme_of(settings: Any) -> str:
     return str(getattr(settings, "scheme", ""))
 
 
+def presets_of(
+    kind: type[Any], values: Mapping[str, Mapping[str, Mapping[str, Any]]]
+) -> Mapping[str, Mapping[str, Any]]:
+    """Presets, formulation -> preset -> settings of this ``kind``, from the ``values`` that are not its defaults."""
+    return {
+        formulation: {
+            name: kind(**{**own, "formulation": formulation, "preset": name}) for name, own in presets.items()
+        }
+        for formulation, presets in values.items()
+    }
+
+
 # Machine epsilon of the arithmetic in which an engine may compute, by its precision.
 EPSILON: Mapping[str, float] = {"double": 2.0**-52, "single": 2.0**-23}
 

@@ -16,14 +16,16 @@ def announced(group: str) -> tuple[EntryPoint, ...]:
     return tuple(sorted(_everything().select(group=group), key=lambda point: point.name))
 
 
-def loaded(group: str, of: type = type, like: Any = None) -> list[tuple[EntryPoint, Any]]:
-    """Entry points of a group, each with the object that it names.
+def loaded(group: str, of: type = type, like: Any = None, name: str = "") -> list[tuple[EntryPoint, Any]]:
+    """Entry points of a group, or those with a name alone, each with the object that it names.
 
     An entry point is left out, with a warning, if it cannot be loaded, if its object is no instance of ``of`` (by
     default a class), or if the object lacks a member of the protocol ``like``.
     """
     loaded_points = []
     for point in announced(group):
+        if name not in {"", point.name}:
+            continue
         try:
             with contextlib.redirect_stdout(sys.stderr):  # standard output is for data
                 named = point.load()

@@ -136,9 +136,12 @@ def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str,
 def raised_at(error: BaseException) -> str:
     """Line of an adapter that raised an exception, as ``file:line in function``; empty if no adapter did.
 
-    It is the innermost line in the first package outside the harness; lines of libraries that it calls are skipped.
+    It is the innermost line in the first package outside the harness; lines of libraries that it calls are skipped, and
+    those of modules that only pass on (``__tracebackhide__``, as in pytest).
     """
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "importlib" not in frame.filename]
+    traced = zip(traceback.walk_tb(error.__traceback__), traceback.extract_tb(error.__traceback__), strict=True)
+    shown = [summary for (frame, _), summary in traced if not frame.f_globals.get("__tracebackhide__")]
+    frames = [frame for frame in shown if "importlib" not in frame.filename]
     files = [(frame, Path(frame.filename)) for frame in frames]
     ours = [file.is_relative_to(_PACKAGE) and not any(map(file.is_relative_to, _ADAPTERS)) for _, file in files]
     outside = [frame for (frame, _), harness in zip(files, ours, strict=True) if not harness]

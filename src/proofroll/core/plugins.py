@@ -13,6 +13,7 @@ from proofroll.core.element import ElementKind
 from proofroll.core.engine_abilities import MadeFor, SupportsFrom, offered
 from proofroll.core.entry_points import announced, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, raised_at, require_known
+from proofroll.core.formulations import extended
 
 GROUP = "proofroll.engines"
 ELEMENTS = "proofroll.elements"
@@ -36,7 +37,7 @@ def place_of(name: str) -> str:
 
 
 def load_engine(name: str) -> Any:
-    """Class of an engine, loaded into this process.
+    """Class of an engine with the formulations that packages add to it, loaded into this process.
 
     Raises:
         InputError: no installed package announces such an engine, or it belongs to another interpreter.
@@ -63,7 +64,7 @@ def load_engine(name: str) -> Any:
     if oldest and release(kind.version()) < release(oldest):
         fault = f"{name} {kind.version()} is older than its adapter supports, {oldest}"
         raise Missing(f"{fault}; install a later {name}")
-    return kind
+    return extended(kind)
 
 
 def lacking_of(kind: object, *besides: str) -> list[str]:
@@ -201,7 +202,9 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
     """
     from proofroll.core.validation import strict, validated  # pydantic takes a while to import
 
-    fields = [field.name for field in dataclasses.fields(engine.settings)]
+    complete = [settings for presets in engine.presets.values() for settings in presets.values()]
+    kinds = dict.fromkeys([engine.settings, *map(type, complete)])
+    fields = dict.fromkeys(field.name for kind in kinds for field in dataclasses.fields(kind))
     for key, value in options.items():
         require_known(f"{engine.name}: {key}", key, fields, "there is no such setting; choose from", value)
     purposes = engine.made_for if isinstance(engine, MadeFor) else {}
@@ -212,6 +215,8 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
     presets = engine.presets[formulation]
     preset = options.get("preset", "matched" if "matched" in presets else next(iter(presets)))
     require_known(f"{engine.name}: preset", preset, presets, f"{formulation} has")
-    values = {**dataclasses.asdict(presets[preset]), **options}
-    strict(engine.settings, finite=True)
-    return validated(engine.settings, values, engine.name)
+    kind, values = type(presets[preset]), dataclasses.asdict(presets[preset])
+    for key in (name for name in options if name not in values):
+        raise InputError(f"{engine.name}: {key}", options[key], f"{formulation} does not use it; leave it out")
+    strict(kind, finite=True)
+    return validated(kind, {**values, **options}, engine.name)

@@ -13,6 +13,7 @@ from typing import Any
 
 import proofroll
 from proofroll.core.errors import InputError
+from proofroll.core.formulations import added_by
 from proofroll.core.plugins import place_of
 from proofroll.core.source_code import OWN, hash_of, package_of, with_imports
 from proofroll.core.truth import load_truths
@@ -76,10 +77,11 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
 
     kind = load(engine)
     settings = resolve_settings(kind, options, requires)
+    added = added_by(kind, settings.formulation)
     facts = EngineFacts(
         name=engine,
         version=kind.version(),
-        code=_code_of(kind),
+        code=_code_of(kind, *([added.build] if added else [])),
         settings=used(settings),
         resolution=settings.resolution,
         order=settings.order,

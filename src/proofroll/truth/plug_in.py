@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -13,7 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.bounces import with_bounces
 from proofroll.core.dataset import ENDED, ENDS, LAWS
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError, NotUnique
+from proofroll.core.errors import NotUnique
 from proofroll.core.events import with_events
 from proofroll.core.observable import Role
 from proofroll.elements.mechanism.dynamics.named_forces import FIELDS, named_forces
@@ -36,7 +34,6 @@ _BARS = {
     "contact_pull": "pressed", "cone_excess": "pressed",
     "hop_speed": "slip", "energy_gain": "energy", "bushing_forces": "links", "bushing_torques": "links",
 }  # fmt: skip
-_ILL_POSED = "a change of the parameters within their accuracy changes the time of the first slip"
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
 _PREFIXES = {"work.": "work", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
@@ -53,7 +50,7 @@ class MechanismTruth:
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
         """See :func:`proofroll.truth.switched_truth.truth_of`; of motions that are not unique, laws alone."""
-        # imports of a third of a second, which no ball needs
+        # imports of a third of a second, which what has another truth does not need
         from proofroll.truth.singular_poses import branching
         from proofroll.truth.switched_truth import truth_of
 
@@ -132,38 +129,7 @@ class MechanismTruth:
             dataset.attrs["ill_posed"] = "; ".join(filter(None, notes))
         if not element.mechanism.has_events:
             return dataset
-        return _with_onset(element, with_bounces(with_events(dataset, motion.events), motion.bounces))
-
-    @staticmethod
-    def edge_between(element: Element, parameter: str, low: float, high: float, until: float) -> float | None:
-        """Value of static friction at which the first slip of a ball jumps, see :func:`.onset.edge_between`.
-
-        Raises:
-            InputError: ``parameter`` is not ``mu_static``, or the element is no ball in an upright cylinder.
-        """
-        from proofroll.elements.ball_on_surface.as_body import ball_of
-        from proofroll.truth.ball_on_surface.onset import edge_between
-
-        ball = ball_of(element)
-        if parameter != "mu_static" or ball is None:
-            advice = "an edge can be found only for mu_static of a ball in an upright cylinder"
-            raise InputError(parameter, "edge_between", advice)
-        return edge_between(ball, low, high, until)
-
-
-def _with_onset(element: MechanismElement, dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with the conditioning of the first slip of a ball in an upright cylinder."""
-    from proofroll.elements.ball_on_surface.as_body import ball_of
-    from proofroll.truth.ball_on_surface.onset import onset
-
-    ball = ball_of(element)
-    if ball is None or np.isinf(ball.contact.mu_static):
-        return dataset
-    first = onset(ball, min(float(dataset["time"][-1]), float(dataset.attrs.get(ENDS, np.inf))))
-    dataset.attrs["onset"] = json.dumps(dataclasses.asdict(first))
-    if first.verdict == "ill-posed":
-        dataset.attrs.setdefault("ill_posed", _ILL_POSED)
-    return dataset
+        return with_bounces(with_events(dataset, motion.events), motion.bounces)
 
 
 def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, get_args
 from proofroll.core import comparison
 from proofroll.core.entry_points import loaded
 from proofroll.core.gravity import Gravity
-from proofroll.elements.ball_on_surface.surfaces import surface_kinds
+from proofroll.elements.balls.surfaces import surface_kinds
 from proofroll.elements.mechanism import Body, Force, Joint, Loop, Point, Spring
 from proofroll.elements.mechanism.scene import balls
 from proofroll.elements.mechanism.scene.bushing import Bushing

@@ -23,8 +23,11 @@ import numpy as np
 
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
-from proofroll.engines.projection import Projection
+from proofroll.papers.blajer_2006.projection.settings import ProjectionBallSettings
+
+Projection = load_engine("projection")
 
 FOLDER = "PROOFROLL_DRILL"
 _FOREVER = 600.0
@@ -187,7 +190,7 @@ class Drill:
     @staticmethod
     def version() -> str:
         """See :class:`proofroll.core.engine.Engine`."""
-        return Projection.version()
+        return str(Projection.version())
 
     @classmethod
     def build(cls, scene: Scene, settings: DrillSettings) -> Self:
@@ -201,7 +204,7 @@ class Drill:
         self._mark = folder / f"alive-{settings.formulation}"
         self._do("build")
         self._inner = Projection.build(
-            scene, Projection.settings(formulation="rotating_frame", integrator="rk4", dt=settings.dt)
+            scene, ProjectionBallSettings(formulation="rotating_frame", integrator="rk4", dt=settings.dt)
         )
         self._t = 0.0
 
@@ -220,7 +223,7 @@ class Drill:
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`."""
-        right = self._inner.sample()
+        right: Sample = self._inner.sample()
         if self._t == 0:
             return right
         self._do("sample")

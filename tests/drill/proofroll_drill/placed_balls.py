@@ -9,10 +9,10 @@ import numpy as np
 
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.mechanism.run.balls import PlacedBall, ball_as_body
+from proofroll.elements.balls.reader import PlacedBall, ball_as_body
 from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.elements.mechanism.scene.balls import InitialMotion
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 
 
 def placed(scene: Scene) -> PlacedBall:

@@ -12,11 +12,11 @@ from proofroll.core import heyoka_library as library
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Missing, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.ball_on_surface.friction_curve import friction_curve
-from proofroll.truth.ball_on_surface.onset import first_slip as true_first_slip
-from proofroll.truth.ball_on_surface.polar import Polar
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.truth.friction_curve import friction_curve
+from proofroll.papers.blajer_2006.truth.onset import first_slip as true_first_slip
+from proofroll.papers.blajer_2006.truth.polar import Polar
 from proofroll_benchmarks.first_slip import FirstSlip, first_slip
 from proofroll_benchmarks.first_slips import first_slips
 
@@ -75,7 +75,7 @@ def test_random_balls_against_the_other_route(monkeypatch: pytest.MonkeyPatch) -
     """A route that shares no equations with the compiled ones, nor heyoka, finds the same times."""
     balls = random_balls(4)
     found = first_slips(PAPER, 1.0, **balls)
-    monkeypatch.setattr("proofroll.truth.ball_on_surface.friction_curve.first_route", Polar)
+    monkeypatch.setattr("proofroll.papers.blajer_2006.truth.friction_curve.first_route", Polar)
     for index, time in enumerate(found):
         v2, mu, f = (float(balls[key][index]) for key in ("v2", "mu", "f"))
         expected = true_first_slip(rolling_ball(cylinder(speed=v2, mu_static=mu, rolling_resistance=f)), 1.0)

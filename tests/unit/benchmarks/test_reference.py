@@ -15,8 +15,8 @@ from rich.console import Console
 from proofroll.core import heyoka_library as library
 from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import Missing
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store

@@ -15,9 +15,9 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.first_steps import MOST, certificate, derivable, first_steps
 from proofroll.core.multi_element import build
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
-from proofroll.elements.ball_on_surface.sampling import BallBuilt
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt
 from proofroll.running.simulation import simulate
 
 SLOW = load_scene("sphere_in_cylinder", speed=1.2, axial_speed=0.2, radial_spin=5.0, rolling_resistance=5e-4)

@@ -15,9 +15,9 @@ from proofroll.core.arrays import read_only
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, rolling_ball
 from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, rolling_ball
 from proofroll.running.simulation import simulate
 
 SCENES = {**scenes(), **truth_scenes()}

@@ -14,14 +14,14 @@ from placed_balls import placed, scene_with
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.model import ROLLS
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
+from proofroll.elements.balls.surfaces import Cylinder, Plane
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.on_wall import slip_velocity
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.model import ROLLS
 from proofroll.running.case import EngineFacts
 from proofroll.running.cluster import _files
 from proofroll.studies.cases import case_of

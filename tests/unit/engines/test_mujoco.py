@@ -18,12 +18,12 @@ from proofroll.core.certificate import certify, first_difference
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.gravity import Gravity
-from proofroll.core.plugins import resolve_settings
+from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.mechanism.run.sampling import MechanismSample
-from proofroll.engines.mujoco import Mujoco, mjspec
-from proofroll.engines.mujoco.settings import ORDER_OF_TURNING, PRESETS
+from proofroll.engines.mujoco import mjspec
+from proofroll.engines.mujoco.settings import ORDER_OF_TURNING
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
 from proofroll.running.identity import used
@@ -32,6 +32,8 @@ from proofroll.running.simulation import build, simulate
 
 SCENES = scenes()
 CYLINDER = "sphere_in_cylinder"
+Mujoco = load_engine("mujoco")
+PRESETS = Mujoco.presets
 MODELS = [("chart", preset) for preset in PRESETS["chart"]]
 
 

@@ -272,7 +272,6 @@ def test_joints_have_no_contact():
         ({"cone_correction": True, "cone": "pyramidal"}, "cone"),
         ({"curvature": True, "integrator": "implicitfast"}, "integrator"),
         ({"curvature": True, "cone": "pyramidal"}, "cone"),
-        ({"condim": 6}, "condim"),
     ],
 )
 def test_settings_without_effect_are_told(options, field):

@@ -10,8 +10,7 @@ import pytest
 from source_code import nodes
 
 import proofroll.engines
-from proofroll.elements.ball_on_surface.surfaces import surface_kinds
-from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
+from proofroll.elements.balls.surfaces import surface_kinds
 from proofroll.files.scene_file import scene_names
 
 ENGINES = Path(proofroll.engines.__path__[0])
@@ -36,20 +35,16 @@ def setting(node: ast.expr) -> bool:
 
 @pytest.mark.parametrize("engine", sorted(path.name for path in ENGINES.iterdir() if path.is_dir()))
 def test_no_adapter_knows_a_scene_or_a_surface(engine: str) -> None:
-    """No adapter names a scene, or a class or kind of surface: what it asks, it asks of any.
-
-    But what is for the ball in its cylinder alone may name that.
-    """
+    """No adapter names a scene, or a class or kind of surface: what it asks, it asks of any."""
     classes, kinds = {kind.__name__ for kind in surface_kinds()}, {kind.kind for kind in surface_kinds()}
     # One word alone may mean anything else, as MuJoCo's cone of friction; compared with something it does not.
     scene = re.compile(rf"\b({'|'.join(name for name in scene_names() if '_' in name)})\b")
     for path in sorted((ENGINES / engine).rglob("*.py")):
-        own = {Cylinder.__name__} if "ball" in path.parts else set()
         for node in without_docstrings(nodes(path)):
             where = f"{path.name}:{getattr(node, 'lineno', 0)}"
             if isinstance(node, (ast.Name, ast.Attribute, ast.alias)):
                 name = next(getattr(node, key) for key in ("id", "attr", "name") if hasattr(node, key))
-                assert name.rpartition(".")[2] not in classes - own, where
+                assert name.rpartition(".")[2] not in classes, where
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 assert not scene.search(node.value), where
             elif isinstance(node, ast.Compare):

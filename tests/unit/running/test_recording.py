@@ -10,8 +10,8 @@ from hostile import GivesUp, HostileSettings, NotANumber, Oracle
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grid, time_grid
-from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.sampling import BallSample
 from proofroll.running.recording import record
 
 

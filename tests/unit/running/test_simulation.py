@@ -17,9 +17,9 @@ import proofroll
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError, Missing, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.projection import Projection
 from proofroll.files.data_folders import data_folder
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 
 
 @pytest.fixture(autouse=True)

@@ -8,8 +8,8 @@ from tiny import Tiny, TinySettings
 
 from proofroll.core.multi_element import build
 from proofroll.core.time_grid import time_grid
-from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.sampling import BallSample
 from proofroll.running.recording import record
 from proofroll.running.time_case import CleanRuns, clean_runs, is_put_off
 

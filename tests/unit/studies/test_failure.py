@@ -12,8 +12,8 @@ import pytest
 from placed_balls import run_of
 
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.running.case import Result, Status
 from proofroll.studies.failure import LOST_PHASE, Yardstick, meanings, run_outcome
 

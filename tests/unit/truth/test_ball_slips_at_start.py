@@ -13,8 +13,8 @@ from proofroll.core.errors import InputError
 from proofroll.core.events import events_of
 from proofroll.core.gravity import Gravity
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.surfaces import Plane
-from proofroll.elements.mechanism.run.balls import PlacedBall, ball_as_body
+from proofroll.elements.balls.reader import PlacedBall, ball_as_body
+from proofroll.elements.balls.surfaces import Plane
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 from proofroll.files.scene_file import load_scene
 

@@ -1,26 +1,21 @@
 """Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
 
 Mechanisms are bodies in redundant coordinates (:mod:`redundant`), with contacts of spheres (:mod:`spheres`) or discs
-that roll (:mod:`discs`), or its kinematic tree (:mod:`tree`). It has no joint for a sphere that rolls on a curved wall:
-:mod:`carrier` and :mod:`rolling_disc` build one from its items.
+that roll (:mod:`discs`), or its kinematic tree (:mod:`tree`).
 """
 
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, ClassVar
 
-from proofroll.core.engine_abilities import Level, Term, require_provided
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.exudyn.ball import formulations as ball
 from proofroll.engines.exudyn.contact import discs, spheres
 from proofroll.engines.exudyn.contact.discs import Discs
 from proofroll.engines.exudyn.contact.spheres import Spheres
-from proofroll.engines.exudyn.integration import ExudynModel
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.own_lines import own_lines
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
@@ -28,14 +23,13 @@ from proofroll.engines.exudyn.smooth import redundant, tree
 from proofroll.engines.exudyn.smooth.redundant import Redundant
 from proofroll.engines.exudyn.smooth.tree import KinematicTree
 
-OF_MECHANISMS: Mapping[str, type[Redundant | KinematicTree]] = {
+_RUNS: Mapping[str, type[Redundant | KinematicTree]] = {
     "redundant": Redundant,
     "spheres": Spheres,
     "discs": Discs,
     "tree": KinematicTree,
 }
-# Formulations whose joints are given by whole frames (exudyn.HT).
-_WITH_FRAMES = {"carrier", *OF_MECHANISMS}
+NEW_JACOBIAN = "new Jacobian at every step"  # a term
 _SWITCHES = (MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS, MechanismCapability.SATURATION)
 
 
@@ -47,7 +41,6 @@ class Exudyn:
     witness: ClassVar[bool] = False
     oldest: ClassVar[str] = "1.11"  # the oldest that was tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        **ball.PROVIDES,
         "redundant": redundant.PROVIDES,
         "spheres": spheres.PROVIDES,
         "discs": discs.PROVIDES,
@@ -58,7 +51,6 @@ class Exudyn:
         "discs": frozenset({MechanismCapability.UNBOUNDED_FRICTION}),
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        **dict.fromkeys(ball.RUNS, NO_OTHER_BODIES),
         "redundant": redundant.LACKING,
         "spheres": spheres.LACKING,
         "discs": discs.LACKING,
@@ -67,8 +59,6 @@ class Exudyn:
     settings: ClassVar[type[ExudynSettings]] = ExudynSettings
     presets: ClassVar[Mapping[str, Mapping[str, ExudynSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
-        "carrier": Level.CONSTRAINT,
-        "rolling_disc": Level.CONSTRAINT,
         "redundant": Level.CONSTRAINT,
         "spheres": Level.CONTACT,
         "discs": Level.CONSTRAINT,
@@ -76,8 +66,8 @@ class Exudyn:
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
-            name="new Jacobian at every step",
-            formulations=("carrier", "rolling_disc", "redundant", "spheres", "discs"),
+            name=NEW_JACOBIAN,
+            formulations=("redundant", "spheres", "discs"),
             on={"jacobian": "step"},
             off={"jacobian": "reused"},
             because="lets Newton's method end after two or three iterations where an old Jacobian needs seven",
@@ -90,7 +80,6 @@ class Exudyn:
             because="goes on where Newton's method fails at the edge of the friction zone",
         ),
     )
-    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = ball.INHERENT
 
     @staticmethod
     def caveat(settings: ExudynSettings) -> str:
@@ -133,16 +122,10 @@ class Exudyn:
         return defaults
 
     @classmethod
-    def build(cls, scene: Scene, settings: ExudynSettings) -> ExudynModel | RunOnBody:
+    def build(cls, scene: Scene, settings: ExudynSettings) -> Redundant | KinematicTree:
         """See :class:`proofroll.core.engine.Engine`; builds a run of the formulation."""
-        if settings.formulation in _WITH_FRAMES and not hasattr(exu, "HT"):
-            raise Refused(
-                f"{settings.formulation} needs the frames of markers of exudyn 1.13, and this is {cls.version()}"
-            )
-        if settings.formulation in OF_MECHANISMS:
-            return OF_MECHANISMS[settings.formulation](scene, settings)
-        require_provided(cls, settings.formulation, scene)
-        return on_body(ball.RUNS[settings.formulation](rolling_ball(scene), settings), scene)
+        require_frames(settings.formulation)
+        return _RUNS[settings.formulation](scene, settings)
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
@@ -152,3 +135,9 @@ class Exudyn:
         if settings.formulation not in {"redundant", "tree"}:
             raise Refused("the steps of bodies in contact are proofroll's")
         return mechanism_source(cls.build(scene, settings), mechanism_of(scene), settings)
+
+
+def require_frames(formulation: str) -> None:
+    """Checks that joints can be given by whole frames (exudyn.HT). Raises Refused: this Exudyn is too old for it."""
+    if not hasattr(exu, "HT"):
+        raise Refused(f"{formulation} needs the frames of markers of exudyn 1.13, and this is {Exudyn.version()}")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Gt, Interval
 
-from proofroll.core.engine import Scheme
+from proofroll.core.engine import Scheme, presets_of
 from proofroll.core.errors import InputError
 
 
@@ -15,11 +15,9 @@ class ExudynSettings:
     """Settings of Exudyn: model of the scene and integration. A setting that would do nothing is None.
 
     Attributes:
-        formulation: of a ball that rolls in a cylinder: ``carrier`` (rigid ball on a massless carrier, built-in joints
-            only) or ``rolling_disc`` (the engine's rolling-disc joint, re-aimed at every iterate); of mechanisms:
-            ``redundant`` (bodies in redundant coordinates, joints as constraints), ``spheres`` (the same with its
-            penalty contacts of spheres), ``discs`` (with its rolling-disc joint for circles on planes) or ``tree`` (its
-            kinematic tree in joint coordinates).
+        formulation: ``redundant`` (bodies in redundant coordinates, joints as constraints), ``spheres`` (the same with
+            its penalty contacts of spheres), ``discs`` (with its rolling-disc joint for circles on planes) or ``tree``
+            (its kinematic tree in joint coordinates).
         preset: name of the preset that supplies the other values.
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
@@ -37,7 +35,7 @@ class ExudynSettings:
             coefficient of 100, with a zone as much wider.
     """
 
-    formulation: Literal["carrier", "rolling_disc", "redundant", "spheres", "discs", "tree"] = "carrier"
+    formulation: str = "redundant"
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-4
     integrator: Literal["generalized_alpha", "trapezoidal_index2", "rk44", "rk67"] = "trapezoidal_index2"
@@ -80,9 +78,14 @@ class ExudynSettings:
         if value is None:
             return
         # The value may come from the preset, whose integrator the user has replaced: then it is dropped.
-        if value != getattr(PRESETS.get(self.formulation, {}).get(self.preset), name, None):
+        if value != getattr(self._presets().get(self.formulation, {}).get(self.preset), name, None):
             raise InputError(f"exudyn: {name}", value, advice)
         object.__setattr__(self, name, None)
+
+    @staticmethod
+    def _presets() -> "Mapping[str, Mapping[str, ExudynSettings]]":
+        """Presets of the formulations that have these settings."""
+        return PRESETS
 
     @property
     def penalty(self) -> tuple[float, float]:
@@ -97,77 +100,45 @@ EXPLICIT = {"rk44": 4, "rk67": 6}
 # Settings of the penalty contact.
 _OF_CONTACT = ("halvings", "stiffness", "friction_zone")
 
-# ``default`` is Exudyn's own choice of integrator, damping and Newton options at a common step of 1e-3 s. Exudyn's own
-# step, a hundredth of the simulated time, would be 1e-2 s for one second, in which the ball turns by 1.6 rad. So
-# ``default`` shows those options, not a script that sets no step. Only ``spheres`` have Exudyn's adaptive step: see
-# ``simulation_settings``.
-# The tolerance of 1e-8 matters: with rolling resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise of
-# 0.3 N in the carrier's F2. With rigid bodies, ρ = 0.9 stops being stable where the ball turns by more than about 0.3
-# rad per step.
-_OWN: Mapping[str, Any] = {
+# ``default`` is Exudyn's own choice of integrator, damping and Newton options at a common step of 1e-3 s; its own step
+# is a hundredth of the simulated time. Only ``spheres`` have Exudyn's adaptive step: see ``simulation_settings``.
+OWN: Mapping[str, Any] = {
     "dt": 1e-3,
     "integrator": "generalized_alpha",
     "spectral_radius": 0.9,
     "newton_tolerance": 1e-8,
     "jacobian": "reused",
 }
-_VELOCITIES: Mapping[str, Any] = {**_OWN, "integrator": "trapezoidal_index2", "spectral_radius": None}
+VELOCITIES: Mapping[str, Any] = {**OWN, "integrator": "trapezoidal_index2", "spectral_radius": None}
 # Adaptive step and friction zone as Exudyn has them; a stiffness it does not have.
 _PENALTY: Mapping[str, Any] = {"halvings": 10, "stiffness": 1e6, "friction_zone": 1e-3}
-_DAMPED: Mapping[str, Any] = {
-    **_OWN,
-    "dt": 1e-4,
-    "spectral_radius": 0.8,
-    "newton_tolerance": 1e-10,
-    "jacobian": "step",
-}
 
-PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
-    formulation: {
-        preset: ExudynSettings(**{**values, "formulation": formulation, "preset": preset})
-        for preset, values in presets.items()
-    }
-    for formulation, presets in dict[str, dict[str, Mapping[str, Any]]](
-        carrier={
-            "default": _OWN,
-            # A new Jacobian at every step costs less than the seven iterations per step that an old one needs.
-            "matched": {**_VELOCITIES, "dt": 1e-4, "jacobian": "step", "newton_tolerance": 1e-10},
-            # Index 3 keeps the gap closed to round-off (index 2 lets it open by 1e-7 m), slips less and is a little
-            # more accurate without rolling resistance. ρ = 0.8 damps the multipliers enough to stay stable up to half a
-            # radian of spin per step (0.9: up to 0.3) at the price of a tenth more energy error; 0.6 costs twice the
-            # energy error.
-            "tuned": _DAMPED,
-        },
-        rolling_disc={
-            "default": _OWN,
-            # The joint is a constraint on velocities only, and its re-aiming disturbs the multipliers a little at every
-            # step: the damping of generalized-alpha keeps them quiet (ρ as above), the trapezoidal rule lets them ring
-            # (F2 is off by 1e-3 N instead of 2e-5 N, and z by twice as much).
-            "matched": _DAMPED,
-        },
+PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = presets_of(
+    ExudynSettings,
+    dict[str, Mapping[str, Mapping[str, Any]]](
         redundant={
-            "default": _OWN,
+            "default": OWN,
             # Passes singular poses and dependent constraints, and keeps loops closed to round-off. A tolerance of 1e-10
             # takes four fifths of the error out of the forces of stiff small mechanisms; a new Jacobian at every step
             # ends Newton's method where constraints depend on each other.
-            "matched": {**_OWN, "newton_tolerance": 1e-10},
+            "matched": {**OWN, "newton_tolerance": 1e-10},
             # Constraints at velocity level: loops open by 1e-6 m at 1e-3 s, and forces are a hundred times as accurate:
             # on the slider-crank off by 8e-3 of 87 N, at second order. No other reading of multipliers mends that, for
             # exact reactions at these states, 5e-5 rad off themselves, are off by 1.4e-2 N; Newmark's β below 1/4,
             # which Exudyn offers too, and nodes without Euler parameters do worse.
             # Dependent constraints leave Newton's method with more round-off than a tighter tolerance asks for.
-            "tuned": _VELOCITIES,
+            "tuned": VELOCITIES,
         },
         spheres={
-            "default": {**_OWN, **_PENALTY},
+            "default": {**OWN, **_PENALTY},
             # A tenth of the default's creep.
-            "matched": {**_OWN, **_PENALTY, "jacobian": "step", "friction_zone": 1e-4},
+            "matched": {**OWN, **_PENALTY, "jacobian": "step", "friction_zone": 1e-4},
         },
         discs={
-            "default": _OWN,
+            "default": OWN,
             # The joint constrains velocities; the trapezoidal rule tells forces that are some per cent off at any step.
-            "matched": {**_OWN, "newton_tolerance": 1e-10, "jacobian": "step"},
+            "matched": {**OWN, "newton_tolerance": 1e-10, "jacobian": "step"},
         },
         tree={"default": {"dt": 1e-3, "integrator": "rk44"}, "matched": {"dt": 1e-3, "integrator": "rk67"}},
-    ).items()
-}
+    ),
+)

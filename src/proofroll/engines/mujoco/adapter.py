@@ -1,4 +1,4 @@
-"""The adapter: builds, steps and reads MuJoCo for mechanisms and for any ball on any surface."""
+"""The adapter: builds, steps and reads MuJoCo for mechanisms."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -6,20 +6,17 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
-from proofroll.core.engine_abilities import Level, Term, require_provided
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
-from proofroll.core.plugins import resolve_settings
+from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body
-from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.mujoco.ball import run as ball
 from proofroll.engines.mujoco.contact import mechanism_geoms
 from proofroll.engines.mujoco.contact.mechanism_geoms import MujocoGeoms
 from proofroll.engines.mujoco.own_lines import own_lines
 from proofroll.engines.mujoco.running import written
-from proofroll.engines.mujoco.settings import PRESETS, TERMS, MujocoSettings, lowered
+from proofroll.engines.mujoco.settings import PRESETS, MujocoSettings
 from proofroll.engines.mujoco.smooth import mechanism
 from proofroll.engines.mujoco.smooth.mechanism import MujocoMechanism
 
@@ -34,27 +31,27 @@ class Mujoco:
     witness: ClassVar[bool] = False
     oldest: ClassVar[str] = "3.5"  # the first version with mj_copyData, which every sample needs
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        **ball.PROVIDES,
         "joints": mechanism.PROVIDES,
         "geoms": mechanism_geoms.PROVIDES,
     }
     made_for: ClassVar[Mapping[str, frozenset[str]]] = {"geoms": frozenset({MechanismCapability.CONTACT})}
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "chart": NO_OTHER_BODIES,
         "joints": mechanism.LACKING,
         "geoms": mechanism_geoms.LACKING,
     }
     settings: ClassVar[type[Any]] = MujocoSettings
     lines = staticmethod(own_lines)
-    lowered = staticmethod(lowered)
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
-        "chart": Level.CONTACT,
         "joints": Level.CONSTRAINT,
         "geoms": Level.CONTACT,
     }
-    terms: ClassVar[Sequence[Term]] = TERMS
-    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = ball.INHERENT
+    terms: ClassVar[Sequence[Term]] = ()
+
+    @staticmethod
+    def lowered(settings: MujocoSettings) -> Mapping[str, int]:
+        """See :class:`proofroll.core.engine_abilities.LowersOrder`."""
+        return settings.lowered
 
     @staticmethod
     def caveat(settings: MujocoSettings) -> str:
@@ -82,25 +79,14 @@ class Mujoco:
         return defaults | {f"geom {name}": np.asarray(getattr(model, f"geom_{name}")[0]).tolist() for name in geom}
 
     @classmethod
-    def build(cls, scene: Scene, settings: MujocoSettings) -> RunOnBody | MujocoMechanism:
-        """See :class:`proofroll.core.engine.Engine`; ``joints`` and ``geoms`` build a run of a mechanism."""
-        if settings.formulation in _MECHANISMS:
-            return _MECHANISMS[settings.formulation](scene, settings)
-        require_provided(cls, settings.formulation, scene)
-        return on_body(ball.MujocoBall.of(scene, settings), scene)
+    def build(cls, scene: Scene, settings: MujocoSettings) -> MujocoMechanism:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return _MECHANISMS[settings.formulation](scene, settings)
 
     @classmethod
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:
         """MJCF, whose keyframe ``start`` is time 0; see :class:`proofroll.core.engine_abilities.WritesModels`."""
-        return written(cls._startable(scene, settings))
-
-    @classmethod
-    def _startable(cls, scene: Scene, settings: MujocoSettings) -> Any:
-        """MjSpec of a scene, whose keyframe ``start`` is time 0."""
-        if settings.formulation in _MECHANISMS:
-            return _MECHANISMS[settings.formulation](scene, settings).spec()
-        require_provided(cls, settings.formulation, scene)
-        return ball.MujocoBall.startable(scene, settings)
+        return written(cls.build(scene, settings).spec())
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
@@ -108,7 +94,7 @@ class Mujoco:
         from proofroll.engines.mujoco.reproducer import mechanism_source
 
         if settings.formulation not in _MECHANISMS:
-            raise Refused("the steps of a ball on a wall are proofroll's")
+            raise Refused(f"the steps of {settings.formulation} are not MuJoCo's alone")
         return mechanism_source(cls.model_file(scene, settings), mechanism_of(scene))
 
 
@@ -120,7 +106,7 @@ def mjspec(scene: Scene, *, portable: bool = False, **settings: Any) -> mujoco.M
     ``drive.JOINT`` that needs no control.
 
     Args:
-        scene: a ball on a surface, or a mechanism.
+        scene: one that the formulation represents.
         portable: False keeps a state that is not finite as it is; True leaves MuJoCo's automatic reset on, for readers
             that refuse the flag (mujoco_warp).
         **settings: settings of the adapter (``formulation``, ``dt``, ``preset`` …), by default those of ``run``.
@@ -129,7 +115,8 @@ def mjspec(scene: Scene, *, portable: bool = False, **settings: Any) -> mujoco.M
         InputError: a setting that does not exist.
         Refused: MuJoCo cannot represent the scene, or only with values that the adapter sets anew in every step.
     """
-    spec = Mujoco._startable(scene, resolve_settings(Mujoco, settings, scene.requires))
+    engine = load_engine(Mujoco.name)
+    spec = engine.build(scene, resolve_settings(engine, settings, scene.requires)).spec()
     if portable:
         spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return spec

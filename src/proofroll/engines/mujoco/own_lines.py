@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import mujoco
 
 from proofroll.core.errors import Refused
-from proofroll.engines.mujoco.settings import MujocoSettings
+from proofroll.engines.mujoco.settings import PRESETS, MujocoSettings
 from proofroll.engines.mujoco.smooth.mechanism_model import set_integration
 
 
@@ -13,10 +13,10 @@ def own_lines(settings: MujocoSettings) -> list[str]:
     """See :class:`proofroll.core.engine_abilities.TellsLines`: ``<option>`` and ``<default>``, with comments.
 
     Raises:
-        Refused: a ball's chart, which is a model of proofroll's.
+        Refused: an added formulation, as no model of MuJoCo's alone.
     """
-    if settings.formulation == "chart":
-        raise Refused("chart is a ball on joints along the wall, a model of proofroll's; proofroll export writes it")
+    if settings.formulation not in PRESETS:
+        raise Refused(f"{settings.formulation} is a model of proofroll's; proofroll export writes it")
     spec = mujoco.MjSpec()
     set_integration(spec.option, settings)
     settings.soften(spec.default.equality)

@@ -1,4 +1,4 @@
-"""Settings of MuJoCo, the presets of each formulation, and the terms of its model that a setting switches."""
+"""Settings of MuJoCo and the presets of each formulation."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -6,25 +6,20 @@ from typing import Annotated, Any, Literal
 
 import mujoco
 from annotated_types import Ge, Gt, Le
-from pydantic import BeforeValidator
 
 from proofroll.core.engine import Scheme
-from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import InputError, Refused, refuse_first
 from proofroll.core.plugins import release
 from proofroll.elements.mechanism.run.capabilities import ALL_LOOPS, MechanismCapability
 
-# MuJoCo's defaults: step [s], friction, solref [s], solimp (dmin, dmax).
+# MuJoCo's defaults: step [s], solref [s], solimp (dmin, dmax).
 DEFAULT_STEP = 2e-3
-DEFAULT_FRICTION = 1.0
-# Friction against turning about the normal and against rolling: lengths [m], the same for balls of every radius.
-DEFAULT_TURNING, DEFAULT_ROLLING = 5e-3, 1e-4
 DEFAULT_TIME_CONSTANT = 0.02
 DEFAULT_IMPEDANCE = (0.9, 0.95)
 # Order of RK4 for joints with a quaternion; for other joints it is 4 in every version.
 ORDER_OF_TURNING = 4 if release(mujoco.__version__) >= (4,) else 2
-# Least dimensions of a contact (condim) that resist sliding, turning about the normal, and rolling.
-SLIDES, TURNS, ROLLS = 3, 4, 6
+# Least dimensions of a contact (condim) that resist sliding, and turning about the normal.
+SLIDES, TURNS = 3, 4
 # MuJoCo silently clips to these: mjMINIMP, mjMAXIMP, and two steps (refsafe).
 SMALLEST_IMPEDANCE = 1e-4
 LARGEST_IMPEDANCE = 0.9999
@@ -38,16 +33,10 @@ UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
 # Settings that not every formulation has, by formulation.
 _OWN: Mapping[str, tuple[str, ...]] = {
-    "chart": ("cone", "friction", "start", "condim"),
     "joints": ("damping_armature",),
     "geoms": ("damping_armature", "cone_correction", "cone", "curvature"),
 }
 _SOME = tuple(dict.fromkeys(name for names in _OWN.values() for name in names))
-
-
-def _digits_as_number(value: object) -> object:
-    """Converts a text of digits to an int; pydantic does that for other numbers, not for those of a Literal."""
-    return int(value) if isinstance(value, str) and value.isdecimal() else value
 
 
 @dataclass(frozen=True)
@@ -55,10 +44,8 @@ class MujocoSettings:
     """Formulation, time step and the options of contact that matter for rolling.
 
     Attributes:
-        formulation: ``chart``: a ball on joints that follow the cylinder's coordinates, and a plane that is re-posed
-            tangent to the wall at each evaluation of the forces; ``joints``: a mechanism of MuJoCo's joints, tendons
-            and equality constraints, which has no contact and none of its options; ``geoms``: the same with contacts
-            between bodies.
+        formulation: ``joints``: a mechanism of MuJoCo's joints, tendons and equality constraints, which has no contact
+            and none of its options; ``geoms``: the same with contacts between bodies.
         preset: source of the other values.
         dt: step [s].
         integrator: MuJoCo's name of it.
@@ -67,31 +54,23 @@ class MujocoSettings:
             (first number of ``solref``), in steps; None: MuJoCo's default of 0.02 s at every step.
         impedance: constant constraint impedance (``solimp``); 1 would be a rigid contact; None: MuJoCo's default,
             0.9 to 0.95 growing with depth.
-        friction: coefficient that stands for unbounded friction [1]; with less than the scene needs, the ball slips.
-        start: ``touching``: at depth zero, where a soft contact is not loaded yet; ``settled``: at the depth at which
-            the contact already bends the path as the wall does.
         curvature: True if the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
             out (``geoms`` on curved walls).
         cone_correction: True if the adapter takes from the contacts' reference accelerations the lift that MuJoCo's
             convex cone gives to what slips, and the lift by the missing J̇v (``geoms``).
-        condim: dimensions of the contact's friction: 3 slides; 4 also resists turning about the normal, 6 also rolling,
-            with MuJoCo's documented coefficients. No scene asks for either; they are there to be compared.
         damping_armature: True if each joint has the armature h (c + kd) of its damper and servos in place of MuJoCo's
             implicit damping: the same step without contact, and contacts see it (``joints``, ``geoms``).
     """
 
-    formulation: Literal["chart", "joints", "geoms"] = "chart"
+    formulation: str = "joints"
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-3
     integrator: Literal["Euler", "RK4", "implicitfast"] = "RK4"
     cone: Literal["pyramidal", "elliptic"] = "elliptic"
     time_constant: Annotated[float, Ge(SHORTEST_TIME_CONSTANT)] | None = SHORTEST_TIME_CONSTANT
     impedance: Annotated[float, Ge(SMALLEST_IMPEDANCE), Le(LARGEST_IMPEDANCE)] | None = LARGEST_IMPEDANCE
-    friction: Annotated[float, Gt(0)] = UNBOUNDED_FRICTION
-    start: Literal["touching", "settled"] = "settled"
     curvature: bool = False
     cone_correction: bool = False
-    condim: Annotated[Literal[3, 4, 6], BeforeValidator(_digits_as_number)] = 3
     damping_armature: bool = False
 
     @property
@@ -106,16 +85,35 @@ class MujocoSettings:
 
     @property
     def order(self) -> int | None:
-        """Measured order of convergence; :func:`lowered` has the capabilities of a scene that lower it.
+        """Measured order of convergence; :attr:`lowered` has the capabilities of a scene that lower it."""
+        return 4 if self.integrator == "RK4" else 1
 
-        Of mechanisms it is 4 with RK4. A chart with a fixed time constant is a smooth spring, and its limit no hard
-        contact: RK4 has its order for turning bodies there. Other charts have 2.
+    @property
+    def lowered(self) -> Mapping[str, int]:
+        """See :class:`proofroll.core.engine_abilities.LowersOrder`; measured.
+
+        Soft constraints (every loop, dry friction) leave velocities of first order.
         """
-        if self.formulation != "chart":
-            return 4 if self.integrator == "RK4" else 1
-        if self.time_constant is None:
-            return ORDER_OF_TURNING if self.integrator == "RK4" else 1
-        return 2
+        turning: dict[str, int] = dict.fromkeys(_QUATERNIONS, ORDER_OF_TURNING)
+        return turning | dict.fromkeys((*ALL_LOOPS, *_FIRST_ORDER), 1)
+
+    def rules(self) -> Iterator[tuple[bool, str, str]]:
+        """Combinations that MuJoCo would ignore or misread: True if there, name of the setting, advice."""
+        plain, formulation = type(self)(self.formulation), self.formulation
+        reason = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
+        for name in self.unused:
+            yield getattr(self, name) != getattr(plain, name), name, f"{reason}; leave it out"
+        # The other integrators have the implicit damping of their own, or none.
+        explicit = self.damping_armature and self.integrator != "Euler"
+        yield explicit, "integrator", "damping_armature=true needs integrator=Euler"
+        if self.cone_correction:
+            # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
+            yield self.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"
+            yield self.cone == "pyramidal", "cone", "cone_correction=true of a mechanism needs cone=elliptic"
+        if self.curvature:
+            yield self.integrator != "Euler", "integrator", "curvature=true needs integrator=Euler"
+            # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
+            yield self.cone == "pyramidal", "cone", "curvature=true needs cone=elliptic"
 
     @property
     def scheme(self) -> Scheme | str:
@@ -171,27 +169,11 @@ class MujocoSettings:
         """
         return self.velocity_lag * self.own_share / (1 - self.own_share)
 
-    def friction_coefficients(self, mu: float) -> tuple[float, float, float]:
-        """MuJoCo's coefficients of sliding [1], of turning about the normal [m] and of rolling [m]; 0 where unused."""
-        turning = DEFAULT_TURNING if self.condim >= TURNS else 0.0
-        return mu, turning, DEFAULT_ROLLING if self.condim >= ROLLS else 0.0
 
-
+_QUATERNIONS = MechanismCapability.SPHERICAL, MechanismCapability.FREE
 _FIRST_ORDER = tuple(
     MechanismCapability[name] for name in ("JOINT_FRICTION", "STOPS", "COUPLINGS", "SATURATION", "CONTACT")
 )
-
-
-def lowered(settings: MujocoSettings) -> Mapping[str, int]:
-    """See :class:`proofroll.core.engine_abilities.LowersOrder`; measured.
-
-    Soft constraints (every loop, dry friction) leave velocities of first order. The torque of rolling resistance uses a
-    normal force that is extrapolated linearly in time.
-    """
-    if settings.formulation == "chart":
-        return {MechanismCapability.TURNING_FRICTION: 2}
-    turning: dict[str, int] = dict.fromkeys((MechanismCapability.SPHERICAL, MechanismCapability.FREE), ORDER_OF_TURNING)
-    return turning | dict.fromkeys((*ALL_LOOPS, *_FIRST_ORDER), 1)
 
 
 def check(settings: MujocoSettings) -> None:
@@ -200,32 +182,11 @@ def check(settings: MujocoSettings) -> None:
     Raises:
         InputError: the first such combination.
     """
-    refuse_first("mujoco", settings, _rules(settings))
+    refuse_first("mujoco", settings, settings.rules())
     if settings.own_share >= 1:
         # MuJoCo's damping would supply all of J̇v or more of it: nothing is left to add.
         advice = f"curvature=true needs impedance times time_constant above 1, not {1 / settings.own_share:.4g}"
         raise InputError("mujoco: impedance", settings.impedances[1], advice)
-
-
-def _rules(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
-    plain, formulation = MujocoSettings(settings.formulation), settings.formulation
-    reason = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
-    soft = settings.cone == "pyramidal" and settings.friction > LARGEST_PYRAMIDAL_FRICTION and formulation == "chart"
-    advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
-    yield soft, "friction", advice
-    for name in settings.unused:
-        yield getattr(settings, name) != getattr(plain, name), name, f"{reason}; leave it out"
-    # The other integrators have the implicit damping of their own, or none.
-    explicit = settings.damping_armature and settings.integrator != "Euler"
-    yield explicit, "integrator", "damping_armature=true needs integrator=Euler"
-    if settings.cone_correction:
-        # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
-        yield settings.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"
-        yield settings.cone == "pyramidal", "cone", "cone_correction=true of a mechanism needs cone=elliptic"
-    if settings.curvature:
-        yield settings.integrator != "Euler", "integrator", "curvature=true needs integrator=Euler"
-        # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
-        yield settings.cone == "pyramidal", "cone", "curvature=true needs cone=elliptic"
 
 
 def check_restitution(settings: MujocoSettings) -> None:
@@ -238,21 +199,6 @@ def check_restitution(settings: MujocoSettings) -> None:
 
 
 PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
-    "chart": {
-        # Coordinates and integrator belong to the formulation; only the contact has MuJoCo's defaults.
-        "default": MujocoSettings(
-            "chart",
-            "default",
-            dt=DEFAULT_STEP,
-            cone="pyramidal",
-            time_constant=None,
-            impedance=None,
-            friction=DEFAULT_FRICTION,
-            start="touching",
-        ),
-        # In these coordinates J̇v vanishes, so documented options are also the best known ones.
-        "matched": MujocoSettings("chart", "matched"),
-    },
     "joints": {
         # Loops are springs of 0.02 s, whatever the step.
         "default": MujocoSettings(
@@ -284,30 +230,3 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
         ),
     },
 }
-
-
-TERMS = (
-    Term(
-        name="friction against turning (condim 4)",
-        formulations=("chart",),
-        on={"condim": TURNS},
-        off={"condim": SLIDES},
-        because="resists the spin about the normal, which decides the ball's motion on a curved wall",
-        rung=True,
-    ),
-    Term(
-        name="friction against turning and rolling (condim 6)",
-        formulations=("chart",),
-        on={"condim": ROLLS},
-        off={"condim": SLIDES},
-        because="looks like rolling resistance, but sliding, turning and rolling share one cone",
-        rung=True,
-    ),
-    Term(
-        name="settled start",
-        formulations=("chart",),
-        on={"start": "settled"},
-        off={"start": "touching"},
-        because="starts the soft contact at the depth at which it already bends the path as the wall does",
-    ),
-)

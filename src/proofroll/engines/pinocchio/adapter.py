@@ -5,19 +5,16 @@ from typing import Any, ClassVar
 
 import pinocchio as pin
 
-from proofroll.core.engine_abilities import Level, Term, require_provided
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody
-from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.pinocchio.ball import formulations as ball
 from proofroll.engines.pinocchio.contact import impulses
 from proofroll.engines.pinocchio.contact.impulse_run import ImpulseRun
 from proofroll.engines.pinocchio.own_lines import own_lines
-from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings, lowered
+from proofroll.engines.pinocchio.settings import PRESETS, PinocchioSettings
 from proofroll.engines.pinocchio.smooth import constraint_dynamics, joint_tree
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
 
@@ -33,7 +30,6 @@ class Pinocchio:
     witness: ClassVar[bool] = False
     oldest: ClassVar[str] = "3.9"  # oldest version tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        **ball.PROVIDES,
         "null_space": joint_tree.PROVIDES,
         "constraint_dynamics": constraint_dynamics.PROVIDES,
         "impulses": impulses.PROVIDES,
@@ -42,33 +38,22 @@ class Pinocchio:
         "impulses": frozenset(MechanismCapability[name] for name in ("CONTACT", "JOINT_FRICTION", "STOPS"))
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "composite": NO_OTHER_BODIES,
         "null_space": joint_tree.LACKING,
         "constraint_dynamics": constraint_dynamics.LACKING,
         "impulses": impulses.LACKING,
     }
     settings: ClassVar[type[Any]] = PinocchioSettings
     lines = staticmethod(own_lines)
-    lowered = staticmethod(lowered)
     presets: ClassVar[Mapping[str, Mapping[str, PinocchioSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
-        "composite": Level.CONSTRAINT,
         "null_space": Level.CONSTRAINT,
         "constraint_dynamics": Level.CONSTRAINT,
         "impulses": Level.CONTACT,
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
-            name="orientation",
-            formulations=("composite",),
-            on={"orientation": True},
-            off={"orientation": False},
-            because="turns the ball's own axes; its inertia is the same about all of them, so the motion does not "
-            "ask for it",
-        ),
-        Term(
             name="projection",
-            formulations=("composite", "null_space", "constraint_dynamics"),
+            formulations=("null_space", "constraint_dynamics"),
             on={"projection": True},
             off={"projection": False},
             because="puts the state back on the constraints after each step",
@@ -82,6 +67,11 @@ class Pinocchio:
         return f"integrated by proofroll{around} (Pinocchio has no integrator)"
 
     family = staticmethod(impulses.family)
+
+    @staticmethod
+    def lowered(settings: PinocchioSettings) -> Mapping[str, int]:
+        """See :class:`proofroll.core.engine_abilities.LowersOrder`."""
+        return settings.lowered
 
     @staticmethod
     def version() -> str:
@@ -99,17 +89,10 @@ class Pinocchio:
         return defaults | {"gravity": pin.Model().gravity.linear.tolist()}
 
     @classmethod
-    def build(cls, scene: Scene, settings: PinocchioSettings) -> RunOnBody | MechanismRun:
+    def build(cls, scene: Scene, settings: PinocchioSettings) -> MechanismRun:
         """See :class:`proofroll.core.engine.Engine`; returns a run of the formulation."""
         if settings.formulation in _OF_PINOCCHIO_4 and release(cls.version()) < (4,):
             raise Refused(f"{settings.formulation} needs the constraints of pinocchio 4.0, and this is {cls.version()}")
-        if settings.formulation in OF_MECHANISMS:
-            return _of_mechanism(scene, settings)
-        require_provided(cls, settings.formulation, scene)
-        return ball.ball_run(scene, settings)
-
-
-def _of_mechanism(scene: Scene, settings: PinocchioSettings) -> MechanismRun:
-    mechanism, formulation = mechanism_of(scene), settings.formulation
-    require(mechanism, Pinocchio.provides[formulation], Pinocchio.lacking[formulation])
-    return (ImpulseRun if formulation == "impulses" else MechanismRun)(mechanism, settings)
+        mechanism, formulation = mechanism_of(scene), settings.formulation
+        require(mechanism, cls.provides[formulation], cls.lacking[formulation])
+        return (ImpulseRun if formulation == "impulses" else MechanismRun)(mechanism, settings)

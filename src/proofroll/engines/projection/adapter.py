@@ -4,38 +4,30 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import proofroll
-from proofroll.core.engine_abilities import Level, Term, require_provided
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.heyoka_library import with_heyoka
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody
-from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
-from proofroll.engines.projection.ball import run as ball
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.smooth import mechanism
 from proofroll.engines.projection.smooth.mechanism import ProjectionMechanism
 
+ELIMINATION = "elimination of violations"  # a term
+
 
 class Projection:
-    """Blajer's projection method, for a ball on any surface that guides it and for mechanisms."""
+    """Blajer's projection method for mechanisms."""
 
     name: ClassVar[str] = "projection"
     title: ClassVar[str] = "projection solver"
     witness: ClassVar[bool] = True
-    provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        **ball.PROVIDES,
-        "dependent": mechanism.PROVIDES,
-    }
-    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = dict.fromkeys(ball.FORMULATIONS, NO_OTHER_BODIES)
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"dependent": mechanism.PROVIDES}
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
-    levels: ClassVar[Mapping[str, Level]] = {
-        **dict.fromkeys(ball.FORMULATIONS, Level.PROJECTION),
-        "dependent": Level.CONSTRAINT,
-    }
+    levels: ClassVar[Mapping[str, Level]] = {"dependent": Level.CONSTRAINT}
     terms: ClassVar[Sequence[Term]] = (
         Term(
-            name="elimination of violations",
+            name=ELIMINATION,
             formulations=tuple(PRESETS),
             on={"elimination": True},
             off={"elimination": False},
@@ -43,7 +35,6 @@ class Projection:
             "coefficients, as in the rotating frame, there is none",
         ),
     )
-    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = ball.INHERENT
 
     @staticmethod
     def family(_: ProjectionSettings) -> Mapping[str, str]:
@@ -56,9 +47,6 @@ class Projection:
         return with_heyoka(proofroll.__version__)
 
     @classmethod
-    def build(cls, scene: Scene, settings: ProjectionSettings) -> RunOnBody | ProjectionMechanism:
-        """See :class:`proofroll.core.engine.Engine`; ``dependent`` gives a run of a mechanism."""
-        if settings.formulation == "dependent":
-            return ProjectionMechanism(scene, settings)
-        require_provided(cls, settings.formulation, scene)
-        return ball.ball_run(scene, settings)
+    def build(cls, scene: Scene, settings: ProjectionSettings) -> ProjectionMechanism:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return ProjectionMechanism(scene, settings)

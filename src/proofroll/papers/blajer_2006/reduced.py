@@ -16,17 +16,17 @@ from proofroll.core.errors import Diverged, Refused, refuse_first
 from proofroll.core.heyoka_library import TIGHTEST, require_heyoka, with_heyoka
 from proofroll.core.integrators import DormandPrince853
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.elements.ball_on_surface.compiled.rolling import parameters, reduced
-from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
-from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
-from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import NO_OTHER_BODIES, ROLLS, RollingBall
-from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
-from proofroll.elements.ball_on_surface.rolling_equations import closed_form, placed, reduced_rates, start
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.papers.blajer_2006.ball.compiled.rolling import parameters, reduced
+from proofroll.papers.blajer_2006.ball.compiled.rolling import start as start_along_arc
+from proofroll.papers.blajer_2006.ball.compiled.series import Series, still_moving
+from proofroll.papers.blajer_2006.ball.mechanics import natural_speed
+from proofroll.papers.blajer_2006.ball.model import NO_OTHER_BODIES, ROLLS, RollingBall
+from proofroll.papers.blajer_2006.ball.motion import BallMotion, world_motion
+from proofroll.papers.blajer_2006.ball.rolling_equations import closed_form, placed, reduced_rates, start
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
 
 # Least step as a part of the interval to the next sample; a shorter one means divergence.
 _STUCK = 1e-12

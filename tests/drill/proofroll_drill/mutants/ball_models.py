@@ -9,10 +9,10 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import newton_euler
-from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.mechanics import newton_euler
+from proofroll.papers.blajer_2006.ball.model import RollingBall
+from proofroll.papers.blajer_2006.ball.sampling import BallSample
 from proofroll_drill.mutants.base import STEP, Honest, Mutant
 from proofroll_drill.placed_balls import gravity_of, placed, scene_with
 

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.sampling import BallSample
 from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.mechanics import newton_euler
-from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.papers.blajer_2006.ball.mechanics import newton_euler
+from proofroll.papers.blajer_2006.ball.sampling import BallSample
 from proofroll_drill.mutants.ball_models import RESISTED, NewtonMutant
 from proofroll_drill.mutants.base import OneStepBehind
 

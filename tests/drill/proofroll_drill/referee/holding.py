@@ -12,11 +12,11 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.events import JUMPS, events_of
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.balls.reader import PlacedBall, ball_as_body
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.run.assembly import check_start
-from proofroll.elements.mechanism.run.balls import PlacedBall, ball_as_body
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.smooth_truth import find_truth

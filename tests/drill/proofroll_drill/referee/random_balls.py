@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.gravity import Gravity
-from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Cylinder, Plane, Torus
+from proofroll.elements.balls.surfaces import Bowl, Cone, Cylinder, Plane, Torus
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 
 WALLS = ("plane", "cylinder", "bowl", "cone", "torus")

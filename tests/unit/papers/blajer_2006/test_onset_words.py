@@ -16,10 +16,10 @@ from proofroll.core.events import Event
 from proofroll.papers.blajer_2006.commands import _onset_table
 from proofroll.papers.blajer_2006.report.onsets import TrueSlips, conditioning
 from proofroll.papers.blajer_2006.slip.onset import EngineOnset, OnsetStudy, onset_study, summary
+from proofroll.papers.blajer_2006.truth.onset import Onset
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.truth.ball_on_surface.onset import Onset
 
 AT_ONCE = Onset(0.0, None, None, None, 0.21, 20.0, 1e-3, "well-posed", 0.0, 0.0)
 

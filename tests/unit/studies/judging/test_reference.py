@@ -14,15 +14,15 @@ from proofroll.core.engine_abilities import SharesEquations
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Allowance, RunCurve, Verdict, judge_curve
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.reduced import Reduced
+from proofroll.papers.blajer_2006.truth.rolling import reduced
 from proofroll.running.case import Result, Status
 from proofroll.running.identity import resolve
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference, _true_curves
 from proofroll.studies.tradeoff.curve import CurvePoint, with_errors
-from proofroll.truth.ball_on_surface.rolling import reduced
 
 
 def reference(**curves: list[float]) -> Reference:

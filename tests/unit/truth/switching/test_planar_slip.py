@@ -11,13 +11,13 @@ from placed_balls import placed
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.contact.acting import Acting
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.truth.numerics.picard import PicardSteps
 from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.switching import contact_taylor, stopping_slip

@@ -16,11 +16,11 @@ from scipy.integrate import solve_ivp
 
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import resistance_moment
-from proofroll.elements.ball_on_surface.model import ROLLS, RollingBall
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.papers.blajer_2006.ball.mechanics import resistance_moment
+from proofroll.papers.blajer_2006.ball.model import ROLLS, RollingBall
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
 from proofroll_drake.settings import DrakeSettings
 
 PROVIDES: frozenset[str] = ROLLS | {MechanismCapability.ORIENTATION}

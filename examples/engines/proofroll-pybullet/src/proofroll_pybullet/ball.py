@@ -15,11 +15,11 @@ import numpy as np
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, RollingBall
-from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.papers.blajer_2006.ball.mechanics import natural_acceleration
+from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL, RollingBall
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,9 +8,9 @@ from decimal import Decimal, InvalidOperation
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.time_grid import time_grid
 from proofroll.core.validation import validated
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_file
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.figures.definition import CRITERIA, Figure, Figures, Statement
 from proofroll.papers.blajer_2006.figures.measures import MEASURES
 from proofroll.papers.blajer_2006.figures.quantities import known

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import parse_engine
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.figures.definition import Figures
 from proofroll.papers.blajer_2006.figures.quantities import TIME, known, quantity
 from proofroll.running.case import Case, EngineFacts, Result, Status

@@ -3,8 +3,8 @@
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.report.pen import Drawing, View, across, circle, turn
 
 _BALL = 84.0  # radius of the ball [px]
@@ -92,7 +92,7 @@ def _forward(body: RollingBall) -> FloatArray:
 _SIZE = 128.0  # half the width of the drawn part of a wall [px]
 
 
-def overview(wall: Cylinder, body: RollingBall) -> list[Drawing]:
+def overview(wall: UprightCylinder, body: RollingBall) -> list[Drawing]:
     """Drawings of the cylinder cut open, and of the contact enlarged.
 
     The first has the axis, radii, the circle of the centre, the ball at its start and later.
@@ -126,7 +126,7 @@ def overview(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1))]
 
 
-def _tube(drawn: Drawing, view: View, wall: Cylinder, top: float, bottom: float) -> None:
+def _tube(drawn: Drawing, view: View, wall: UprightCylinder, top: float, bottom: float) -> None:
     """Draws rims and outline of a cylinder; the part behind is dashed."""
     round_ = turn(0, 2 * np.pi)
     facing = view.towards(wall.frame(_ring(round_, 0.0))[..., :, 0])

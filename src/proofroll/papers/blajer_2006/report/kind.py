@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import ball_of, rolling_ball
 from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.papers.blajer_2006.ball.as_body import ball_of, rolling_ball
 from proofroll.papers.blajer_2006.report import onsets
 from proofroll.report.kinds import ReportKind
 

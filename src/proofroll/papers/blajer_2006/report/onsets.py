@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 from proofroll.core.events import Event, EventKind, events_of
 from proofroll.core.number_format import number
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.json_data import OPTIONAL
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.slip.onset import onset_verdict as judged_onset
+from proofroll.papers.blajer_2006.truth.onset import Onset
 from proofroll.report.comparison.plots import Bound, Mark, PointCurves
 from proofroll.studies.comparison.planning import point_name
-from proofroll.truth.ball_on_surface.onset import Onset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.files.json_data import plain
+from proofroll.papers.blajer_2006.truth.regimes import Regime
 from proofroll.report.figure import drawn_file
 from proofroll.report.pages import element
 from proofroll.running.store import write_text
-from proofroll.truth.ball_on_surface.regimes import Regime
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,10 +13,10 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import EventKind
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.run.contacts.stretches import carried
 from proofroll.files.json_data import plain
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.report.replay_wall import middle, wall
 from proofroll.report.labels import symbol, unit
 from proofroll.report.replay.records import PackedNumbers, Replayed, present

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.papers.blajer_2006.ball.model import RollingBall
 
 # Divisions of a periodic coordinate, and number of divisions between drawn lines (30 degrees).
 _ROUND, _ROUND_LINES = 72, 6

@@ -13,10 +13,10 @@ import numpy as np
 from proofroll.core.errors import InputError, ProofrollError, Refused
 from proofroll.core.events import Event, EventKind, events_of
 from proofroll.core.plugins import engine_names, parse_engine
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.engine_questions import describe_each, resolve
 from proofroll.running.idle_workers import Workers
@@ -25,7 +25,7 @@ from proofroll.running.runner import Runner
 from proofroll.studies.cases import case_of
 
 if TYPE_CHECKING:
-    from proofroll.truth.ball_on_surface.onset import Onset
+    from proofroll.papers.blajer_2006.truth.onset import Onset
 
 _EVERY = 0.01  # interval between samples [s]; engines that locate events do better than this
 _SMALLEST = float(np.finfo(float).tiny)  # smaller times are round-off of zero
@@ -105,7 +105,7 @@ def onset_study(
         InputError: the scene is not one ball that begins to roll in an upright cylinder, its friction is
             unbounded, or a name is unknown.
     """
-    from proofroll.truth.ball_on_surface.onset import onset
+    from proofroll.papers.blajer_2006.truth.onset import onset
 
     loaded = load_scene(scene, **parameters)
     try:

@@ -15,12 +15,12 @@ from proofroll.core.bounds import require_bounds
 from proofroll.core.errors import InputError, error_location
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, validated
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_file
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.model import RollingBall
+from proofroll.papers.blajer_2006.truth.regimes import Regime, analytic_boundaries, classify
 from proofroll.running.in_processes import in_processes
-from proofroll.truth.ball_on_surface.regimes import Regime, analytic_boundaries, classify
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.figures import style
 from proofroll.papers.blajer_2006.figures.definition import Figures
 from proofroll.papers.blajer_2006.figures.drawing import drawn, inline, picture

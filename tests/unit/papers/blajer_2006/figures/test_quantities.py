@@ -9,10 +9,10 @@ import pytest
 from placed_balls import of_ball
 
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
-from proofroll.engines.projection.ball.orientation import EulerAngles
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.figures.quantities import euler_angles, known, quantity
+from proofroll.papers.blajer_2006.projection.orientation import EulerAngles
 
 
 def test_euler_angles_come_back_over_many_turns() -> None:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.elements.ball_on_surface.as_body import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.report.drawings import overview
 from proofroll.report.pen import Drawing, View, circle, turn
 

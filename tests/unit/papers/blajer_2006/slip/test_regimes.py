@@ -12,7 +12,7 @@ from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.slip import regimes as regimes_study
 from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_map, regime_maps
-from proofroll.truth.ball_on_surface.regimes import Regime
+from proofroll.papers.blajer_2006.truth.regimes import Regime
 
 slow = pytest.mark.skipif(not heyoka_library.available(), reason="a map takes minutes without heyoka")
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN
-from proofroll.elements.mechanism.run.contacts.on_wall import OnWall, energy, wall_velocity
+from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, energy, wall_velocity
 from proofroll.elements.mechanism.run.contacts.stretches import (
     DEGREE,
     ENDS,
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _SUBSTEPS = 16
 
 
-def energy_balance(body: OnWall, dataset: xr.Dataset) -> FloatArray:
+def energy_balance(body: BodyOnWall, dataset: xr.Dataset) -> FloatArray:
     """Energy now plus the work that resistance and friction took, minus the energy at the start [J], shape (time,).
 
     The moment M of the rolling resistance takes the power -M · ω (N f V / a while rolling), friction -F · u, and a wall
@@ -66,12 +66,12 @@ def energy_balance(body: OnWall, dataset: xr.Dataset) -> FloatArray:
     return np.concatenate([balance, few])
 
 
-def _energy(body: OnWall, dataset: xr.Dataset, prefix: str) -> FloatArray:
+def _energy(body: BodyOnWall, dataset: xr.Dataset, prefix: str) -> FloatArray:
     """Energy of the ball at samples whose variables have a prefix [J]."""
     return energy(body, *(dataset[f"{prefix}{name}"].to_numpy() for name in ("p_WB", "v_WB", "w_WB")))
 
 
-def force_audit(body: OnWall, dataset: xr.Dataset) -> FloatArray:
+def force_audit(body: BodyOnWall, dataset: xr.Dataset) -> FloatArray:
     """Reported minus recomputed contact force, largest of the components N, F2, F3 [N], shape (samples,).
 
     Newton's law along e1, e2, e3 with the acceleration of the engine's own motion: rates of the surface coordinates,
@@ -82,7 +82,7 @@ def force_audit(body: OnWall, dataset: xr.Dataset) -> FloatArray:
     return _joined(_audited(body, stretch) for stretch in stretches(_with_forces(dataset)))
 
 
-def rate_audit(body: OnWall, dataset: xr.Dataset) -> FloatArray:
+def rate_audit(body: BodyOnWall, dataset: xr.Dataset) -> FloatArray:
     """Differences of the velocities from the rates of the positions, in stretches as :func:`force_audit` [m/s].
 
     At every sample v is compared with the derivative of the positions and, if an orientation is given, a ω with its
@@ -102,7 +102,7 @@ def _joined(audited: Iterable[FloatArray]) -> FloatArray:
     return np.concatenate([np.zeros(0), *audited])
 
 
-def _audited(body: OnWall, dataset: xr.Dataset) -> FloatArray:
+def _audited(body: BodyOnWall, dataset: xr.Dataset) -> FloatArray:
     """Audit of forces in a stretch without events [N]: on the grid but for its ends, then off it."""
 
     def apart(columns: Mapping[str, FloatArray], instants: FloatArray) -> FloatArray:
@@ -117,7 +117,7 @@ def _audited(body: OnWall, dataset: xr.Dataset) -> FloatArray:
     return np.concatenate([audit, apart(few, between)]) if "N" in few else audit
 
 
-def _rates_audited(body: OnWall, dataset: xr.Dataset) -> FloatArray:
+def _rates_audited(body: BodyOnWall, dataset: xr.Dataset) -> FloatArray:
     """Audit of rates in a stretch without events [m/s]: on the grid but for its ends, then off it."""
     from scipy.interpolate import make_interp_spline
 

@@ -18,7 +18,7 @@ from proofroll.core.events import EventKind, events_of
 from proofroll.core.observable import Observable, Role
 from proofroll.core.whole_turns import doubt
 from proofroll.elements.mechanism.run.contacts.audits import energy_balance, force_audit, rate_audit
-from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, OnWall, slip_velocity, wall_velocity
+from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, slip_velocity, wall_velocity
 from proofroll.elements.mechanism.run.contacts.stretches import DEGREE, ENDS, FORCES, held_in_flight, with_sticking
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ _ALWAYS = 0.5
 
 
 def local_variables(
-    body: OnWall,
+    body: BodyOnWall,
     times: FloatArray,
     p_WB: FloatArray,
     v_WB: FloatArray,
@@ -97,7 +97,7 @@ def local_variables(
     return variables
 
 
-def table(body: OnWall, weight: float, lengths: Sequence[float]) -> tuple[Observable, ...]:
+def table(body: BodyOnWall, weight: float, lengths: Sequence[float]) -> tuple[Observable, ...]:
     """Observables of a ball on a surface; the last coordinate decides (on a cylinder the height), or the gap in flight.
 
     No scale is below a hundredth (:data:`_LEAST`) of the ball's natural size: radius a, largest force m max(g, |p̈|),
@@ -189,7 +189,7 @@ def table(body: OnWall, weight: float, lengths: Sequence[float]) -> tuple[Observ
     )
 
 
-def observe(body: OnWall, dataset: xr.Dataset) -> dict[str, FloatArray]:
+def observe(body: BodyOnWall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     """Observables that a run allows, by name; those that the engine's values do not determine are absent.
 
     Coordinates of the surface, and ``attitude`` [1]; ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [1] without time
@@ -235,7 +235,7 @@ def creep(dataset: xr.Dataset) -> float:
     return float(np.sum(both * np.diff(t) * (slip[1:] + slip[:-1]) / 2))
 
 
-def scales(body: OnWall, truth: xr.Dataset) -> dict[str, float]:
+def scales(body: BodyOnWall, truth: xr.Dataset) -> dict[str, float]:
     """Size of each observable in the truth; floors are those of :func:`table`.
 
     Ranges of coordinates, the largest normal force and needed friction, the kinetic energy and the speed of the start,

@@ -70,49 +70,6 @@ class LocalCoordinates(Protocol):
         """e1."""
 
 
-class OnWall(Protocol):
-    """A ball on its wall: data, coordinates and start."""
-
-    @property
-    def ball(self) -> Ball:
-        """The ball."""
-
-    @property
-    def contact(self) -> Contact:
-        """Law of its contact."""
-
-    @property
-    def surface(self) -> LocalCoordinates:
-        """LocalCoordinates of its centre."""
-
-    @property
-    def gravity(self) -> FloatArray:
-        """Acceleration of gravity [m/s²], shape (3,)."""
-
-    @property
-    def u0(self) -> FloatArray:
-        """LocalCoordinates at the start, shape (2,)."""
-
-    @property
-    def v0(self) -> FloatArray:
-        """Velocity of the centre at the start [m/s], shape (3,)."""
-
-    @property
-    def w0(self) -> FloatArray:
-        """Angular velocity at the start [rad/s], shape (3,)."""
-
-    @property
-    def flies(self) -> bool:
-        """True if it starts off the wall or may leave it and land."""
-
-    @property
-    def wall_rate(self) -> FloatArray | None:
-        """Angular velocity of the wall, which turns along itself about the world's origin [rad/s]; None: at rest."""
-
-    def resisting(self, N: FloatArray, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-        """Moment of the rolling resistance about the centre [N m], shape (..., 3)."""
-
-
 @dataclass(frozen=True)
 class LocalStart:
     """A ball whose motion is described in the local frame of its wall.
@@ -130,7 +87,7 @@ class LocalStart:
 
 @dataclass(frozen=True, eq=False)
 class BodyOnWall:
-    """The ball of a mechanism, see :class:`OnWall`; its wall may turn about an axis through ``surface.origin``.
+    """The ball of a mechanism: data, coordinates and start; its wall may turn about an axis through ``surface.origin``.
 
     Attributes:
         index: of its body.
@@ -260,7 +217,7 @@ def slip_velocity(radius: float, e1: FloatArray, v_WB: FloatArray, w_WB: FloatAr
     return np.asarray(v_WB + radius * cross(w_WB, e1))
 
 
-def wall_velocity(body: OnWall, p_WB: FloatArray, e1: FloatArray) -> FloatArray:
+def wall_velocity(body: BodyOnWall, p_WB: FloatArray, e1: FloatArray) -> FloatArray:
     """Velocity of the wall where the ball touches it [m/s], shape (..., 3): W × (p + a e1)."""
     if body.wall_rate is None:
         return np.zeros_like(p_WB)
@@ -278,7 +235,7 @@ def resistance_moment(f: float, N: npt.ArrayLike, e1: FloatArray, v_WB: FloatArr
     return np.asarray(-f * np.asarray(N)[..., None] * cross(direction, e1))
 
 
-def energy(body: OnWall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+def energy(body: BodyOnWall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
     """Kinetic plus potential energy [J], shape (...); the potential is zero at the world's origin."""
     m, J = body.ball.mass, body.ball.inertia
     kinetic = 0.5 * m * np.sum(v_WB**2, axis=-1) + 0.5 * J * np.sum(w_WB**2, axis=-1)

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN
 from proofroll.core.events import EventKind, events_of
-from proofroll.elements.mechanism.run.contacts.on_wall import LocalCoordinates, OnWall
+from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, LocalCoordinates
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +25,7 @@ ENDS = 5
 FORCES = ("N", "F2", "F3")
 
 
-def with_sticking(body: OnWall, dataset: xr.Dataset) -> xr.Dataset:
+def with_sticking(body: BodyOnWall, dataset: xr.Dataset) -> xr.Dataset:
     """The run with ``sticking`` at each sample, as its events show it, where friction is bounded and it has events.
 
     A sample at an event belongs to what follows it.

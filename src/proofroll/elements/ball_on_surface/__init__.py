@@ -1,1 +1,0 @@
-"""A ball that rolls or slips on a surface."""

@@ -1,0 +1,1 @@
+"""Reader of balls on surfaces, which are bodies with spheres that touch walls."""

@@ -1,0 +1,100 @@
+"""Sequence of rolling and slipping of a ball, for any route.
+
+A :class:`Route` integrates one stretch at a time and reports why it ended; this module decides what comes next.
+:func:`proofroll.truth.numerics.hybrid.follow` chains the stretches.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Refused
+from proofroll.core.events import EventKind
+from proofroll.papers.blajer_2006.ball.model import RollingBall
+from proofroll.papers.blajer_2006.truth.route import BallStretch, End, Route
+from proofroll.truth.numerics import hybrid
+from proofroll.truth.numerics.hybrid import Transition
+
+# Relative distance from the friction cone below which round-off (1e-15) decides on which side a state is.
+_ON_CONE = 1e-12
+# Successive slips that are followed when each is shorter than the one before by more than the fraction _SHORTER; each
+# costs a search for the place where the rolling resistance changes direction.
+_REVERSALS = 10
+_SHORTER = 1e-6
+
+
+@dataclass(frozen=True)
+class Path:
+    """A motion from time 0.
+
+    Attributes:
+        stretches: in order.
+        events: kind and time [s] of each change.
+        ended: reason why it is not known to the last time, as a clause; empty: it is.
+    """
+
+    stretches: list[BallStretch]
+    events: list[tuple[str, float]]
+    ended: str
+
+
+def follow(body: RollingBall, route: Route, until: float) -> Path:
+    """Path from time 0 to ``until`` [s], or to an earlier time from which the motion is not known.
+
+    Raises:
+        Refused, Diverged: no motion is known from time 0 on.
+    """
+    path = hybrid.follow(SwitchedBall(body, route), until)
+    return Path(list(path.stretches), [(event.kind, event.time) for event in path.happenings], path.ended)
+
+
+class SwitchedBall:
+    """Stretches of a ball by one route, True for those that stick; see :class:`.hybrid.SwitchingRoute`."""
+
+    def __init__(self, body: RollingBall, route: Route) -> None:
+        self.body, self.route = body, route
+        self._reversals, self._spans = 0, (0.0, 0.0)  # durations of the last two stretches [s]
+
+    def begin(self) -> Transition[bool]:
+        """See the protocol."""
+        state = self.route.start()
+        if _must_slip(self.body, self.route, state):
+            return Transition(state, False, ((EventKind.SLIP, ""),))
+        return Transition(state, True, ())
+
+    def walk(self, time: float, state: FloatArray, mode: bool, until: float) -> BallStretch:
+        """See the protocol."""
+        stretch = (self.route.stick if mode else self.route.slip)(time, state, until)
+        self._spans = self._spans[1], stretch.end - stretch.start
+        return stretch
+
+    def change(self, stretch: BallStretch) -> Transition[bool]:
+        """See the protocol."""
+        state = stretch.state
+        if stretch.why is End.HALT:
+            raise Refused(f"at {stretch.end:.6g} s the ball slips and all but stops rolling: resistance turns round")
+        last_span, span = self._spans
+        hastens = stretch.why is End.STILL and not stretch.sticking and span < (1 - _SHORTER) * last_span
+        self._reversals = self._reversals + 1 if hastens else 0
+        if self._reversals > _REVERSALS:
+            raise Refused(
+                f"from about {stretch.end:.6g} s on the ball slips to and fro ever faster: resistance stops the "
+                "rolling before friction stops the centre; "
+                "end the run earlier, or take more friction or less resistance"
+            )
+        # At |u| = 0 the ball sticks if the needed friction is inside the cone; otherwise it goes on slipping.
+        slips = stretch.why is End.CONE or _must_slip(self.body, self.route, state)
+        if slips != stretch.sticking:
+            return Transition(state, not slips, ())
+        return Transition(state, not slips, ((EventKind.SLIP if slips else EventKind.STICK, ""),))
+
+
+def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:
+    """True if the needed friction is outside the static cone, or on it and about to leave."""
+    excess = route.excess(state)
+    if abs(excess) > _ON_CONE:
+        return excess > 0
+    a, speed = body.ball.radius, float(np.linalg.norm(route.world(state)[1]))
+    pace = np.sqrt(a * np.linalg.norm(body.gravity)) + speed
+    return bool(pace > 0 and route.excess(route.ahead(state, 1e-3 * a / pace)) > _ON_CONE)

@@ -1,0 +1,151 @@
+"""Stick and slip by compiled Taylor series (heyoka): the fast first route."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from typing_extensions import override
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged
+from proofroll.papers.blajer_2006.ball.compiled.rolling import parameters, start
+from proofroll.papers.blajer_2006.ball.model import RollingBall
+from proofroll.papers.blajer_2006.ball.motion import BallMotion, world_motion
+from proofroll.papers.blajer_2006.truth.route import End
+from proofroll.papers.blajer_2006.truth.sliding import Sliding
+from proofroll.papers.blajer_2006.truth.taylor_model import TaylorModel, model
+
+# Reasons for an end, in the order of the integrators' events.
+_STICK_ENDS = (End.CONE,)
+_CREEP_ENDS = (End.GROWN, End.STILL)
+_SLIP_ENDS = (End.STILL, End.TIME, End.HALT)
+_LARGEST = 1e6  # largest friction coefficient: more than any motion needs, and its square still counts
+_TIME_LIMIT = -(2**32) - 3  # heyoka's taylor_outcome.time_limit
+
+
+class SlidingTaylor(Sliding):
+    """Route in the local frame: arc length q, height h [m], v2, v3 [m/s], ω1 [rad/s]; see :class:`Sliding`."""
+
+    name = "local frame with direction of slip, Taylor series"
+
+    def __init__(self, body: RollingBall, handover: float = 1e-5) -> None:
+        super().__init__(body, handover)
+        contact = body.contact
+        self._scales = np.array(body.surface.length_scales)
+        self._A = (1 + body.ball.inertia_ratio) / body.ball.inertia_ratio
+        self._pars = [*parameters(body), *(min(mu, _LARGEST) for mu in (contact.mu_kinetic, contact.mu_static))]
+        self._model: TaylorModel = model(contact.rolling_resistance > 0)
+
+    @override
+    def start(self) -> FloatArray:
+        return start(self._body)
+
+    def friction(self, state: FloatArray) -> tuple[float, float]:
+        """Needed and available friction, times (1 + κ)/κ over the mass [m/s²]; see :class:`Route`."""
+        b2, b3, _, N = self._model.drive(state, self._pars)
+        return float(np.hypot(b2, b3)), self._A * self._body.contact.mu_static * float(N)
+
+    @override
+    def rates(self, state: FloatArray) -> FloatArray:
+        return self._model.rates(state, self._pars)
+
+    def _stick(self, time: float, state: FloatArray, until: float) -> _Run:
+        return _Run(self._model.stick, self._pars, _STICK_ENDS, time, state, until)
+
+    def _grown(self, time: float, state: FloatArray, until: float) -> float:
+        b2, b3, change, _ = self._model.drive(state, self._pars)
+        strength = float(np.hypot(b2, b3))
+        pace = min(strength / change if change > 0 else np.inf, until - time)
+        return max(self._handover * strength * pace, np.finfo(float).tiny)
+
+    def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> _Run:
+        return _Run(self._model.creep, [*self._pars, handover], _CREEP_ENDS, time, np.append(state, 0.0), until)
+
+    def _slide(self, start_state: FloatArray, floor: float, until: float) -> _Run:
+        return _Run(self._model.slip, [*self._pars, floor, until], _SLIP_ENDS, 0.0, start_state, np.inf)
+
+    def _slaved(self, states: FloatArray) -> FloatArray:
+        return np.asarray(self._model.direction(states.T, self._pars)[0])
+
+    def _axes(self, state: FloatArray) -> FloatArray:
+        return self._body.surface.frame(state[:2] / self._scales)
+
+    def _stood_still(self, last: FloatArray) -> FloatArray:
+        b2, b3, _, N = self._model.drive(last[:5], self._pars)
+        cos, sin = np.cos(last[6]), np.sin(last[6])
+        mu = self._body.contact.mu_kinetic
+        slowing = self._A * mu * N - b2 * cos - b3 * sin
+        left = float(np.exp(last[5]) / slowing)
+        # The rates of sticking, with the friction of sticking replaced by that of slipping
+        rates = self.rates(last[:5])
+        rates[2] += -mu * N * cos + b2 / self._A
+        rates[3] += -mu * N * sin + b3 / self._A
+        return np.array([*(last[:5] + left * rates), -np.inf, last[6], last[7] + left])
+
+    def _motion(self, states: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
+        ball = self._body.ball
+        b2, b3, _, N = self._model.drive(states.T, self._pars)
+        if phi is None:
+            friction, u = -np.stack([b2, b3], axis=-1) / self._A, np.zeros((len(states), 2))
+        else:
+            heading = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+            friction, u = -self._body.contact.mu_kinetic * N[:, None] * heading, size[:, None] * heading
+        return world_motion(
+            self._body,
+            states[:, :2] / self._scales,
+            velocity=states[:, 2:4],
+            spin=states[:, 4],
+            slip=u,
+            friction=ball.mass * friction,
+            press=ball.mass * N,
+            route=self.name,
+        )
+
+
+class _Run:
+    """Run of a compiled integrator to ``until`` or the first event; repeated with dense output when first sampled.
+
+    Implements :class:`.sliding.IntegratedRun`; ``ends`` gives the reason for each event of the integrator.
+    """
+
+    def __init__(
+        self, integrator: Any, pars: list[float], ends: tuple[End, ...], time: float, state: FloatArray, until: float
+    ) -> None:
+        self._inputs = (integrator, pars, time, state, min(until, 1e300))
+        self._series: Any = None
+        self.end, self.last, self.why = time, state, End.TIME
+        if until > time:
+            code = self._again(dense=False)
+            event = -code - 1 if -(2**31) < code < 0 else None  # terminal events are numbered -1, -2, …
+            if (event is None and code != _TIME_LIMIT) or not np.all(np.isfinite(integrator.state)):
+                raise Diverged("the Taylor series of stick and slip could not be continued")
+            self.end, self.last = float(integrator.time), integrator.state.copy()
+            self.why = End.TIME if event is None else ends[event]
+
+    def _again(self, dense: bool) -> int:
+        integrator, pars, time, state, until = self._inputs
+        integrator.time = time
+        integrator.pars[:] = pars[: len(integrator.pars)]
+        integrator.state[:] = state
+        integrator.reset_cooldowns()
+        result = integrator.propagate_until(until, c_output=dense)
+        self._series = result[4]
+        return int(result[0])
+
+    def steps(self) -> tuple[FloatArray, FloatArray]:
+        """See :class:`proofroll.papers.blajer_2006.truth.sliding.IntegratedRun`."""
+        knots = self._knots()
+        return knots, self.at(knots)
+
+    def at(self, places: FloatArray) -> FloatArray:
+        """See :class:`proofroll.papers.blajer_2006.truth.sliding.IntegratedRun`."""
+        knots = self._knots()
+        if len(knots) < 2 or not len(places):
+            return np.broadcast_to(self.last, (len(places), len(self.last))).copy()
+        return np.array(self._series(np.clip(places, knots[0], knots[-1])), dtype=np.float64)
+
+    def _knots(self) -> FloatArray:
+        if self._series is None and self.end > self._inputs[2]:
+            self._again(dense=True)  # dense output must be compiled separately; a second run costs nearly nothing
+        return np.asarray([self.end] if self._series is None else self._series.times)

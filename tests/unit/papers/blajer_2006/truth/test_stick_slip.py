@@ -1,0 +1,156 @@
+"""Slips of a ball in an upright cylinder: the route that finds first slips against the truth, and known digits."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proofroll import load_scene
+from proofroll.core import heyoka_library as library
+from proofroll.core.events import events_of
+from proofroll.core.truth import truth
+from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.model import RollingBall
+from proofroll.papers.blajer_2006.truth.polar import Polar, first_route
+from proofroll.papers.blajer_2006.truth.switching import Path, follow
+from proofroll.papers.blajer_2006.truth.taylor import SlidingTaylor
+
+PAPER: dict[str, float] = {"rolling_resistance": 5e-4, "mu_static": 0.35}
+UNTIL = 4.0
+needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
+
+
+def ball(**parameters: float) -> RollingBall:
+    """The paper's ball with other parameters."""
+    return rolling_ball(load_scene("sphere_in_cylinder", **parameters))
+
+
+@cache
+def paper() -> xr.Dataset:
+    """The truth of the paper's case with resistance and bounded friction, once for all tests."""
+    return truth(load_scene("sphere_in_cylinder", **PAPER), np.linspace(0.0, UNTIL, 401))
+
+
+def final_height(path: Path, until: float) -> float:
+    """Height at the end of a path [m]."""
+    return float(path.stretches[-1].motion(np.array([until])).p_WB[0, 2])
+
+
+@pytest.mark.parametrize(
+    "route", [pytest.param(SlidingTaylor, marks=needs_heyoka), pytest.param(Polar, marks=pytest.mark.drill)]
+)
+def test_the_route_of_first_slips_agrees_with_the_truth(route: Any) -> None:
+    """Events and final height are those of the general mechanics, which shares no equation with it, to 1e-9."""
+    body, true = ball(**PAPER), paper()
+    path, events = follow(body, route(body), UNTIL), events_of(true)
+    assert [kind for kind, _ in path.events] == [event.kind for event in events] == ["slip", "stick", "slip"]
+    assert [time for _, time in path.events] == pytest.approx([event.time for event in events], abs=1e-9, rel=0)
+    assert final_height(path, UNTIL) == pytest.approx(float(true["z"][-1]), abs=1e-9)
+
+
+@needs_heyoka
+@pytest.mark.drill
+@settings(max_examples=5, deadline=None)
+@given(
+    speed=st.floats(2.0, 5.0),
+    mu=st.floats(0.1, 0.5),
+    ratio=st.floats(0.6, 1.0),
+    f=st.sampled_from([0.0, 2e-4, 5e-4]),
+    spin=st.floats(-20.0, 20.0),
+)
+def test_random_slips_agree_with_the_truth(speed: float, mu: float, ratio: float, f: float, spin: float) -> None:
+    """The same of random balls, also where friction drops as the ball begins to slip."""
+    parameters = {"speed": speed, "mu_static": mu, "mu_kinetic": ratio * mu, "radial_spin": spin}
+    scene = load_scene("sphere_in_cylinder", **parameters, rolling_resistance=f)
+    true = truth(scene, np.linspace(0.0, 1.0, 11))
+    if "ill_posed" in true.attrs:
+        return
+    body = rolling_ball(scene)
+    path = follow(body, first_route(body), 1.0)
+    later = [(kind, time) for kind, time in path.events if time > 0]  # the truth counts a slip at once to its start
+    events = events_of(true)
+    assert [kind for kind, _ in later] == [event.kind for event in events]
+    assert [time for _, time in later] == pytest.approx([event.time for event in events], abs=1e-9, rel=0)
+    assert final_height(path, 1.0) == pytest.approx(float(true["z"][-1]), abs=1e-9)
+
+
+# Scene parameters, end [s], events [s], height at the end [m].
+KNOWN: dict[str, tuple[dict[str, float], float, list[float], float | None]] = {
+    "slow": ({"speed": 2, "mu_static": 0.35}, 0.3, [0.2166732], None),
+    "slow, resisted": ({"speed": 2, **PAPER}, 0.3, [0.20720339], None),
+    "fast, resisted": ({"speed": 6, **PAPER}, 3.5, [3.36617197], None),
+    "recovers": ({"mu_static": 0.15}, 0.75, [0.176667992, 0.412090574, 0.628116731, 0.710311323], None),
+    "falls": ({"mu_static": 0.12}, 3.0, [0.14413074], -2.7869160),
+}
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("name", KNOWN)
+def test_known_digits(name: str) -> None:
+    """In the truth every published event comes out to 1e-7 s and every height to 1e-6 m, in narrow brackets."""
+    parameters, until, times, height = KNOWN[name]
+    found = truth(load_scene("sphere_in_cylinder", **parameters), np.linspace(0.0, until, 31))
+    events = events_of(found)
+    assert [event.kind for event in events] == ["slip", "stick", "slip", "stick"][: len(times)]
+    assert [event.time for event in events] == pytest.approx(times, abs=1e-7, rel=0)
+    assert all(event.time_low <= event.time <= event.time_high < event.time_low + 1e-9 for event in events)
+    assert found["z"].attrs["error_bar"] < 1e-9
+    if height is not None:
+        assert float(found["z"][-1]) == pytest.approx(height, abs=1e-6)
+
+
+def test_state_at_the_first_slip_of_the_paper() -> None:
+    """Where the paper's ball first slips its state has the known digits; the bounds are their last ones."""
+    body = ball(**PAPER)
+    stretch = follow(body, first_route(body), 1.8).stretches[0]
+    p, v, w = (values[-1] for values in _state(stretch.motion(np.array([1.0, stretch.end]))))
+    frame = body.surface.frame(body.surface.locate(p))
+    assert stretch.end == pytest.approx(1.720183172, abs=1e-9)
+    state = [p[2], v @ frame[:, 1] / 0.2, v[2], w @ frame[:, 0]]
+    assert state == pytest.approx([-0.15342234, 13.44828166, -0.39505144, -101.7254881], rel=4e-8)
+
+
+def _state(motion: Any) -> tuple[Any, Any, Any]:
+    return motion.p_WB, motion.v_WB, motion.w_WB
+
+
+@pytest.mark.drill
+def test_start_of_slip_does_not_matter() -> None:
+    """No event and no end point moves when what takes the place of a start of slip varies over a decade or more."""
+    body = ball(**PAPER)
+    routes: list[Any] = [Polar(body), Polar(body, handover=1e-4)]
+    if library.available():
+        routes += [SlidingTaylor(body, handover=size) for size in (1e-7, 1e-6, 1e-5, 1e-4)]
+    paths = [follow(body, route, 2.5) for route in routes]
+    for path in paths[1:]:
+        assert [time for _, time in path.events] == pytest.approx([time for _, time in paths[0].events], abs=1e-9)
+        assert final_height(path, 2.5) == pytest.approx(final_height(paths[0], 2.5), abs=1e-9)
+
+
+@needs_heyoka
+def test_many_short_slips_settle() -> None:
+    """Between the two boundaries every oscillation slips once, ever more briefly, and the sequence is never cut."""
+    body = ball(mu_static=0.15)
+    found = follow(body, SlidingTaylor(body), 30.0).events
+    slips, sticks = ([time for kind, time in found if kind == wanted] for wanted in ("slip", "stick"))
+    lengths = np.diff(np.stack([slips[: len(sticks)], sticks]), axis=0)[0]
+    assert len(slips) > 45
+    assert np.all(np.diff(lengths) < 0)
+    assert lengths[-1] < 0.1 * lengths[0]
+
+
+def test_energy_goes_into_slip_and_rolling() -> None:
+    """While it slips the energy falls by the work of slip μk N |u| and of rolling resistance f N ω, and no other."""
+    later = paper().sel(time=slice(2.495, 4.001))
+    slip = np.hypot(later["slip2"], later["slip3"])
+    turning = np.hypot(later["omega2"], later["omega3"])
+    power = (later["N"] * (0.35 * slip + 5e-4 * turning)).to_numpy()
+    simpson = (power[0] + power[-1] + 4 * power[1:-1:2].sum() + 2 * power[2:-1:2].sum()) * 0.01 / 3
+    assert len(power) % 2 == 1
+    assert float(later["energy"][0] - later["energy"][-1]) == pytest.approx(simpson, rel=1e-6)
