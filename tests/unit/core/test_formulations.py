@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.core import entry_points
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.formulations import Formulation, added_by, extended
@@ -56,6 +57,7 @@ def planted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     points = "projection = planted_formulations:FORMULATIONS\nmujoco = no_such_module:FORMULATIONS\n"
     (info / "entry_points.txt").write_text(f"[proofroll.formulations]\n{points}")
     monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(entry_points, "broken", {})  # commands of other tests would print what is planted here
     return load_engine("projection")
 
 
