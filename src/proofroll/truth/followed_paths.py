@@ -289,7 +289,8 @@ def at_times(
                 if time > path.stretches[near].start if step < 0 else time < path.stretches[near].end:
                     break
                 earlier = min(near, near + step)
-                if not np.array_equal(path.stretches[earlier].last, path.stretches[earlier + 1].first):
+                # all but the time, which has its own last digit
+                if not np.array_equal(path.stretches[earlier].last[:-1], path.stretches[earlier + 1].first[:-1]):
                     break
                 near += step
         states.append(near)
