@@ -38,7 +38,7 @@ _BARS = {
 }  # fmt: skip
 _ILL_POSED = "a change of the parameters within their accuracy changes the time of the first slip"
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
-_PREFIXES = {"work.": "work", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
+_PREFIXES = {"work.": "work", "net_force.": "sums", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
 
 
