@@ -107,7 +107,7 @@ def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
     if not early:
         return np.inf, ""
     shortest = min(early, key=lambda path: path.stretches[-1].end)
-    end = shortest.stretches[-1].end
+    end = max(shortest.stretches[-1].end, 0.0)  # a guard at zero at the start rises before it by round-off
     together = (path.ended for path in early if path.stretches[-1].end <= end + time_accuracy(end))
     return end, shortest.ended or next(filter(None, together), "")
 

@@ -7,7 +7,7 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.followed_paths import at_times, end_of, followed
-from proofroll.truth.numerics.hybrid import HybridPath, Stretch, Transition
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch, Transition, first_close
 
 
 class _Refusing:
@@ -48,3 +48,11 @@ def test_states_of_a_motion_that_goes_on_are_taken_from_the_stretch_that_has_the
     later = Stretch(1.0, 2.0, "slip", np.array([3.0, 1.0]), np.array([4.0, 2.0]), None)
     path = HybridPath((sooner, later), (), ())
     assert at_times(path, [0, 0], np.array([0.5, 1.5])) == [0, 1]
+
+
+def test_no_truth_ends_before_it_begins() -> None:
+    """A guard that is zero at the start rises before it by round-off; the end and the first close decision are at 0."""
+    early = Stretch(0.0, -1e-10, "slips", np.zeros(2), np.zeros(2), 0, grazes=[-1e-11])
+    path = HybridPath((early,), (), (), known=False, ended="nothing is known")
+    assert end_of((path, path)) == (0.0, "nothing is known")
+    assert first_close([path], 0.0) == 0.0

@@ -388,4 +388,4 @@ def first_close(paths: Sequence[HybridPath[Any]], close: float) -> float:
     """Time [s] of the first graze, or decision whose margin is below ``close``; inf: there is none."""
     decisions = (time for path in paths for time, margin in path.margins if margin < close)
     grazes = (time for path in paths for stretch in path.stretches for time in getattr(stretch, "grazes", ()))
-    return min([*decisions, *grazes], default=np.inf)
+    return max(0.0, min([*decisions, *grazes], default=np.inf))
