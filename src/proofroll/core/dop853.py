@@ -16,7 +16,7 @@ Accept = Callable[[float, FloatArray], FloatArray]
 # Smallest relative tolerance that scipy accepts; the method itself could go lower.
 TIGHTEST = 100 * float(np.finfo(float).eps)
 # Distance from a failure of the rates, relative to the time, up to which steps are halved to come nearer to it.
-_NEAREST = 1e-9
+NEAREST = 1e-9
 
 
 def solver_from(
@@ -164,6 +164,6 @@ def integrate(
                 if visited is not None:
                     visited.pop()
                 longest = min(solver.h_abs, longest, time - begun) / 2
-                if longest <= _NEAREST * begun or begun == 0.0:
+                if longest <= NEAREST * begun or begun == 0.0:
                     raise Diverged(str(stopped), begun) from None
         yield solver.y.copy()

@@ -13,11 +13,12 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.core.events import JUMPS, EventKind
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import Acting, ContactMode
+from proofroll.elements.mechanism.contact.acting import REST, Acting, ContactMode
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.dynamics.commands import has_held
+from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.dynamics.record import record_of
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import contact_sums
@@ -100,7 +101,9 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     for values in held:
         values.finish()
     seconds = times * units.time
-    works = work_paths[0].at(seconds, stretches), work_paths[1].at(seconds, others)
+    known_until = _works_known(tree, paths[0])
+    unknown = times[:, None] > known_until
+    works = np.where(unknown, np.nan, work_paths[0].at(seconds, stretches)), work_paths[1].at(seconds, others)
     tree_states = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
     by_tree = tree_states.record
     cut = None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
@@ -129,7 +132,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         _reason(dynamics, paths),
         units,
         works,
-        unresolved=max(float(work.unresolved.max(initial=0.0)) for work in work_paths),
+        unresolved=max(float(work.unresolved[np.isinf(known_until)].max(initial=0.0)) for work in work_paths),
         kinds=kinds,
         pressed=(tree_states.pressed * units.force, forces_of_bodies * units.force) if scaled.contacts else None,
         sums=(tree_states.sums * units.force, others_sums) if scaled.contacts else None,
@@ -160,6 +163,24 @@ def _followed(
     if any(item.kind == EventKind.SETTLE for item in tree_path.happenings):
         raise Refused("no route of the truth follows rebounds to their end under held targets yet")
     return (tree_route.completed(tree_path), body_route.completed(body_path)), (tree_route, body_route)
+
+
+def _works_known(tree: ContactTree, path: _Path) -> Array:
+    """Time in natural units up to which the work of each of :func:`.working` is determinate, (drives); inf: always.
+
+    Where contacts share a load in several ways, a drive that moves against it does another work in each.
+    """
+    dynamics, m = tree.dynamics, tree.dynamics.mechanism
+    numbers, until = [number for number, _ in working(m)], np.full(len(working(m)), np.inf)
+    moving = [m.v_slices[m.joint_index[name]].start for name in working_joints(m)]
+    for stretch in path.stretches if numbers and m.contacts else ():
+        middle = (stretch.start + stretch.end) / 2
+        (state,) = tree.within(stretch, np.array([middle]))
+        (q, v, _), mode = dynamics.parts(state), tree.acting(stretch, state)
+        if stretch.end > stretch.start and dynamics.solve(q, v, mode, middle).undetermined.size:
+            named = dynamics.sample(q, v, mode, middle)[0]["named"]
+            until[np.isnan(named[numbers]) & (np.abs(v[moving]) > REST) & np.isinf(until)] = stretch.start
+    return until
 
 
 def _kinds(dynamics: ContactDynamics, mode: ContactMode) -> tuple[tuple[str, bool], ...]:

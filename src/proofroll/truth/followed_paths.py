@@ -107,7 +107,7 @@ def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
     if not early:
         return np.inf, ""
     shortest = min(early, key=lambda path: path.stretches[-1].end)
-    end = shortest.stretches[-1].end
+    end = max(shortest.stretches[-1].end, 0.0)  # a guard at zero at the start rises before it by round-off
     together = (path.ended for path in early if path.stretches[-1].end <= end + time_accuracy(end))
     return end, shortest.ended or next(filter(None, together), "")
 
@@ -289,7 +289,8 @@ def at_times(
                 if time > path.stretches[near].start if step < 0 else time < path.stretches[near].end:
                     break
                 earlier = min(near, near + step)
-                if not np.array_equal(path.stretches[earlier].last, path.stretches[earlier + 1].first):
+                # all but the time, which has its own last digit
+                if not np.array_equal(path.stretches[earlier].last[:-1], path.stretches[earlier + 1].first[:-1]):
                     break
                 near += step
         states.append(near)

@@ -35,7 +35,7 @@ _BARS = {
     "hop_speed": "slip", "energy_gain": "energy", "bushing_forces": "links", "bushing_torques": "links",
 }  # fmt: skip
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
-_PREFIXES = {"work.": "work", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
+_PREFIXES = {"work.": "work", "net_force.": "sums", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
 
 

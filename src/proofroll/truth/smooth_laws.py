@@ -31,7 +31,6 @@ _HALVINGS = 20
 _LOOSE = 1e-3  # tolerance of a step that is taken again: it was accepted
 _TURN = 1.0  # rad, in which rotations are polynomials of eleven degrees to the last digit
 
-
 _Powers = tuple[Array, Array]  # times [s] and powers [W] at the points of a window
 
 
@@ -66,6 +65,20 @@ class KeptRoute(NamedTuple):
     coarse: bool = False
 
 
+class _Window(NamedTuple):
+    """A part of a step, and the last coefficients of the powers in the window that it is a half of [W]."""
+
+    step: KeptStep
+    start: float
+    end: float
+    left: float = np.inf
+
+    def halves(self) -> tuple[_Window, _Window]:
+        """Both of its halves."""
+        middle = (self.start + self.end) / 2
+        return self._replace(end=middle), self._replace(start=middle)
+
+
 def dense_steps(
     rates: Callable[[float, Array], Array], visited: Sequence[tuple[float, Array]], last: float
 ) -> list[KeptStep]:
@@ -97,36 +110,35 @@ def law_check(mechanism: Mechanism, routes: Mapping[str, KeptRoute], counting: s
 def works_along(mechanism: Mechanism, route: KeptRoute, times: Array) -> tuple[Array, Array]:
     """Work of drives along a route's steps at times [s], (times, drives), and what is not resolved of it [J], (drives).
 
-    It is integrated over all steps, halved until their points resolve the powers.
+    It is integrated over all steps, halved until their points resolve the powers, or a half does it no better than the
+    whole: then the rest is round-off.
     """
     scale = natural_scale(mechanism)
     works = WorkAlong(mechanism, scale.length, scale.rate)
     if route.powers is not None and working(mechanism):
         windows, parts = (
-            [(step, step.start, step.end) for step in route.steps if step.end > step.start],
+            [_Window(step, step.start, step.end) for step in route.steps if step.end > step.start],
             list[_Powers](),
         )
         for last in [False] * _HALVINGS + [True]:
-            time = np.array([start + (end - start) * (POINTS + 1) / 2 for _, start, end in windows])
-            states = [step.inside(moments) for (step, _, _), moments in zip(windows, time, strict=True)]
+            time = np.array([window.start + (window.end - window.start) * (POINTS + 1) / 2 for window in windows])
+            states = [window.step.inside(moments) for window, moments in zip(windows, time, strict=True)]
             if not states:
                 break
             power = route.powers(time.ravel(), np.concatenate(states)).reshape(*time.shape, -1)
             series = np.abs(np.einsum("kn,snd->skd", TO_SERIES, power))
-            rough = (series[:, -2:].max((1, 2)) > _RESOLVED * series.max()) & (not last)
+            left = series[:, -2:].max((1, 2))
+            falls = left < np.array([window.left for window in windows]) / 2
+            rough = (left > _RESOLVED * series.max()) & falls & (not last)
             parts += [(moments, powers) for moments, powers, again in zip(time, power, rough, strict=True) if not again]
-            halves = [window for window, again in zip(windows, rough, strict=True) if again]
-            windows = [half for step, start, end in halves for half in _halved(step, start, end)]
+            again = [
+                window._replace(left=rest) for window, rest, more in zip(windows, left, rough, strict=True) if more
+            ]
+            windows = [half for window in again for half in window.halves()]
         parts.sort(key=lambda part: float(part[0][0]))
         time, power = np.array([moments for moments, _ in parts]), np.array([powers for _, powers in parts])
         works.add(0, time, np.broadcast_to((time[:, -1:] - time[:, :1]) / 2, time.shape), power)
     return works.at(times, [0] * len(times)), works.unresolved
-
-
-def _halved(step: KeptStep, start: float, end: float) -> list[tuple[KeptStep, float, float]]:
-    """Both halves of a window of a step."""
-    middle = (start + end) / 2
-    return [(step, start, middle), (step, middle, end)]
 
 
 def _pieces(mechanism: Mechanism, route: KeptRoute, counting: KeptRoute) -> Pieces | None:

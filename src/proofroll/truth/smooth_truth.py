@@ -1,10 +1,10 @@
 """Truth of a motion without switches: two routes that share no kinematics, with their difference as an error bar.
 
-Routes: joint coordinates (DOP853 with projection), maximal coordinates (Taylor series in doubles and in long doubles;
-DOP853 without heyoka), both by implicit collocation if dampers are stiff, and closed forms if known. The best of them
-is the truth, the others give its error bar. If in both routes a start displaced by :data:`NUDGE` leads farther away
-than :data:`CHAOS`, the question is ill-posed; the time of that is the horizon. A route that changes the energy of a
-conservative mechanism has failed, and shows no chaos.
+Routes: joint coordinates (compiled collocation, or DOP853 with projection), maximal coordinates (Taylor series in
+doubles and in long doubles; DOP853 without heyoka), both by implicit collocation if dampers are stiff, and closed forms
+if known. The best of them is the truth, the others give its error bar. If in both routes a start displaced by
+:data:`NUDGE` leads farther away than :data:`CHAOS`, the question is ill-posed; the time of that is the horizon. A route
+that changes the energy of a conservative mechanism has failed, and shows no chaos.
 """
 
 from dataclasses import replace
@@ -28,6 +28,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
 from proofroll.truth.bodies.maximal_taylor import Visited
+from proofroll.truth.compiled_tree import compiled_run
 from proofroll.truth.early_end import EarlyEnd
 from proofroll.truth.error_bars import (
     NUDGE,
@@ -236,20 +237,24 @@ def _runs(
         names = "maximal coordinates, implicit collocation", "joint coordinates, implicit collocation"
         best = on_same_turns(mechanism, runs.one, runs.precise)
         return runs.one, best, best, runs.growth, names, runs.kept[::-1]
-    by_tree, kept = early.run(partial(_by_tree, tree, tolerance=tolerance), times)
+    by_tree, kept, first_name = early.run(partial(_by_tree, tree, tolerance=tolerance), times)
     by_bodies, precise, name, second_path = early.run(partial(_second, second, tolerance=tolerance), times)
     growth = early.run(second.growth, times)
     by_tree, by_bodies, precise = (record.first(len(growth)) for record in (by_tree, by_bodies, precise))
     # route 1 alone counts turns; angles of the others are put on the same turns
     by_bodies, precise = on_same_turns(mechanism, by_tree, by_bodies), on_same_turns(mechanism, by_tree, precise)
-    return by_tree, by_bodies, precise, growth, (name, "joint coordinates, DOP853"), (second_path, kept)
+    return by_tree, by_bodies, precise, growth, (name, first_name), (second_path, kept)
 
 
-def _by_tree(tree: JointCoordinates, times: Array, tolerance: float) -> tuple[Record, KeptRoute]:
-    """Route 1 and its steps."""
+def _by_tree(tree: JointCoordinates, times: Array, tolerance: float) -> tuple[Record, KeptRoute, str]:
+    """Route 1, its steps and its name."""
+    compiled = compiled_run(tree.mechanism, times)
+    if compiled is not None:
+        return *compiled, "joint coordinates, collocation"
     visited: list[tuple[float, Array]] = []
     record = tree.run(times, tolerance, visited)
-    return record, KeptRoute(dense_steps(tree.rate, visited, float(times[-1])), tree.recorded, tree.spin, coarse=True)
+    steps = dense_steps(tree.rate, visited, float(times[-1]))
+    return record, KeptRoute(steps, tree.recorded, tree.spin, coarse=True), "joint coordinates, DOP853"
 
 
 def _singular(mechanism: Mechanism, end: float) -> str:

@@ -5,7 +5,7 @@ Stiffness is measured at the start, see :func:`stiff`. Route 1 has the equations
 differ too.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -19,9 +19,10 @@ from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates, NumericEquations
 from proofroll.truth.bodies.maximal_taylor import compiled_rates
-from proofroll.truth.natural_units import Units, natural_units
+from proofroll.truth.compiled_tree import NaturalStep, kept_in_seconds
+from proofroll.truth.natural_units import natural_units
 from proofroll.truth.numerics.collocation import Step, System, by_states, next_length, nodes, take
-from proofroll.truth.smooth_laws import KeptRoute, KeptStep
+from proofroll.truth.smooth_laws import KeptRoute
 
 # Time constants of a damper per run above which it may be stiff. DOP853 is stable up to six of them per step, so it
 # makes at least a hundred steps for stability alone, and more due to the noise of accelerations.
@@ -88,27 +89,23 @@ def run_stiff(mechanism: Mechanism, rank: int, times: Array) -> StiffRuns:
     growth = np.abs(beside - joined)[:, :nq].max(axis=1) / BESIDE
     by_tree, precise = (units.record(mechanism, state) for state in (by_tree, bodies.recorded(moments, alone)))
     kept = (
-        _kept(steps[0], units, lambda t, y: units.record(mechanism, tree.recorded(t, y)), tree.spin),
-        _kept(steps[1], units, lambda t, y: units.record(mechanism, bodies.recorded(t, y)), bodies.spin)._replace(
-            powers=lambda t, y: bodies.powers(t / units.time, y) * (units.force * units.length / units.time)
+        kept_in_seconds(
+            _natural(steps[0]), units, lambda t, y: units.record(mechanism, tree.recorded(t, y)), tree.spin
         ),
+        kept_in_seconds(
+            _natural(steps[1]), units, lambda t, y: units.record(mechanism, bodies.recorded(t, y)), bodies.spin
+        )._replace(powers=lambda t, y: bodies.powers(t / units.time, y) * (units.force * units.length / units.time)),
     )
     return StiffRuns(by_tree, precise, growth, kept)
 
 
-def _kept(
-    steps: list[Step], units: Units, recorded: Callable[[Array, Array], Record], spin: Callable[[Array], float]
-) -> KeptRoute:
-    """Steps in seconds, from those in natural units."""
+def _natural(steps: Sequence[Step]) -> list[NaturalStep]:
+    """Steps by their start, end and states without the time."""
 
-    def inside(step: Step, times: Array) -> Array:
-        return step(times / units.time)[:, :-1]
+    def states(step: Step, times: Array) -> Array:
+        return step(times)[:, :-1]
 
-    kept = [
-        KeptStep(step.time * units.time, (step.time + step.length) * units.time, partial(inside, step))
-        for step in steps
-    ]
-    return KeptRoute(kept, lambda times, states: recorded(times / units.time, states), lambda y: spin(y) / units.time)
+    return [(step.time, step.time + step.length, partial(states, step)) for step in steps]
 
 
 def _rates(lean: NumericEquations) -> Callable[[Array], Array]:

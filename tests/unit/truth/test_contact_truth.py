@@ -23,7 +23,9 @@ from proofroll.elements.mechanism.contact import coulomb
 from proofroll.elements.mechanism.contact.acting import modes_of
 from proofroll.elements.mechanism.dynamics import switches
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
+from proofroll.elements.mechanism.run.dataset import UNDETERMINED
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
+from proofroll.elements.mechanism.scene.composed import Cable
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
@@ -653,6 +655,24 @@ def test_the_sum_of_forces_at_corners_is_known_where_their_split_is_not() -> Non
     assert np.isnan(found["force.touch.1.z"].to_numpy()).all()
     assert found["pair_forces"].shape == (3, 1, 3)
     assert found["pair_forces"].attrs["error_bar"] < 1e-9
+
+
+def test_the_sum_of_parallel_cables_is_given_by_name_where_no_single_pull_is_known() -> None:
+    """A box on four cables hangs by its weight, and what is not determinate at the last time says so."""
+    box = Body("box", 5.0, inertia=(0.8, 0.8, 0.8))
+    start = Joint("free", "free", "world", "box", q0=(0, 0, 2, 1, 0, 0, 0))
+    ends = [(x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
+    shapes, pairs = [], []
+    for k, end in enumerate(ends):
+        cable = Cable(f"t{k}", "world", "box", position_a=(*end, 5.0), position_b=(*end, 0.5), at_most=2.5).parts()
+        shapes += cable["geometries"]
+        pairs += cable["pairs"]
+    mechanism = Mechanism((box,), (start,), gravity=(0.0, 0.0, -9.81), geometries=tuple(shapes), pairs=tuple(pairs))
+    element = MechanismElement(mechanism)
+    found = MechanismTruth.truth(element, np.array([0.0, 0.1]), ())
+    assert found["net_force.box.z"].to_numpy() == pytest.approx(49.05, abs=1e-9)
+    assert found["net_force.box.z"].attrs["error_bar"] < 1e-9
+    assert found["force.t1.z"].attrs["absent"] == UNDETERMINED
 
 
 def test_what_has_no_truth_is_held_to_the_laws_of_contact_alone() -> None:

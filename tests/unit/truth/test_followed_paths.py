@@ -6,8 +6,8 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.truth.followed_paths import end_of, followed
-from proofroll.truth.numerics.hybrid import Stretch, Transition
+from proofroll.truth.followed_paths import at_times, end_of, followed
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch, Transition, first_close
 
 
 class _Refusing:
@@ -39,3 +39,20 @@ def test_the_second_route_is_not_followed_behind_an_early_end_of_the_first() -> 
     assert end_of(paths) == (1.0, "nothing is known from 1 s on")
     first, second = _Refusing(90.0), _Refusing(1.0)
     assert end_of(followed(first, second, 100.0, ())) == (1.0, "nothing is known from 1 s on")
+
+
+def test_states_of_a_motion_that_goes_on_are_taken_from_the_stretch_that_has_their_time() -> None:
+    """One route alone may divide a slip; the time in its states differs in the last digit there."""
+    middle = 1.0 + 2e-16
+    sooner = Stretch(0.0, 1.0, "slip", np.array([0.0, 0.0]), np.array([3.0, middle]), 0)
+    later = Stretch(1.0, 2.0, "slip", np.array([3.0, 1.0]), np.array([4.0, 2.0]), None)
+    path = HybridPath((sooner, later), (), ())
+    assert at_times(path, [0, 0], np.array([0.5, 1.5])) == [0, 1]
+
+
+def test_no_truth_ends_before_it_begins() -> None:
+    """A guard that is zero at the start rises before it by round-off; the end and the first close decision are at 0."""
+    early = Stretch(0.0, -1e-10, "slips", np.zeros(2), np.zeros(2), 0, grazes=[-1e-11])
+    path = HybridPath((early,), (), (), known=False, ended="nothing is known")
+    assert end_of((path, path)) == (0.0, "nothing is known")
+    assert first_close([path], 0.0) == 0.0

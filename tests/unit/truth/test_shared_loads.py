@@ -31,13 +31,15 @@ def _skid_steered() -> Mechanism:
 
 @pytest.mark.drill
 def test_forces_of_joints_and_drives_that_hang_on_a_split_are_not_given() -> None:
-    """Four wheels share the load: axles and drives have no values, the free joint has, and bars stay small."""
+    """Four wheels share the load: axles, drives and their work have no values, the free joint has, bars stay small."""
     found = truth_of(_skid_steered(), np.array([0.0, 0.01]))
     wrench, drives = found.record.wrench, found.record.named
     assert np.isnan(drives).all()
     assert np.isnan(wrench[:, 1:, 2]).all()
     assert np.isfinite(wrench[:, 0]).all()
-    assert max(float(found.bars[name][-1]) for name in ("wrench", "named", "p_WB", "v_WB")) < 1e-9
+    assert found.works is not None
+    assert np.isnan(found.works[1]).all()
+    assert max(float(found.bars[name][-1]) for name in ("wrench", "named", "work", "p_WB", "v_WB")) < 1e-9
 
 
 @pytest.mark.drill

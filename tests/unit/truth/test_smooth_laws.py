@@ -7,6 +7,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.truth.bodies import maximal_taylor
 from proofroll.truth.smooth_truth import find_truth
+from proofroll.truth.switching import contact_taylor
 
 TIMES = np.array([0.0, 0.1, 0.2])
 
@@ -22,7 +23,8 @@ def test_an_honest_truth_holds_the_laws(scene, name):
 
 def test_a_wrong_load_of_one_route_is_refused_from_the_start(scene, monkeypatch):
     """Gravity that is wrong by a millionth in joint coordinates breaks their law of motion, and theirs alone."""
-    monkeypatch.setattr(maximal_taylor, "heyoka", None)
+    for module in (maximal_taylor, contact_taylor):
+        monkeypatch.setattr(module, "heyoka", None)
     begun = JointCoordinates.__init__
 
     def heavier(self, mechanism, rank=None):

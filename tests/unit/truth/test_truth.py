@@ -1,21 +1,26 @@
 import tomllib
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
+from proofroll.elements.mechanism import Body, Force, Joint, Loop, Mechanism, Spring
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.bushing import Bushing
+from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.elements.mechanism.scene.spring_law import SpringLaw
 from proofroll.truth.bodies import maximal_taylor
 from proofroll.truth.bodies.maximal_bodies import GeneralBody, Planar, made_bodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.contact_truth import contact_truth
 from proofroll.truth.plug_in import MechanismTruth
 from proofroll.truth.singular_poses import BRANCHING
 from proofroll.truth.smooth_truth import CHAOS, find_truth
+from proofroll.truth.switching import contact_taylor
 
 MODELS = Path(__file__).parents[3] / "models"
 
@@ -420,13 +425,32 @@ def test_routes_of_a_spinning_body_agree(scene):
     assert max(found.differences["q_WB"], found.differences["points"]) < 2e-10
 
 
-def test_a_failure_of_the_rates_ends_the_truth_at_its_time(monkeypatch):
+@pytest.mark.parametrize("route", [partial(find_truth, tolerance=1e-9), contact_truth], ids=["smooth", "switching"])
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_failure_of_the_rates_ends_the_truth_at_its_time(monkeypatch, route, compiled):
     """A bushing turned at 10 rad/s has a truth to 3 rad, to a part in a million of the time, wherever samples lie."""
-    monkeypatch.setattr(maximal_taylor, "heyoka", None)
+    for module in () if compiled else (maximal_taylor, contact_taylor):
+        monkeypatch.setattr(module, "heyoka", None)
     body, axle = Body("b", 1.0, inertia=(1, 1, 1)), Joint("axle", "revolute", "world", "b", v0=(10.0,))
     mount = Bushing("mount", "world", "b", stiffness=(0, 0, 0, 0, 0, 1e-9))
     for times in ([0.0, 0.1, 0.2, 0.4], [0.0, 0.2999, 0.3001]):
-        found = find_truth(Mechanism((body,), (axle,), bushings=(mount,)), np.array(times), 1e-9)
+        found = route(Mechanism((body,), (axle,), bushings=(mount,)), np.array(times))
         assert found.end == pytest.approx(0.3, rel=1e-6)
         assert found.record.time.tolist() == times[:-1]
         assert found.ended.startswith("the bushing mount turns by more than 3 rad")
+
+
+@pytest.mark.parametrize(
+    ("until", "place"),
+    [(5.0, -0.027406676253), pytest.param(50.0, 0.00655755831, marks=pytest.mark.drill)],
+)
+def test_a_long_run_of_a_tree_is_compiled_in_both_routes(until, place):
+    """A mass on a cubic spring under a sweep is where scipy's LSODA and DOP853 have it, after any number of swings."""
+    pytest.importorskip("heyoka")
+    spring = Spring("s", "world", "m", (-10, 0, 0), force=SpringLaw("400*(L - 10) + 4000*(L - 10)^3 + 4*dL"))
+    load = Force("load", "m", "force", (Formula("80*sin(t^2/2)"), 0.0, 0.0))
+    slide = Joint("x", "prismatic", "world", "m", axis=(1, 0, 0))
+    body = Body("m", 1.6, inertia=(1, 1, 1))
+    found = find_truth(Mechanism((body,), (slide,), springs=(spring,), forces=(load,)), np.array([0.0, until]))
+    assert found.record.q[-1, 0] == pytest.approx(place, abs=2e-11)
+    assert found.routes[1] == "joint coordinates, collocation"

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.optimize import brentq, minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
+from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.truth.numerics.hybrid import follow
 from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.tree.contact_tree import ContactTree
+from proofroll_drill.referee.random_contacts import random_contacts
 
 _MU, _M, _G, _PULL = 0.3, 1.5, 9.81, 9.0
 _SLIPS = _MU * _M * _G / _PULL
@@ -108,3 +115,48 @@ def test_feet_hold_as_long_as_any_distribution_of_friction_does() -> None:
     found = truth_of(_pushed_tripod((0.3, 0.31, 0.3)), np.array([0.0, 0.29, 0.303, 0.32]))
     assert found.end == pytest.approx(0.3033057104, abs=1e-9)
     assert not found.events or found.events[0].time == pytest.approx(0.3033057104, abs=1e-9)
+
+
+def _pin_on_a_disc(twist: float) -> Mechanism:
+    """A pin that an arm presses on a disc whose axis is not its normal, at rest under a moment that grows [N m/s]."""
+    mechanism = random_contacts(259)[1]
+    hinge, shoulder = mechanism.joints
+    joints = replace(hinge, v0=(0.0,), torque=Formula(f"{twist}*t")), replace(shoulder, v0=(0.0,))
+    return replace(mechanism, joints=joints, actuators=())
+
+
+def _grip_of_the_pin(mechanism: Mechanism, moment: float) -> float:
+    """Largest margin of friction [N] of any force on the pin that both joints balance under a moment on the disc."""
+    hinge, shoulder = (np.array(joint.axis) / np.linalg.norm(joint.axis) for joint in mechanism.joints)
+    arm, at = mechanism.bodies[1], np.array(mechanism.joints[1].position)
+    pin = at + np.array(mechanism.geometries[0].position)
+    rows = np.array([np.cross(shoulder, pin - at), np.cross(hinge, pin)])
+    weight = shoulder @ np.cross(arm.com, arm.mass * np.array(mechanism.gravity))
+    force = np.linalg.lstsq(rows, [-weight, moment], rcond=None)[0]
+    across = np.cross(*rows) / np.linalg.norm(np.cross(*rows))
+
+    def excess(share: float) -> float:
+        whole = force + share * across
+        return float(np.hypot(whole[0], whole[1]) - mechanism.pairs[0].friction * whole[2])
+
+    return -float(minimize_scalar(excess, bounds=(-100, 100), method="bounded", options={"xatol": 1e-12}).fun)
+
+
+@pytest.mark.parametrize("twist", [2.0, -2.0])
+def test_one_contact_that_shares_its_load_with_joints_holds_while_any_distribution_does(twist: float) -> None:
+    """A pin on a wobbling disc holds until no force that both joints balance has its friction within the bound."""
+    mechanism = _pin_on_a_disc(twist)
+    limit = brentq(lambda time: _grip_of_the_pin(mechanism, twist * time), 0.0, 1.0, xtol=1e-14)
+    path = follow(ContactTree(ContactDynamics(mechanism), 1e-9, 1.0), 1.0)
+    assert path.stretches[0].end == pytest.approx(limit, abs=1e-9)
+    assert "c begins to slip from rest" in path.ended
+
+
+@pytest.mark.drill
+def test_forces_of_a_shared_load_are_held_to_the_law_in_a_distribution_that_its_contacts_can_bear() -> None:
+    """A pin that comes to rest on a wobbling disc breaks no law: some friction within its bound balances the joints."""
+    mechanism, until = random_contacts(259)[1:]
+    found = truth_of(mechanism, np.linspace(0.0, until, 3))
+    assert found.ended == ""
+    assert [event.time for event in found.events] == pytest.approx([0.020580191355707818], abs=1e-13)
+    assert np.isnan(found.pressed[-1]).any()

@@ -14,6 +14,7 @@ from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.studies.judging.reference import Reference
+from proofroll.truth.smooth_laws import KeptRoute, KeptStep, works_along
 
 LIFT, G = 0.2, 9.80665  # m/s, m/s²
 TIMES = np.linspace(0.0, 0.4, 9)
@@ -67,3 +68,22 @@ def test_a_motor_at_its_stop_works_by_its_path_alone() -> None:
     work, angle = found["work.effort.motor"], found["q.axle"].to_numpy()
     assert angle[-1] == pytest.approx(0.1, abs=1e-12)
     assert np.max(np.abs(work.to_numpy() - 2.0 * angle)) < work.attrs["error_bar"] < 1e-11
+
+
+def test_round_off_of_a_power_is_not_halved_without_end() -> None:
+    """Where a half resolves a power no better than the whole does, the rest is noise, and in the bar of the work."""
+    slide = Joint("x", "prismatic", "world", "m", axis=(1, 0, 0), motion=Formula("t"))
+    mechanism, asked = Mechanism((Body("m", 1.0, inertia=(1, 1, 1)),), (slide,)), list[int]()
+
+    def powers(times: FloatArray, _: FloatArray) -> FloatArray:
+        asked.append(len(times))
+        return (1 + 1e-10 * np.sin(1e9 * times))[:, None]
+
+    def nothing(*_: object) -> Any:
+        raise AssertionError
+
+    step = KeptStep(0.0, 1.0, lambda times: times[:, None])
+    works, unresolved = works_along(mechanism, KeptRoute([step], nothing, nothing, powers), np.array([0.0, 1.0]))
+    assert abs(works[-1, 0] - 1) <= 2e-10
+    assert 0 < unresolved[0] < 1e-9
+    assert sum(asked) < 1000

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +46,7 @@ def contact_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads
     if not scene.contacts:
         return
     largest = norm(pieces.force).max(-1) + scene.faint
-    touches, passed = [], set[str]()
+    passed = set[str]()
     for k, contact in enumerate(scene.contacts):
         if contact.alone or contact.pair.name not in passed:
             passed.add(contact.pair.name)
@@ -62,9 +61,8 @@ def contact_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads
         loads.works(dot(force, touch.slide), norm(force) * scene.speed)
         _surfaces(scene, pieces, residuals, touch)
         _slips(pieces, residuals, touch, largest)
-        touches.append(touch)
+        _presses(pieces, residuals, touch, largest)
         _turning(scene, pieces, residuals, loads, (touch, largest))
-    _presses(pieces, residuals, touches, largest)
 
 
 def _touch(scene: LawScene, pieces: Pieces, k: int, contact: PairContact) -> ClosedContact:
@@ -130,50 +128,13 @@ def _slips(pieces: Pieces, residuals: LawResiduals, touch: ClosedContact, larges
     )
 
 
-def _presses(pieces: Pieces, residuals: LawResiduals, touches: Sequence[ClosedContact], largest: Array) -> None:
-    """Contacts press, and what sticks has its friction within the bound.
-
-    How contacts of two bodies share a load is not determinate: each may be beyond its bound while another distribution
-    of the same sum is not.
-    """
-    groups: dict[tuple[int, int], list[ClosedContact]] = {}
-    for touch in touches:
-        groups.setdefault((touch.contact.a, touch.contact.b), []).append(touch)
-    for group in groups.values():
-        pulls = np.array([np.maximum(-touch.normal_force, 0) for touch in group])
-        if len(group) > 1 and (pulls > 1e-9 * largest).any():
-            pulls[:] = _least_pull(pieces, group, pulls)
-        for touch, pull in zip(group, pulls, strict=True):
-            residuals.note("pull", touch.contact.name, pull, largest, pieces.time)
-        held = [touch for touch in group if pieces.modes.contacts[touch.number] == "stick"]
-        excess = [
-            np.maximum(norm(touch.friction) - touch.contact.pair.static * np.maximum(touch.normal_force, 0), 0)
-            for touch in held
-            if np.isfinite(touch.contact.pair.static)
-        ]
-        if len(held) > 1 and len(excess) == len(held):
-            bound = sum(touch.contact.pair.static * np.maximum(touch.normal_force, 0) for touch in held)
-            whole = np.maximum(norm(np.sum([touch.friction for touch in held], 0)) - bound, 0)
-            excess = [np.minimum(part, whole) for part in excess]
-        for touch, part in zip(
-            (touch for touch in held if np.isfinite(touch.contact.pair.static)), excess, strict=True
-        ):
-            residuals.note("cone", touch.contact.name, part, largest, pieces.time)
-
-
-def _least_pull(pieces: Pieces, group: Sequence[ClosedContact], pulls: Array) -> Array:
-    """Part of the sum of normal forces and their moments that no distribution without pull gives, at each point."""
-    from scipy.optimize import nnls
-
-    left = np.zeros(pulls.shape[1:])
-    for index in zip(*np.nonzero(pulls.max(0) > 0), strict=True):
-        normals = [pieces.normal[(*index, touch.number)] for touch in group]
-        places = np.array([pieces.place[(*index, touch.number)] for touch in group])
-        reach = np.abs(places - places.mean(0)).max() or 1.0
-        arms = (places - places.mean(0)) / reach
-        rows = np.array([[*normal, *np.cross(arm, normal)] for normal, arm in zip(normals, arms, strict=True)]).T
-        left[index] = nnls(rows, rows @ np.array([touch.normal_force[index] for touch in group]))[1]
-    return left
+def _presses(pieces: Pieces, residuals: LawResiduals, touch: ClosedContact, largest: Array) -> None:
+    """A contact presses, and one that sticks has its friction within the bound."""
+    contact, pressed = touch.contact, np.maximum(touch.normal_force, 0)
+    residuals.note("pull", contact.name, np.maximum(-touch.normal_force, 0), largest, pieces.time)
+    if pieces.modes.contacts[touch.number] == "stick" and np.isfinite(contact.pair.static):
+        excess = np.maximum(norm(touch.friction) - contact.pair.static * pressed, 0)
+        residuals.note("cone", contact.name, excess, largest, pieces.time)
 
 
 def _turning(

@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dop853 import controlled_step, corrected_by, go_on_from, integrated_to, solver_from
+from proofroll.core.dop853 import NEAREST, controlled_step, corrected_by, go_on_from, integrated_to, solver_from
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.event_location import locate_rise
 from proofroll.core.number_format import number
@@ -223,6 +223,9 @@ def follow(
         try:
             stretch = route.walk(time, change.state, change.mode, end)
         except (Diverged, Refused) as error:
+            reached = error.time if isinstance(error, Diverged) else None
+            if reached is not None and time < reached < end:  # up to there it is known
+                stretches.append(route.walk(time, change.state, change.mode, reached * (1 - close)))
             if not stretches:
                 raise
             return path(complete=False, ended=str(error))
@@ -304,7 +307,7 @@ def integrate_to_guard(
     the stretch before, as rebounds get shorter and shorter; None: chosen from the rates.
 
     Raises:
-        Diverged: the integration fails, or would take too many steps.
+        Diverged: the rates fail, at its ``time``, or it would take too many steps.
     """
     if not until > time:
         return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=None)
@@ -313,9 +316,17 @@ def integrate_to_guard(
     dense = list[tuple[float, float, Callable[[FloatArray], FloatArray]]]()
     if first_step is not None:
         solver.h_abs = min(solver.h_abs, max(first_step, 16 * float(np.spacing(time))))
+    longest = np.inf
     while solver.t < until:
-        visited.append((solver.t, solver.y.copy()))
-        controlled_step(solver, None, until)
+        begun = solver.t, solver.y.copy()
+        try:
+            controlled_step(solver, None, until, longest)
+        except Diverged as stopped:
+            longest = min(solver.h_abs, longest, until - begun[0]) / 2
+            if longest <= NEAREST * max(until - time, begun[0]):
+                raise Diverged(str(stopped), float(begun[0])) from None
+            continue
+        visited.append(begun)
         count.took(solver.t)
         dense.append((float(solver.t_old), float(solver.t), solver.dense_output()))
         if len(law.noise) and (
@@ -377,4 +388,4 @@ def first_close(paths: Sequence[HybridPath[Any]], close: float) -> float:
     """Time [s] of the first graze, or decision whose margin is below ``close``; inf: there is none."""
     decisions = (time for path in paths for time, margin in path.margins if margin < close)
     grazes = (time for path in paths for stretch in path.stretches for time in getattr(stretch, "grazes", ()))
-    return min([*decisions, *grazes], default=np.inf)
+    return max(0.0, min([*decisions, *grazes], default=np.inf))

@@ -17,7 +17,7 @@ from proofroll.elements.mechanism.contact.acting import (
     heading_of,
     slip_velocity,
 )
-from proofroll.elements.mechanism.contact.distributions import Distribution, best_distribution, cones_of
+from proofroll.elements.mechanism.contact.distributions import ContactCones, Distribution, best_distribution, cones_of
 from proofroll.elements.mechanism.contact.joint_laws import JointContact, off_stops
 from proofroll.elements.mechanism.contact.touching import FLAT, Touching
 from proofroll.elements.mechanism.contact.turning import TurningFriction
@@ -40,6 +40,7 @@ _TOGETHER = 1e-13  # relative to the mechanism's size: gaps of contacts of a fac
 # size, by which features are left and still the nearest: round-off.
 _MOST_BORDERS, _ON_BORDER = 4, 1e-13
 NOT_SHARED = -1.0  # value of a guard that no shared load concerns
+_BORNE = 1e-9  # part of a bound by which friction of a distribution that holds may exceed it
 _DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened
 
 
@@ -120,7 +121,8 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
         guards.append(ContactGuard(-1, "tear"))
         if sum(acting.kind != "open" for acting in mode) > 1:
             guards.append(ContactGuard(-1, "share"))
-    if sum(acting.kind != "open" for acting in mode) > 1 and any(acting.kind == "stick" for acting in mode):
+    # one alone may share its load with joints that exclude a direction of its slip
+    if any(acting.kind == "stick" for acting in mode):
         guards.append(ContactGuard(-1, "grip"))
     return guards
 
@@ -189,27 +191,31 @@ class SharedForces(Protocol):
 
 
 def borne_forces(contacts: Sequence[Touchable], touching: Sequence[Touching], solved: SharedForces) -> Array:
-    """Forces, (contacts, 3); of a load that joints with dry friction share in a distribution that they can bear."""
-    shared = np.abs(solved.shifts).max(axis=(1, 2), initial=0.0) > RANK
-    rubs = any(contact.bound for contact, shares in zip(contacts, shared, strict=True) if shares)
-    grip = best_grip(contacts, touching, solved) if rubs else None
-    return solved.force if grip is None else np.asarray(solved.force + solved.shifts @ grip.weights)
+    """Forces, (contacts, 3), of a shared load in a distribution that contacts can bear; as they are without one."""
+    cones = _cones(contacts, touching, solved)
+    if not solved.shifts.shape[2] or cones.hold(np.zeros(solved.shifts.shape[2]), _BORNE):
+        return solved.force
+    best = best_distribution(cones)
+    return solved.force if best is None else np.asarray(solved.force + solved.shifts @ best.weights)
 
 
 def best_grip(contacts: Sequence[Touchable], touching: Sequence[Touching], solved: SharedForces) -> Distribution | None:
     """Distribution of a shared load that closed contacts bear best; None: they share none, or nothing sticks."""
     if not solved.shifts.shape[2] or all(acting.kind != "stick" for acting in solved.mode):
         return None
-    return best_distribution(
-        cones_of(
-            kinds=[acting.kind for acting in solved.mode],
-            normals=np.array([touch.normal for touch in touching]),
-            friction=np.array([contact.static for contact in contacts]),
-            bounds=np.array([contact.bound for contact in contacts]),
-            pressed_by=[contact.pressed_by for contact in contacts],
-            force=solved.force,
-            shifts=solved.shifts,
-        )
+    return best_distribution(_cones(contacts, touching, solved))
+
+
+def _cones(contacts: Sequence[Touchable], touching: Sequence[Touching], solved: SharedForces) -> ContactCones:
+    """Inequalities of closed contacts in a mode."""
+    return cones_of(
+        kinds=[acting.kind for acting in solved.mode],
+        normals=np.array([touch.normal for touch in touching]).reshape(-1, 3),
+        friction=np.array([contact.static for contact in contacts]),
+        bounds=np.array([contact.bound for contact in contacts]),
+        pressed_by=[contact.pressed_by for contact in contacts],
+        force=solved.force,
+        shifts=solved.shifts,
     )
 
 

@@ -27,8 +27,9 @@ from proofroll.elements.mechanism.contact.acting import (
 )
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.dynamics.switches import REDUNDANT
+from proofroll.elements.mechanism.scene.bushing import LARGEST
 from proofroll.elements.mechanism.scene.kinks import JUMP
-from proofroll.elements.mechanism.scene.rotations import Array, cross
+from proofroll.elements.mechanism.scene.rotations import Array, cross, from_quaternion
 from proofroll.elements.mechanism.scene.signal import varies
 from proofroll.truth.followed_paths import CLOSE, TOLERANCES
 from proofroll.truth.numerics.hybrid import Stretch, StretchLaw, integrate_to_guard, states_at
@@ -60,6 +61,7 @@ _SAME_RATES = 1e-6
 _NEARBY, _TURNS = 1e-3, 2
 # Guard of the first instants of a slip, which goes on.
 _GOES_ON = -1
+_LOOKS = 32  # at the turn of bushings in a step, which is resolved by half as many points
 
 
 class SwitchedEquations(Protocol):
@@ -249,8 +251,8 @@ class ContactWalks(ABC):
         compiled, by_states = self.by_symbols(state, mode), "DOP853"
         if compiled is not None:
             name = "collocation" if self._by_collocation else "Taylor series"
-            with suppress(Diverged):
-                stretch = compiled.walk(self._law(state, mode, self._signs), mode, time, state, until)
+            stretch = self.walk_compiled(compiled, time, state, mode, until)
+            if stretch is not None:
                 self._used.setdefault(name)
                 return stretch
             by_states = f"DOP853 where {name} failed"
@@ -260,6 +262,35 @@ class ContactWalks(ABC):
         )
         self._span = stretch.end - time if stretch.end > time else None
         return stretch
+
+    def walk_compiled(
+        self, compiled: CompiledMode, time: float, state: Array, mode: ContactMode, until: float
+    ) -> Stretch[ContactMode] | None:
+        """Stretch by a compiled mode; None: its steps fail, or a bushing turns further than its law says."""
+        with suppress(Diverged):
+            stretch = compiled.walk(self._law(state, mode, self._signs), mode, time, state, until)
+            return None if self._overturns(compiled, stretch) else stretch
+        return None
+
+    def _overturns(self, compiled: CompiledMode, stretch: Stretch[ContactMode]) -> bool:
+        """True if a bushing turns further than its rotation vector is unique, which compiled equations do not ask."""
+        mechanism = self._equations.mechanism
+        if not mechanism.bushings or not isinstance(stretch, CompiledStretch):
+            return False
+        steps = compiled.steps_of(stretch)
+        states = (y for start, end, inside in steps for y in inside(np.linspace(start, end, _LOOKS)).T)
+        world = np.eye(3)
+        for state in states:
+            turns = [*map(from_quaternion, self.bodies(state)[2]), world]
+            pairs = (
+                (mechanism.body_index[item.body_a], mechanism.body_index[item.body_b]) for item in mechanism.bushings
+            )
+            if any(
+                item.turned(turns[a], turns[b]) > LARGEST
+                for item, (a, b) in zip(mechanism.bushings, pairs, strict=True)
+            ):
+                return True
+        return False
 
     def by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
         """Compiled mode, if all parts of the mechanism have a rule in symbols and no load is shared."""

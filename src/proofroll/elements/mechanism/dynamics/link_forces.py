@@ -123,7 +123,7 @@ def put_links(
     if work is None:
         work, errors = sampled_works(placed.time, powers(placed, named))
     for k, (_, item) in enumerate(drives):
-        absent = unsaid if np.all(np.isnan(work[1:, k])) else ""
+        absent = unsaid if np.isnan(work[-1, k]) else ""
         error = {SAMPLED_BAR: float(errors[k])} if len(errors) else {}
         put(f"work.{item.name}", work[:, k], "J", f"work of {item.name}", absent=absent, **error)
 

@@ -140,8 +140,8 @@ def columns(
 
     ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3);
     ``sums``: of forces of contacts by :func:`.contact_sums`, (time, sums, 3), by default from ``pressed``;
-    ``unsaid``: reason of what is NaN at all times; ``work``: of drives [J], (time, drives), by default summed over the
-    samples;
+    ``unsaid``: reason of what is NaN at the last time; ``work``: of drives [J], (time, drives), by default summed over
+    the samples;
     ``named``: see :func:`~proofroll.elements.mechanism.dynamics.named_forces.named_forces`, (time, forces).
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
@@ -150,7 +150,8 @@ def columns(
     determinate components of all; ``effort.<actuator>``, ``coupling.<name>``, ``friction.<joint>``, ``stop.<joint>``
     [N, N m] along coordinates; ``force.<spring>`` [N], ``force.<bushing>.x|y|z``, ``torque.<bushing>.x|y|z`` on its
     body_b, ``work.effort.<actuator>``, ``work.drive.<joint>`` [J]; ``force.<pair>.x|y|z`` [N] on the body of its first
-    geometry, the sum where a pair touches at several places, ``gap.<pair>`` [m], ``slip.<pair>`` [m/s], and residuals
+    geometry, the sum where a pair touches at several places, ``net_force.<body>.x|y|z`` [N], the sum of the contacts
+    of a body that touches in several pairs, ``gap.<pair>`` [m], ``slip.<pair>`` [m/s], and residuals
     of Coulomb's law, see
     :data:`~proofroll.elements.mechanism.run.contacts.observables.RESIDUALS`; ``energy`` [J], ``drift`` [m], and
     ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
@@ -185,7 +186,7 @@ def columns(
                 meaning = f"{kind} on the child of {connection.name}"
                 component = masked[:, index, axis]
                 absent = "" if mask[index, axis] else UNDETERMINED
-                absent = absent or (unsaid if np.all(np.isnan(component)) else "")
+                absent = absent or (unsaid if np.isnan(component[-1]) else "")
                 put(f"{kind}.{connection.name}.{letter}", component, unit, meaning, absent=absent)
         if np.any(mask):
             meaning = f"determinate components of the {kind}s on children"
@@ -193,7 +194,7 @@ def columns(
     if mechanism.contacts:
         _put_contacts(element, placed, pressed, sums, unsaid, put)
     for values, item in zip(named.T, named_forces(mechanism), strict=True):
-        put(item.name, values, str(item.unit), item.meaning, absent=unsaid if np.all(np.isnan(values)) else "")
+        put(item.name, values, str(item.unit), item.meaning, absent=unsaid if np.isnan(values[-1]) else "")
     put_links(placed, named, put, unsaid, work)
     energy = placed.energy()
     wound = [doubts[joint.name][UNCERTAIN] for joint in mechanism.joints if joint.stiffness and joint.name in doubts]
@@ -251,7 +252,7 @@ def _put_contacts(
     for index, (name, numbers) in enumerate(shared.items()):
         for axis, letter in enumerate("xyz"):
             component = sums[:, index, axis]
-            absent = unsaid if np.all(np.isnan(component)) else ""
+            absent = unsaid if np.isnan(component[-1]) else ""
             meaning = f"sum of the forces of {name} on {placed.mechanism.contacts[numbers[0]].body_a}"
             put(f"force.{name}.{letter}", component, "N", meaning, absent=absent)
     if shared:
@@ -260,10 +261,14 @@ def _put_contacts(
     if carried:
         meaning = "sums of the contact forces on bodies that touch in several pairs"
         put("net_forces", sums[:, len(shared) :], "N", meaning, "carried", "xyz")
+    for body, net in zip(carried, np.moveaxis(sums[:, len(shared) :], 1, 0), strict=True):
+        for component, letter in zip(net.T, "xyz", strict=True):
+            absent = unsaid if np.isnan(component[-1]) else ""
+            put(f"net_force.{body}.{letter}", component, "N", f"sum of the contact forces on {body}", absent=absent)
     for index, contact in enumerate(placed.mechanism.contacts):
         for axis, letter in enumerate("xyz"):
             component = pressed[:, index, axis]
-            absent = unsaid if np.all(np.isnan(component)) else ""
+            absent = unsaid if np.isnan(component[-1]) else ""
             meaning = f"force of {contact.name} on {contact.body_a}"
             put(f"force.{contact.name}.{letter}", component, "N", meaning, absent=absent)
         put(f"gap.{contact.name}", followed.gap[:, index], "m", f"distance of what {contact.name} may touch")
