@@ -42,7 +42,6 @@ from proofroll.truth.switching.held_route import BodyStates
 _MOST = 6  # largest number of closed contacts of which all modes are tried: each has up to four
 _PIVOTS = 4  # exchanges at most of a search by pivots, for each contact
 _CLEAR = 1e-6  # relative margin above which a mode found by pivots is the only one
-_SHARING = 2  # least number of contacts that may share a load
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
 
 
