@@ -27,6 +27,7 @@ from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.labels import engine_words
+from proofroll.report.page.choice_cell import cell_of
 from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.page.html import templates
 from proofroll.report.page.scene_sheet import scene_sheet
@@ -127,7 +128,7 @@ def standings(outcome: Outcome) -> str:
     matrix = choice_matrix(lines_of(outcome), {name: ChoiceStudy(outcome.comparison.title, "")})
     column = next(item for item in matrix.columns if item.whole)
     rows = [row for row in matrix.rows if not row.setting]
-    found = {row.name: matrix.cell(row, column, TOLERANCE, False).state for row in rows}
+    found = {row.name: cell_of(row.found[name], TOLERANCE, False).state for row in rows}
     return f"<!-- at 1e-4: {json.dumps({column.group: found})} -->\n"
 
 
