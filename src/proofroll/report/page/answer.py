@@ -90,7 +90,7 @@ class ColumnAnswer:
 
     @property
     def exceptions(self) -> list[str]:
-        """Scenes that the engine to take does not hold, or holds less cheaply: the best engine of each, or the closest."""
+        """Best or closest engine of each scene that the engine to take does not hold, or holds less cheaply."""
         taken = self.taken
         if taken is None or not taken.by_scene:
             return []
