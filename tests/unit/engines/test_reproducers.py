@@ -77,7 +77,7 @@ def test_a_program_has_constant_forces() -> None:
     [
         ("exudyn", "saturated_servo", "redundant", "are functions"),
         ("exudyn", "sphere_in_cylinder", "carrier", "proofroll's"),
-        ("mujoco", "sphere_in_cylinder", "chart", "proofroll's"),
+        ("mujoco", "sphere_in_cylinder", "chart", "not MuJoCo's alone"),
     ],
 )
 def test_what_has_no_program(engine: str, name: str, formulation: str, words: str) -> None:

@@ -90,7 +90,7 @@ class ColumnAnswer:
 
     @property
     def exceptions(self) -> list[str]:
-        """For each scene that the engine to take does not hold, or where another is cheaper: which, or the closest."""
+        """Best or closest engine of each scene that the engine to take does not hold, or holds less cheaply."""
         taken = self.taken
         if taken is None or not taken.by_scene:
             return []
@@ -110,7 +110,7 @@ class ColumnAnswer:
     def failures(self) -> list[ChoiceCell]:
         """Cells of settings that fail, one per formulation; ``name`` for a reader, ``why`` in at most twelve words.
 
-        Where another setting of the formulation holds the tolerance, only a failing default is told.
+        Where another setting of the formulation holds the tolerance, only a failing default has an entry.
         """
         entries: list[tuple[int, float, ChoiceCell, str]] = []
         for row in self.matrix.rows:

@@ -94,7 +94,7 @@ class ChoiceCell(NamedTuple):
         return self is not best and bool(pairs) and all(mine.near(other) for mine, other in pairs)
 
     def near(self, other: "ChoiceCell") -> bool:
-        """True if the costs of two cells of one scene cannot be told apart."""
+        """True if the costs of two cells of one scene overlap."""
         return self.holds and not (self.clean and other.clean) and self.cost < TIE * other.cost
 
     @property

@@ -170,7 +170,7 @@ def plan(
     An engine in another interpreter, ``mujoco@3.8.1``, runs the rows of ``mujoco`` there.
 
     Args:
-        comparison: what to run.
+        comparison: rows, points and times.
         engines: to which it is restricted; empty: all.
         workers: pool for questions to engines; None: new workers.
         coarser: True to run settings that should agree with coarser steps, too, for advice on the cheapest one.
