@@ -17,7 +17,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 # In CSS pixels, drawn with two device pixels to each, so that the numbers can be read.
 WIDTH, MOST_HEIGHT, DENSITY = 1400, 1100, 2
 # A page of text and flat cells has few colours; a palette makes the file a third as large.
-COLOURS = 64
+COLOURS = 128
 # The end of the picture, and the first table of verdicts, which stands below it.
 COUNTS, VERDICTS = ".counts", ".matrix"
 # Row for row: what the comparison file calls it, and its verdict.
