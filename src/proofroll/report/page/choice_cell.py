@@ -206,6 +206,13 @@ def _beyond(size: float, tolerance: float, digits: int = 1) -> str:
     )
 
 
+def told_apart(cases: Sequence[str]) -> list[str]:
+    """Cases in words without the parameters that all of them share."""
+    parts = [case.split(", ") for case in cases]
+    shared = set(parts[0]).intersection(*parts[1:])
+    return [", ".join(item for item in case if item not in shared) or "as the scene is" for case in parts]
+
+
 def of_cases(cells: Mapping[str, ChoiceCell], own: str | None, count: int) -> ChoiceCell:
     """Cell of a scene: that of its own case if all cases are held, without one of the slowest; else the worst.
 
@@ -216,7 +223,8 @@ def of_cases(cells: Mapping[str, ChoiceCell], own: str | None, count: int) -> Ch
     """
     worst = max(cells.values(), key=lambda item: (SEVERITY.index(item.state), item.cost))
     held = sum(cell.state == Verdict.AGREES for cell in cells.values())
-    title = worst.title if len(cells) == 1 else "; ".join(f"{case}: {cell.title}" for case, cell in cells.items())
+    titles = zip(told_apart(list(cells)), cells.values(), strict=True)
+    title = worst.title if len(cells) == 1 else "; ".join(f"{case}: {cell.title}" for case, cell in titles)
     if held == count:
         return cells.get(own or "", worst)._replace(title=title)
     if not held:

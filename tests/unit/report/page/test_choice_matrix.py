@@ -231,6 +231,7 @@ def test_the_cheapest_run_of_all_studies_counts_at_the_same_case() -> None:
     longer = {"study": "chain", "case": "speed=2, 1 s", "own_case": False}
     assert at([*ARM, replace(better, **longer, cost=1.0)], 3)[:2] == (Verdict.AGREES, "≥ 100×"), "the scene's own"
     assert at([*ARM, replace(worse, **longer)], 3)[:2] == (PARTLY, "1 of 2 cases")
+    assert "speed=2: alpha joints" in at([*ARM, replace(worse, **longer)], 3).title, "what all cases share is left out"
     once = [*ARM, replace(better, **longer, engine="beta")]
     cell = at(once, 3)
     assert (cell.state, cell.why) == (PARTLY, "was not run in the others; holds 1 of 2 cases")
