@@ -43,7 +43,7 @@ OUTCOMES = {
     "absent": (Status.MISSING, "absent is not installed here"),
     "misspelt": (Status.CRASHED, "NoSuchClass"),
     "judges_itself": (Status.CRASHED, "changed proofroll.core.certificate.Line.holds in its process"),
-    "leaks": (Status.CRASHED, "its process could not write a file any more (Too many open files)"),
+    "leaks": (Status.CRASHED, "Too many open files"),  # of the trajectory, or of a module that is read later
     "limits_files": (Status.CRASHED, "its process could not write a file any more (File too large)"),
     "moves_the_bar": (Status.CRASHED, "changed proofroll.core.certificate.EXACT in its process"),
     "signs_for_the_ball": (
