@@ -36,14 +36,14 @@ def test_several_scenes_are_advised_from_a_report(proofroll: Proofroll, report: 
     assert (code, err) == (0, "")
     content = json.loads(out)
     assert content["tolerance"] == 1e-3
-    assert content["shown_over"] == {"arm": "1 s", "ball": "1 s"}
+    assert content["shown_over"] == {"arm": 1.0, "ball": 1.0}
     assert [item["of"] for item in content["advice"]] == ["trees", "arm", "ball rolling", "ball", "all"]
     assert [item["choice"] for item in content["advice"][::2]] == [
         "alpha joints default at dt 1e-3 s", "beta joints default at dt 1e-3 s", "alpha joints, beta joints",
     ]  # fmt: skip
     code, out, _ = proofroll("recommend", "arm", "ball", "--tolerance", "0.1 %", "--out", str(report.parent))
     assert code == 0
-    assert "Shown over 1 s (arm), 1 s (ball)." in out or "Shown over 1 s (ball), 1 s (arm)." in out
+    assert "Shown over 1 s (arm), 1 s (ball)." in out
     assert "Over all, 2 scenes, to 1e-3: alpha joints holds it in 1; beta joints brings it to 2." in " ".join(
         out.split()
     )

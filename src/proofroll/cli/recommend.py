@@ -143,8 +143,8 @@ def _own_lines(recommendation: Recommendation) -> list[str]:
     engine = load_engine(choice.point.engine)
     if not isinstance(engine, TellsLines):
         raise ProofrollError(f"--lines: the adapter of {choice.point.engine} tells none")
-    given = {name: value for name, value in choice.point.settings.items() if value is not None}
-    return engine.lines(resolve_settings(engine, given))
+    options_set = {name: value for name, value in choice.point.settings.items() if value is not None}
+    return engine.lines(resolve_settings(engine, options_set))
 
 
 def _is_in_report(name: str, path: Path) -> bool:
@@ -164,7 +164,6 @@ def _from_report(
     from proofroll.core.comparison import Tolerance
     from proofroll.files.scene_file import is_scene
     from proofroll.files.toml import named_file
-    from proofroll.report.long_table import case_duration
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
     from proofroll.report.terminal.tables import answer_table
@@ -196,7 +195,7 @@ def _from_report(
     matrix = choice_matrix(lines, studies, report.names)
     advised = advice(matrix, part, forces)
     costs = _engine_costs(matrix, part, forces=forces)
-    durations = {line.scene: case_duration(line.case) for line in reversed(lines)}
+    durations = {line.scene: line.until for line in reversed(lines)}
     content = {
         "report": str(path),
         "tolerance": part,
@@ -209,7 +208,7 @@ def _from_report(
     head = f"Tolerance: {number(part)} {'of the path' if bound.relative else unit}."
     key = "× real time: seconds of motion per second of computing; ≈: to a factor of about two; ≥: at least."
     shown: list[Table | str] = [answer_table(matrix, part, forces, scenes=True), advised[-1].sentence]
-    shown.append(f"Shown over {', '.join(f'{time} ({scene})' for scene, time in durations.items())}.")
+    shown.append(f"Shown over {', '.join(f'{number(time)} s ({scene})' for scene, time in sorted(durations.items()))}.")
     options.show(content, as_json, lambda: [head, *shown, *_cost_tables(costs), key])
     single = [item for item, column in zip(advised, matrix.columns, strict=False) if not column.whole]
     chosen = [bool(item.choice) for item in single if item.judged]

@@ -27,8 +27,9 @@ class TableLine:
         group: group of the scene.
         scene: name of the scene.
         place: parameters of the run in words; empty: the scene's own.
-        case: all parameters of the scene and the length of the run in words (:func:`case_words`).
-        own_case: True if all parameters are the scene's own.
+        case: all parameters of the scene in words, defaults included.
+        own_case: True if all of them are the scene's own.
+        until: length of the run [s].
         row: number of the run's row in its study; of a trade-off, of its curve.
         engine, version, formulation, preset, setting, precision: of the run; ``setting`` has preset and further
         options.
@@ -60,6 +61,7 @@ class TableLine:
     place: str
     case: str
     own_case: bool
+    until: float
     row: int
     engine: str
     version: str
@@ -93,6 +95,11 @@ class TableLine:
     clean: bool
 
     @property
+    def timed_case(self) -> str:
+        """All parameters and the length of the run in words; runs of different studies compete where it is the same."""
+        return ", ".join(filter(None, (self.case, f"{self.until:.12g} s")))
+
+    @property
     def relative(self) -> float:
         """Error plus the truth's error bar, relative to the quantity's size; inf without either."""
         if self.error is None or not self.scale:
@@ -107,15 +114,9 @@ class TableLine:
         return max(0.0, self.limit_error - (self.limit_doubt or 0.0)) / self.scale
 
 
-def case_words(parameters: Mapping[str, float], until: float) -> str:
-    """Parameters of a scene, defaults included, and the length of a run [s], in words."""
-    values = [f"{name}={value:.12g}" for name, value in sorted(parameters.items())]
-    return ", ".join([*values, f"{until:.12g} s"])
-
-
-def case_duration(case: str) -> str:
-    """Length of the runs of a case, as ``0.5 s``."""
-    return case.rpartition(", ")[2]
+def case_words(parameters: Mapping[str, float]) -> str:
+    """Parameters of a scene, defaults included, in words."""
+    return ", ".join(f"{name}={value:.12g}" for name, value in sorted(parameters.items()))
 
 
 def setting_columns(name: str, engine: str, facts: EngineFacts | SweptSetting) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def told(engine: str, **options: Any) -> tuple[Any, str]:
 @pytest.mark.parametrize("formulation", ["joints", "geoms"])
 def test_lines_of_mjcf_make_the_options_of_the_settings(formulation: str, preset: str) -> None:
     """A user's own model with the lines has the step, the integrator, the cone and the softness of the settings."""
-    settings, lines = told("mujoco", formulation=formulation, preset=preset)
+    settings, lines = told("mujoco", formulation=formulation, preset=preset, dt=1 / 871)
     model = mujoco.MjModel.from_xml_string(f"<mujoco>{lines}{BALL}</mujoco>")
     assert model.opt.timestep == settings.dt
     assert mujoco.mjtIntegrator(model.opt.integrator).name == f"mjINT_{settings.integrator.upper()}"
@@ -76,7 +76,7 @@ def test_lines_for_pinocchio_give_an_acceleration(preset: str) -> None:
     moved = pin.getAcceleration(model, data, end).linear
     assert np.linalg.norm(names["a"]) > 1
     assert np.abs(moved).max() < 1e-6
-    assert (f"{settings.dt:g} s" if settings.dt else f"{settings.rtol:g}") in lines
+    assert (f"{settings.dt!r} s" if settings.dt else repr(settings.rtol)) in lines
 
 
 @pytest.mark.parametrize(

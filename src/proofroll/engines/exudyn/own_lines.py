@@ -5,7 +5,7 @@ from typing import Any
 
 from proofroll.engines.exudyn.integration import simulation_settings
 from proofroll.engines.exudyn.native import exu
-from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
 # Settings that say what a run writes and how long it is.
 _OF_A_RUN = (
@@ -26,8 +26,10 @@ def own_lines(settings: ExudynSettings) -> list[str]:
         for name, value in made.items()
         if value != usual.get(name) and not name.startswith(_OF_A_RUN)
     ]
-    steps = f"round(simulationSettings.timeIntegration.endTime / {settings.dt:g})"
+    steps = f"round(simulationSettings.timeIntegration.endTime / {settings.dt!r})"
     lines.append(f"simulationSettings.timeIntegration.numberOfSteps = {steps}")
+    if settings.integrator not in EXPLICIT:
+        lines.append("# newton.absoluteTolerance: as many times that as kilograms move, of more than 1 kg")
     if settings.stiffness is not None:
         lines.append(f"# contact: stiffness {settings.stiffness:g} N/m, friction zone {settings.friction_zone:g} m/s")
     return lines

@@ -26,9 +26,15 @@ def own_lines(settings: MujocoSettings) -> list[str]:
     spec.compile()
     lines: list[str] = []
     for section in ElementTree.fromstring(spec.to_xml()):
+        if section.tag == "option":
+            section.set("timestep", repr(settings.dt))  # MjSpec writes six digits
         if section.tag in {"option", "default"}:
             ElementTree.indent(section)
             lines += ElementTree.tostring(section, encoding="unicode").strip().splitlines()
+    if settings.formulation == "geoms":
+        lines.append(
+            '<!-- a pair with restitution e: solref="-1 -(1 + e)/timestep" solreffriction="-1e-9 -1/timestep" -->'
+        )
     edits = ["cone_correction", "curvature"] if settings.formulation == "geoms" else []
     edited = [name for name in edits if getattr(settings, name)]
     if edited:

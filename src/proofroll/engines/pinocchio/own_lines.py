@@ -5,8 +5,8 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.constraint_dynamics import ACCURACY, ITERATIONS
 
 _STEPS = {
-    "rk4": "# classical Runge-Kutta with dt = {0.dt:g} s; places by pin.integrate(model, q, v * dt)",
-    "dop853": "# scipy.integrate.DOP853 with rtol = {0.rtol:g}; places by the rates of q",
+    "rk4": "# classical Runge-Kutta with dt = {0.dt!r} s; places by pin.integrate(model, q, v * dt)",
+    "dop853": "# scipy.integrate.DOP853 with rtol = {0.rtol!r}; places by the rates of q",
 }
 
 

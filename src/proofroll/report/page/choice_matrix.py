@@ -206,11 +206,13 @@ class ChoiceMatrix:
         """Cell of a scene: per case the cheapest run of all studies that holds; None without a run."""
         cases = [case for case in scene.cases if (group, scene.name, case) in self.judged_cases[forces]]
         keys = [(group, scene.name, case) for case in cases or scene.cases]
-        found = {key[-1]: row.cases[key] for key in keys if key in row.cases}
-        ran = {case: items for case, items in found.items() if any(x.blame != Verdict.NOT_JUDGED for x in items)}
-        cells = {case: cell_of(items, tolerance, forces) for case, items in (ran or found).items()}
+        candidates_of = {key[-1]: row.cases[key] for key in keys if key in row.cases}
+        ran = {
+            case: items for case, items in candidates_of.items() if any(x.blame != Verdict.NOT_JUDGED for x in items)
+        }
+        cells = {case: cell_of(items, tolerance, forces) for case, items in (ran or candidates_of).items()}
         # A case that was left out for lack of time counts against nobody.
-        count = len(cases) - len(found.keys() - ran.keys()) if ran and cases else len(cells)
+        count = len(cases) - len(candidates_of.keys() - ran.keys()) if ran and cases else len(cells)
         return of_cases(cells, scene.own, count) if cells else None
 
     def _without_run(self, row: ChoiceRow, column: ChoiceColumn) -> ChoiceCell:
@@ -347,15 +349,15 @@ def choice_matrix(
         groups.setdefault(row_line.group, {}).setdefault(row_line.scene, {})[name] = None
         by_case: dict[str, list[TableLine]] = {}
         for item in of_row:
-            by_case.setdefault(item.case, []).append(item)
-            cases.setdefault((item.group, item.scene), {})[item.case] = item.own_case
-        found = {case: candidates(items, study.href, study.runs) for case, items in by_case.items()}
+            by_case.setdefault(item.timed_case, []).append(item)
+            cases.setdefault((item.group, item.scene), {})[item.timed_case] = item.own_case
+        steps_of_case = {case: candidates(items, study.href, study.runs) for case, items in by_case.items()}
         for setting in ("", row_line.setting or "as it is"):
             key = (row_line.engine, row_line.formulation, setting)
             row = rows.setdefault(key, ChoiceRow(*key, own_equations=key[:2] in derived))
             row.found.setdefault(name, []).extend(steps)
-            for case, items_found in found.items():
-                row.cases.setdefault((row_line.group, row_line.scene, case), []).extend(items_found)
+            for case, case_steps in steps_of_case.items():
+                row.cases.setdefault((row_line.group, row_line.scene, case), []).extend(case_steps)
     columns = []
     for group, studies_of in groups.items():
         scenes = tuple(_scene(name, of_scene, [*cases[group, name].items()]) for name, of_scene in studies_of.items())
@@ -379,5 +381,5 @@ def choice_matrix(
 
 def _scene(name: str, studies: Iterable[str], cases: Sequence[tuple[str, bool]]) -> ChoiceScene:
     """A scene with its studies; ``cases``: each with True if it has the scene's own parameters."""
-    own = next((case for case, is_own in cases if is_own), None)
-    return ChoiceScene(name, tuple(studies), tuple(case for case, _ in cases), own)
+    own_case = next((case for case, is_own in cases if is_own), None)
+    return ChoiceScene(name, tuple(studies), tuple(case for case, _ in cases), own_case)

@@ -121,8 +121,8 @@ class TradeoffPart(Part):
         assert study is not None  # it was made
         scene = self.asked.swept.loaded
         group, place = group_of(scene), point_name(study.parameters)
-        case = case_words(scene.parameters, study.until)
-        own = dict(scene.parameters) == dict(load_scene(study.scene).parameters)
+        case = case_words(scene.parameters)
+        is_own = case == case_words(load_scene(study.scene).parameters)
         units = {name: item.unit for name, item in scene.observables.items()}
         limits = {(item.curve, item.quantity): _limit(item, units[item.quantity]) for item in study.budgets}
         lines = []
@@ -131,7 +131,7 @@ class TradeoffPart(Part):
             low, high = point.interval or (None, None)
             run: dict[str, Any] = {
                 "study": self.asked.name, "group": group, "scene": study.scene, "place": place,
-                "case": case, "own_case": own,
+                "case": case, "own_case": is_own, "until": study.until,
                 "row": rows[point.curve], "version": study.measured.versions.get(point.engine, ""),
                 "own_equations": by_hand(point.level), "status": point.status,
                 "message": "" if point.status == Status.DONE else point.message, "verdict": "",

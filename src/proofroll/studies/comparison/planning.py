@@ -32,8 +32,6 @@ _USUAL = [4.0, 2.0, 1.0]
 # Ladders that replace it if its steps do not fit between samples, the cheapest first.
 _LADDERS = (_USUAL, [2.0, 1.0, 0.5], [1.0, 0.5, 0.25])
 
-_SAME = 1e-9  # relative difference of two factors that are equal but for round-off
-
 _FIRST = " (the first "  # beginning of a remark in the title of a comparison
 
 
@@ -323,16 +321,17 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
 
 
 def _coarser(comparison: Comparison, row: Row, facts: EngineFacts | ProofrollError, times: FloatArray) -> list[float]:
-    """Factors on the step of an engine's row that should agree, beyond its ladder: half the steps between samples.
+    """Factors on the step of an engine's row that should agree, beyond its ladder.
 
-    They end with one step between two samples.
+    They are whole, so that a person can write the steps down, at least double, and end with one step between samples.
     """
     if not isinstance(facts, EngineFacts) or facts.witness or facts.step is None or Verdict.AGREES not in row.expect:
         return []
-    many, factors = round(comparison.every / facts.step), []
-    while many := many // 2:
-        factors.append(comparison.every / many / facts.step)
-    beyond = [factor for factor in factors if factor > max(row.ladder) * (1 + _SAME)]
+    steps_between, factors = round(comparison.every / facts.step), [1]
+    for factor in range(2, steps_between + 1):
+        if steps_between % factor == 0 and factor >= 2 * factors[-1]:
+            factors.append(factor)
+    beyond = [float(factor) for factor in factors if factor > max(row.ladder)]
     return [factor for factor in beyond if _misfit([factor], facts.step, times) is None]
 
 

@@ -2,7 +2,7 @@
 
 Tables and held values are lines from one break to the next: their coefficients are parameters, too.
 Operations with plain numbers as of formulas (0, 1, 2, a half and their negatives) keep them, as those of a scene may be
-any: a scene with other numbers has the same expression.
+any: a scene with operand numbers has the same expression.
 """
 
 from __future__ import annotations
@@ -87,38 +87,38 @@ class Symbol:
         """Function of this expression, by its name."""
         return self._constants.applied(name, self)
 
-    def _with(self, other: Any, operation: Callable[[Any, Any], Any]) -> Symbol:
-        return Symbol(operation(self.expression, self._constants.symbol(other)), self._constants)
+    def _with(self, operand: Any, operation: Callable[[Any, Any], Any]) -> Symbol:
+        return Symbol(operation(self.expression, self._constants.symbol(operand)), self._constants)
 
-    def __add__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: a + b)
+    def __add__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: a + b)
 
-    def __radd__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: b + a)
+    def __radd__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: b + a)
 
-    def __sub__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: a - b)
+    def __sub__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: a - b)
 
-    def __rsub__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: b - a)
+    def __rsub__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: b - a)
 
-    def __mul__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: a * b)
+    def __mul__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: a * b)
 
-    def __rmul__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: b * a)
+    def __rmul__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: b * a)
 
-    def __truediv__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: a / b)
+    def __truediv__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: a / b)
 
-    def __rtruediv__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: b / a)
+    def __rtruediv__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: b / a)
 
-    def __pow__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: a**b)
+    def __pow__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: a**b)
 
-    def __rpow__(self, other: Any) -> Symbol:
-        return self._with(other, lambda a, b: b**a)
+    def __rpow__(self, operand: Any) -> Symbol:
+        return self._with(operand, lambda a, b: b**a)
 
     def __neg__(self) -> Symbol:
         return Symbol(-self.expression, self._constants)

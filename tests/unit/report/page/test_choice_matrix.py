@@ -228,7 +228,7 @@ def test_the_cheapest_run_of_all_studies_counts_at_the_same_case() -> None:
     assert at([*ARM, better], 3)[:2] == (Verdict.AGREES, "≥ 1000×")
     worse = line(study="chain", error=4e-2)
     assert at([*ARM, worse], 3).state == Verdict.AGREES
-    longer = {"study": "chain", "case": "speed=2, 1 s", "own_case": False}
+    longer = {"study": "chain", "case": "speed=2", "own_case": False}
     assert at([*ARM, replace(better, **longer, cost=1.0)], 3)[:2] == (Verdict.AGREES, "≥ 100×"), "the scene's own"
     assert at([*ARM, replace(worse, **longer)], 3)[:2] == (PARTLY, "1 of 2 cases")
     assert "speed=2: alpha joints" in at([*ARM, replace(worse, **longer)], 3).title, "what all cases share is left out"
