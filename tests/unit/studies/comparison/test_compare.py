@@ -212,6 +212,9 @@ def test_a_coarser_step_for_advice_decides_no_verdict(tmp_path: Path) -> None:
     assert run.verdict is Verdict.AGREES
     errors = {rung.value: rung.errors.get("z") for rung in run.rungs}
     assert errors == {8e-3: None, 4e-3: pytest.approx(1e-3), 2e-3: 0.0, 5e-4: 0.0}
+    lost = beyond | {0.5: lambda *_: Result(Status.DIVERGED, "at a finer step")}
+    (run,) = judged(tmp_path / "lost", claim([row], [4.0]), the_truth, rungs=lost).runs
+    assert "dt 0.0005 diverged: at a finer step" in run.contradictions[0], "not the coarser one"
 
 
 def test_a_tolerance_that_the_engine_refuses_is_no_rung(tmp_path: Path) -> None:
