@@ -440,3 +440,25 @@ def test_a_ball_that_rolls_across_a_slope_begins_to_slip_down_it() -> None:
     run.advance(0.1)
     pull = 9.81 * (np.sin(lean) - friction * np.cos(lean))
     assert run.sample().v_WB[0] == pytest.approx([0.1 * pull * normal[2], -speed, -0.1 * pull * normal[0]], abs=1e-9)
+
+
+def test_corners_of_a_face_land_together() -> None:
+    """A box that falls back from one of its edges onto its face comes to rest by one impact of its other two corners."""
+    tilt, half = 0.1, np.array([0.2, 0.1, 0.1])
+    height = half[0] * np.sin(tilt) + half[2] * np.cos(tilt)
+    scene = Mechanism(
+        bodies=(Body("box", 2.0, inertia=(0.0133, 0.0333, 0.0333)),),
+        joints=(
+            Joint("free", "free", "world", "box", q0=(0, 0, height, np.cos(tilt / 2), 0.0, np.sin(tilt / 2), 0.0)),
+        ),
+        geometries=(Geometry("solid", "box", "box", size=(0.4, 0.2, 0.2)), Geometry("floor", "world", "plane")),
+        pairs=(Pair("touch", ("solid", "floor"), friction=0.8),),
+        gravity=(0.0, 0.0, -9.81),
+    )
+    run = PROJECTION.build(scene, replace(DEFAULT, dt=1e-3))
+    run.advance(0.3)
+    impacts = [event for event in run.events() if event.kind in {"impact", "lift_off"}]
+    assert [event.kind for event in impacts] == ["impact", "impact"]
+    assert impacts[0].time == impacts[1].time
+    sample = run.sample()
+    np.testing.assert_allclose([*sample.v_WB[0], *sample.w_WB[0]], 0.0, atol=1e-12)

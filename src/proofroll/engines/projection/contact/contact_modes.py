@@ -59,6 +59,9 @@ from proofroll.engines.projection.smooth.elimination import solved as divided
 
 _RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
 _OVERLAP = 1e-14  # overlap that is round-off, relative to the natural length
+# Gap, relative to the natural length, difference of times, in units of their last digit, and of closing speeds,
+# relative to these, with which corners of a face land together.
+_TOGETHER, _ULPS_APART, _ALIKE = 1e-13, 8, 1e-9
 _STANDS = 1e-6  # acceleration, relative to the natural one, too small to start a motion
 _REST = 1e-2  # slip speed, relative to gravity times a fixed step, below which slips end together with another one
 
@@ -389,9 +392,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         instant, closed_mask = self.at(x), [acting.kind != "open" for acting in old_mode]
         resting = [acting.kind == "stick" for acting in old_mode]
         if kind == EventKind.IMPACT:
-            x, closed_mask, settles = self._struck(x, instant, k)
+            hits = self._hit_with(k, instant)
+            x, closed_mask, settles = self._struck(x, instant, hits)
             self._limit_efforts(x)  # the effort that a servo requires jumps with the velocity
-            happened = [(EventKind.SETTLE if settles else EventKind.IMPACT, self.contacts[k].name)]
+            happened = [(EventKind.SETTLE if settles else EventKind.IMPACT, self.contacts[hit].name) for hit in hits]
             instant = self.at(x)
             resting = [slip <= self._still for slip in self._slips(instant)]
         elif kind == "still":
@@ -431,22 +435,40 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         line = None if self.mode[k].along is None else (x, y, z)
         return (*self.mode[:k], Acting("slip", line, (x, y, z)), *self.mode[k + 1 :])
 
-    def _struck(self, x: Array, instant: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
+    def _hit_with(self, hit: int, instant: ContactsThere) -> list[int]:
+        """Contacts that an impact closes: the one that hits, and corners of its face that land with it."""
+        if hit >= len(self._bodies):
+            return [hit]
+        pair, speeds = self._bodies[hit].pair, [-float(touch.normal @ touch.slide) for touch in instant.touching]
+        near = _TOGETHER * self._length + speeds[hit] * _ULPS_APART * float(np.spacing(self.t))
+        corners = [
+            k
+            for k, contact in enumerate(self._bodies)
+            if k != hit and contact.pair == pair and self.mode[k].kind == "open"
+            # an overlap when it opened is an error of the method
+            if instant.touching[k].gap + self._overlap[k] <= near
+            if abs(speeds[k] - speeds[hit]) <= _ALIKE * speeds[hit]
+        ]
+        return [hit, *corners]
+
+    def _struck(self, x: Array, instant: ContactsThere, hits: Sequence[int]) -> tuple[Array, list[bool], bool]:
         """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
-        which = [k for k, acting in enumerate(self.mode) if (acting.kind != "open" or k == hit) and self._presses[k]]
+        which = [k for k, acting in enumerate(self.mode) if (acting.kind != "open" or k in hits) and self._presses[k]]
         frames, J, response = instant.framed(which)
         c = np.concatenate([frame.T @ instant.touching[k].slide for frame, k in zip(frames, which, strict=True)])
-        place, law = 3 * which.index(hit), self.contacts[hit]
-        speed, e = -c[place], law.restitution
-        settles = self._settles(hit, speed * self._arms[hit] / self._unit, e)
+        hit, places = hits[0], [3 * which.index(k) for k in hits]
+        law = self.contacts[hit]
+        e = law.restitution
+        settles = self._settles(hit, -c[places[0]] * self._arms[hit] / self._unit, e)
         e, sideways = (0.0, 0.0) if settles else (e, law.tangential_restitution)
-        c[place : place + 3] *= [1 + e, 1 + sideways, 1 + sideways]
+        for place in places:
+            c[place : place + 3] *= [1 + e, 1 + sideways, 1 + sideways]
         impulse, _ = self._law(J @ response, c, which, [None] * len(which))
         x = self._pushed(x, response @ impulse.ravel())
         # by the speed, not the impulse: of a contact that the impact leaves alone that is round-off, of either sign
         parts = [float(touching.normal @ touching.slide) for touching in self.at(x).touching] * self._arms
         closed_mask = [
-            bool(self._bounds[k]) or (k in which and parts[k] <= self._still and not (k == hit and e))
+            bool(self._bounds[k]) or (k in which and parts[k] <= self._still and not (k in hits and e))
             for k in range(len(self.mode))
         ]
         closed_mask = shut_by_pressing(self.contacts, closed_mask)
