@@ -443,7 +443,7 @@ def test_a_ball_that_rolls_across_a_slope_begins_to_slip_down_it() -> None:
 
 
 def test_corners_of_a_face_land_together() -> None:
-    """A box that falls back from one of its edges onto its face comes to rest by one impact of its other two corners."""
+    """A box that falls from an edge back onto its face comes to rest by one impact of the other two corners."""
     tilt, half = 0.1, np.array([0.2, 0.1, 0.1])
     height = half[0] * np.sin(tilt) + half[2] * np.cos(tilt)
     scene = Mechanism(

@@ -50,7 +50,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, coefficients_of
 from proofroll.elements.mechanism.scene.signal import breaks, varies
 from proofroll.engines.projection.contact.alternating import AlternatingMotion, Excess, ends_of_efforts
-from proofroll.engines.projection.contact.contacts_there import ContactsThere
+from proofroll.engines.projection.contact.contacts_there import ContactsThere, landing_together
 from proofroll.engines.projection.contact.slip_directions import SlipDirections, balanced, led_direction
 from proofroll.engines.projection.smooth.connections import Bodies
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates, SolvedState
@@ -59,9 +59,6 @@ from proofroll.engines.projection.smooth.elimination import solved as divided
 
 _RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
 _OVERLAP = 1e-14  # overlap that is round-off, relative to the natural length
-# Gap, relative to the natural length, difference of times, in units of their last digit, and of closing speeds,
-# relative to these, with which corners of a face land together.
-_TOGETHER, _ULPS_APART, _ALIKE = 1e-13, 8, 1e-9
 _STANDS = 1e-6  # acceleration, relative to the natural one, too small to start a motion
 _REST = 1e-2  # slip speed, relative to gravity times a fixed step, below which slips end together with another one
 
@@ -392,7 +389,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         instant, closed_mask = self.at(x), [acting.kind != "open" for acting in old_mode]
         resting = [acting.kind == "stick" for acting in old_mode]
         if kind == EventKind.IMPACT:
-            hits = self._hit_with(k, instant)
+            hits = landing_together(k, self._bodies, instant, old_mode, self._overlap, self._length, self.t)
             x, closed_mask, settles = self._struck(x, instant, hits)
             self._limit_efforts(x)  # the effort that a servo requires jumps with the velocity
             happened = [(EventKind.SETTLE if settles else EventKind.IMPACT, self.contacts[hit].name) for hit in hits]
@@ -435,36 +432,18 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         line = None if self.mode[k].along is None else (x, y, z)
         return (*self.mode[:k], Acting("slip", line, (x, y, z)), *self.mode[k + 1 :])
 
-    def _hit_with(self, hit: int, instant: ContactsThere) -> list[int]:
-        """Contacts that an impact closes: the one that hits, and corners of its face that land with it."""
-        if hit >= len(self._bodies):
-            return [hit]
-        pair, speeds = self._bodies[hit].pair, [-float(touch.normal @ touch.slide) for touch in instant.touching]
-        near = _TOGETHER * self._length + speeds[hit] * _ULPS_APART * float(np.spacing(self.t))
-        corners = [
-            k
-            for k, contact in enumerate(self._bodies)
-            if k != hit and contact.pair == pair and self.mode[k].kind == "open"
-            # an overlap when it opened is an error of the method
-            if instant.touching[k].gap + self._overlap[k] <= near
-            if abs(speeds[k] - speeds[hit]) <= _ALIKE * speeds[hit]
-        ]
-        return [hit, *corners]
-
     def _struck(self, x: Array, instant: ContactsThere, hits: Sequence[int]) -> tuple[Array, list[bool], bool]:
         """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
         which = [k for k, acting in enumerate(self.mode) if (acting.kind != "open" or k in hits) and self._presses[k]]
         frames, J, response = instant.framed(which)
         c = np.concatenate([frame.T @ instant.touching[k].slide for frame, k in zip(frames, which, strict=True)])
         hit, places = hits[0], [3 * which.index(k) for k in hits]
-        law = self.contacts[hit]
-        e = law.restitution
+        e, sideways = self.contacts[hit].restitution, self.contacts[hit].tangential_restitution
         settles = self._settles(hit, -c[places[0]] * self._arms[hit] / self._unit, e)
-        e, sideways = (0.0, 0.0) if settles else (e, law.tangential_restitution)
+        e, sideways = (0.0, 0.0) if settles else (e, sideways)
         for place in places:
             c[place : place + 3] *= [1 + e, 1 + sideways, 1 + sideways]
-        impulse, _ = self._law(J @ response, c, which, [None] * len(which))
-        x = self._pushed(x, response @ impulse.ravel())
+        x = self._pushed(x, response @ self._law(J @ response, c, which, [None] * len(which))[0].ravel())
         # by the speed, not the impulse: of a contact that the impact leaves alone that is round-off, of either sign
         parts = [float(touching.normal @ touching.slide) for touching in self.at(x).touching] * self._arms
         closed_mask = [

@@ -5,9 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proofroll.elements.mechanism.contact.acting import ContactMode
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.engines.projection.smooth.dependent import SolvedState
+
+# Gap, relative to the natural length, difference of times, in units of their last digit, and of closing speeds,
+# relative to these, with which corners of a face land together.
+_TOGETHER, _ULPS, _ALIKE = 1e-13, 8, 1e-9
 
 
 class ContactsThere(NamedTuple):
@@ -37,3 +43,36 @@ class ContactsThere(NamedTuple):
         J = np.concatenate([frame.T @ self.J[k] for frame, k in zip(frames, which, strict=True)])
         response = np.concatenate([self.response[:, k] @ frame for frame, k in zip(frames, which, strict=True)], 1)
         return frames, J, response
+
+
+def landing_together(
+    hit: int,
+    contacts: Sequence[BodyContact],
+    instant: ContactsThere,
+    mode: ContactMode,
+    overlap: Array,
+    length: float,
+    time: float,
+) -> list[int]:
+    """Contacts that an impact closes: the one that hits, and corners of its face that land with it.
+
+    Args:
+        hit: a contact of bodies, or of a joint, which closes alone.
+        contacts: contacts of bodies; ``instant`` has these first.
+        instant: contacts at the impact.
+        mode: before the impact.
+        overlap: of each contact when it opened [m], an error of the method.
+        length: natural length [m].
+        time: of the impact [s].
+    """
+    if hit >= len(contacts):
+        return [hit]
+    speeds = [-float(touch.normal @ touch.slide) for touch in instant.touching]
+    near = _TOGETHER * length + speeds[hit] * _ULPS * float(np.spacing(time))
+    corners = [
+        k
+        for k, contact in enumerate(contacts)
+        if k != hit and mode[k].kind == "open" and contact.pair == contacts[hit].pair
+        if instant.touching[k].gap + overlap[k] <= near and abs(speeds[k] - speeds[hit]) <= _ALIKE * speeds[hit]
+    ]
+    return [hit, *corners]
