@@ -107,7 +107,8 @@ def hold_ball(seed: int, until: float = UNTIL_OF_BALLS) -> Held:
         bar, largest = found[name].attrs["error_bar"], float(np.max(apart))
         worst[name] = largest / bar if bar else (np.inf if largest else 0.0)
     events = [event for event in events_of(found) if event.time > 0]
-    left = [(kind, time) for kind, time in told.events if time > 0]
+    # what a ball does from an impact on is its mode, no event of its own
+    left = [(kind, time) for kind, time in told.events if time > 0 and time not in told.bounces]
     for event in events:
         wide = max(event.time_high - event.time, np.finfo(float).eps * max(event.time, 1e-3))
         if event.time > told.end + wide:
@@ -118,7 +119,7 @@ def hold_ball(seed: int, until: float = UNTIL_OF_BALLS) -> Held:
             kind, time = left.pop(0) if left else ("nothing", np.inf)
             off = abs(time - event.time) if kind == _ALIKE.get(event.kind, event.kind) else np.inf
         worst["event"] = max(worst.get("event", 0.0), off / wide)
-    said = str(found.attrs.get("ill_posed", ""))
+    said = str(found.attrs.get("ill_posed") or found.attrs.get("ended") or "")
     if left and not said:
         worst["event"] = np.inf
     return Held(seed, style, does, said, worst, 0)
