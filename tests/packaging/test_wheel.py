@@ -63,6 +63,7 @@ def test_contents(wheel: Path) -> None:
         "proofroll/models/inclined_plane/scene.toml",
         "proofroll/conformance/checks.py",
         "proofroll/docs/examples/semi_implicit.py",
+        "proofroll/docs/examples/tree_euler.py",
     ):
         assert name in names
     models = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "models").rglob("*") if path.is_file()}

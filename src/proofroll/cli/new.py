@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from proofroll.core.errors import InputError, require_known
+from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
     from proofroll.core.scene import Scene
@@ -20,21 +20,7 @@ new = typer.Typer(help="Write a working start: a scene, a comparison, or an engi
 Name = Annotated[str, typer.Argument(help="Its name: letters, digits and _; the folder or file is named so.")]
 _TEMPLATES = Path(__file__).parent / "templates"
 _ANOTHER = "choose another name"
-# Value of --for -> example in docs/examples to copy, name of its class, a scene that it runs, description.
-_EXAMPLES = {
-    "ball": (
-        "semi_implicit",
-        "SemiImplicit",
-        "sphere_in_cylinder",
-        "semi-implicit Euler on the equations of a rolling ball",
-    ),
-    "mechanism": (
-        "tree_euler",
-        "TreeEuler",
-        "double_pendulum",
-        "semi-implicit Euler in the coordinates of a tree of joints",
-    ),
-}
+_EXAMPLE, _CLASS = "tree_euler", "TreeEuler"  # an engine of docs/examples, and its class
 
 
 @new.command()
@@ -65,7 +51,6 @@ def comparison(name: Name, scene: Annotated[str, typer.Option(help="The scene, o
 @new.command()
 def engine(
     name: Annotated[str, typer.Argument(help="The engine's name: letters, digits and _; commands take it so.")],
-    kind: Annotated[str, typer.Option("--for", help="What it moves: ball (on a surface) or mechanism.")] = "",
 ) -> None:
     """Write a package proofroll_NAME with a working engine NAME, its entry point and its conformance test."""
     from importlib.util import find_spec
@@ -77,21 +62,17 @@ def engine(
     folder = _fresh(name, package)
     if name in {*engine_names(), "truth"} or find_spec(package):
         raise InputError("name", name, f"an installed engine or its package has this name; {_ANOTHER}")
-    require_known("--for", kind, _EXAMPLES, "say what the engine moves:")
-    file, former, scene, does = _EXAMPLES[kind]
     names = {
         "name": name,
         "package": package,
         "Class": "".join(part.capitalize() for part in name.split("_")) or name,
-        "scene": scene,
-        "does": does,
     }
     for template in sorted((_TEMPLATES / "engine").rglob("*")):
         if template.is_file():  # some end in .txt, so that tools do not take them for files of this project
             target = folder / template.relative_to(_TEMPLATES / "engine")
             _write(target.with_suffix("") if target.suffix == ".txt" else target, _filled(template, names))
-    example = (data_folder("docs/examples") / f"{file}.py").read_text(encoding="utf-8")
-    source = example.replace(former, names["Class"]).replace(f'"{file}"', f'"{name}"')
+    example = (data_folder("docs/examples") / f"{_EXAMPLE}.py").read_text(encoding="utf-8")
+    source = example.replace(_CLASS, names["Class"]).replace(f'"{_EXAMPLE}"', f'"{name}"')
     _write(folder / "src" / package / "__init__.py", source)
     _say(folder, f"pip install --editable {folder}", f"pytest {folder}")
 

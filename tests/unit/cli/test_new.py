@@ -58,10 +58,9 @@ def test_a_comparison(
 
 
 @pytest.mark.drill
-@pytest.mark.parametrize("kind", ["ball", "mechanism"])
-def test_an_engine(proofroll: Proofroll, folder: Path, kind: str) -> None:
+def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
     """A new engine announces its class from a package that hides no other, and passes its own conformance test."""
-    assert proofroll("new", "engine", "my_engine", "--for", kind)[0] == 0
+    assert proofroll("new", "engine", "my_engine")[0] == 0
     package = folder / "proofroll_my_engine"
     project = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert project["entry-points"]["proofroll.engines"] == {"my_engine": "proofroll_my_engine:MyEngine"}
@@ -98,7 +97,7 @@ def test_an_engine(proofroll: Proofroll, folder: Path, kind: str) -> None:
 )  # fmt: skip
 def test_a_name_that_stands_for_something_else(proofroll: Proofroll, what: str, name: str) -> None:
     """A scene is not called as one of the package, which commands would take, nor an engine as what is installed."""
-    more = {"comparison": ["--scene", "pendulum"], "engine": ["--for", "ball"]}.get(what, [])
+    more = {"comparison": ["--scene", "pendulum"]}.get(what, [])
     code, out, err = proofroll("new", what, name, *more)
     assert (code, out, list(Path().iterdir())) == (2, "", [])
     assert f"name = '{name}': " in err
@@ -107,20 +106,11 @@ def test_a_name_that_stands_for_something_else(proofroll: Proofroll, what: str, 
 
 def test_an_engine_may_be_called_as_its_library(proofroll: Proofroll, folder: Path) -> None:
     """An engine has the name of its library, from a package that has another."""
-    assert proofroll("new", "engine", "numpy", "--for", "ball")[0] == 0
+    assert proofroll("new", "engine", "numpy")[0] == 0
     assert (folder / "proofroll_numpy" / "src" / "proofroll_numpy" / "__init__.py").exists()
 
 
-@pytest.mark.parametrize("kind", [[], ["--for", "robot"]])
-def test_an_engine_is_for_something(proofroll: Proofroll, folder: Path, kind: list[str]) -> None:
-    """Who does not say what the engine moves is asked."""
-    code, out, err = proofroll("new", "engine", "mine", *kind)
-    assert (code, out, list(folder.iterdir())) == (2, "", [])
-    assert "--for" in err
-    assert "say what the engine moves: ball, mechanism" in err
-
-
-@pytest.mark.parametrize("what", [["scene"], ["engine", "--for", "ball"], ["comparison", "--scene", "pendulum"]])
+@pytest.mark.parametrize("what", [["scene"], ["engine"], ["comparison", "--scene", "pendulum"]])
 def test_nothing_is_overwritten(proofroll: Proofroll, folder: Path, what: list[str]) -> None:
     """What is there already stays, and so does a place that a name would lead out of the folder."""
     file = folder / {"comparison": "mine.toml", "engine": "proofroll_mine", "scene": "mine"}[what[0]]
