@@ -288,6 +288,13 @@ def test_a_model_file_holds_geoms_but_no_correction():
         MUJOCO.model_file(on_floor(*SLED), preset("tuned"))
 
 
+def test_a_short_step_starts_as_the_scene_does():
+    """The gap below which MuJoCo has a contact pushes less than a thousandth of gravity, however stiff the contact."""
+    (element,) = load_scene("inclined_plane").elements
+    run = MUJOCO.build(load_scene("inclined_plane"), preset("tuned", dt=1e-5))
+    assert [str(line) for line in element.certify(run.built(), run.sample()) if not line.holds] == []
+
+
 @pytest.mark.parametrize("name", ["default", "matched"])
 def test_touching_bodies_without_weight_are_certified(name):
     """Balls that touch and nothing pulls are pushed apart by the round-off of their gap, which is no wrong model."""

@@ -39,8 +39,9 @@ _FLAT = 1e-10
 # m: half the width and half the depth of the box whose top stands for a plane on a moving body. A sphere that goes
 # deeper than it is wide would be pushed out at its side.
 _WIDE, _DEEP = 1e3, 1.0
-# m: gap below which MuJoCo has a contact in its equations. At 0, round-off would decide what touches at the start.
-_MARGIN = 1e-9
+# Gap below which MuJoCo has a contact in its equations: at most 1e-9 m, and no deeper than it pushes with 1e-3 m/s^2.
+# At 0, round-off would decide what touches at the start.
+_MARGIN, _PUSH = 1e-9, 1e-3
 # m: margin within which contacts are searched to be read back, so large that every one is found.
 _FAR = 1e6
 # Coefficient that stands for unbounded friction beside friction against spin, which MuJoCo makes softer by the square
@@ -87,8 +88,13 @@ def write_contacts(spec: Any, bodies: dict[str, Any], mechanism: Mechanism, sett
         for name, body, shape in zip(names, (contact.body_a, contact.body_b), shapes, strict=True):
             geom = bodies[body].add_geom(name=name, mass=0.0, contype=0, conaffinity=0)
             _set_shape(geom, shape, body in moving)
-        pair = spec.add_pair(name=f"contact{number}", geomname1=names[0], geomname2=names[1], margin=_MARGIN)
+        pair = spec.add_pair(name=f"contact{number}", geomname1=names[0], geomname2=names[1], margin=margin(settings))
         _set_pair_law(pair, contact, settings)
+
+
+def margin(settings: MujocoSettings) -> float:
+    """Gap below which MuJoCo has a contact in its equations [m]; its stiffness is 1/time²."""
+    return min(_MARGIN, _PUSH * settings.contact_time**2)
 
 
 def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> None:
@@ -255,7 +261,8 @@ class Contacts:
             row = int(contact.efc_address)
             if row >= 0:
                 K, _, impedance, _ = data.efc_KBIP[row].tolist()
-                depths[self._number(contact)] = float(data.efc_R[row] * data.efc_force[row]) / (K * impedance) - _MARGIN
+                loaded = float(data.efc_R[row] * data.efc_force[row]) / (K * impedance)
+                depths[self._number(contact)] = loaded - margin(self._settings)
         return depths
 
     def _slipping(self, contact: Any) -> tuple[float, slice]:
