@@ -15,8 +15,9 @@ _FEWEST, _MANY, _END = 9, 18, 2
 _SHIFTS = 6
 # Delays that are tried where any up to a farthest one is looked for.
 _TRIED = 401
-# Largest relative error of a clock that is looked for.
-_PACE = 0.25
+# Rates of a clock that are looked for, each within this relative error; all but the first are of known mistakes, up to
+# the relative error of a fit.
+_RATES, _PACE, _FIT = (1.0, 0.5, 2.0, 0.25, 4.0), 0.25, 1e-3
 
 
 def _comparable(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray] | None:
@@ -89,14 +90,25 @@ def best_clock_factor(time: FloatArray, reported: FloatArray, true: FloatArray) 
     if comparable is None:
         return None
     since = time - time[0]
-    inner = since <= since[-1] / (1 + _PACE)
-    curve, flat = make_interp_spline(since, comparable[1], k=_SPLINE), comparable[0][inner]
+    curve, fits = make_interp_spline(since, comparable[1], k=_SPLINE), list[tuple[float, float, float]]()
+    for rate in _RATES:
+        inner = since <= since[-1] / max(1.0, rate * (1 + _PACE))  # where the truth is known at the clock's time
+        if np.sum(inner) < _FEWEST and rate != 1:
+            continue
+        flat, known = comparable[0][inner], comparable[1][inner]
 
-    def left(faster: float) -> FloatArray:
-        return np.asarray(flat - curve(since[inner] * (1 + float(np.clip(faster, -_PACE, _PACE))))).ravel()
+        def left(faster: float, since: FloatArray = rate * since[inner], flat: FloatArray = flat) -> FloatArray:
+            return np.asarray(flat - curve(since * (1 + float(np.clip(faster, -_PACE, _PACE))))).ravel()
 
-    faster = float(np.clip(least_squares_parameter(left, 0.0, 1.0), -_PACE, _PACE))
-    return 1 + faster, float(np.max(np.abs(left(0.0)))), float(np.max(np.abs(left(faster))))
+        faster = float(np.clip(least_squares_parameter(left, 0.0, 1.0), -_PACE, _PACE))
+        difference = float(np.max(np.abs(flat - known)))
+        fits.append((rate * (1 + faster), difference, float(np.max(np.abs(left(faster))))))
+    return min(fits, key=lambda fit: fit[2] / (fit[1] or 1.0))
+
+
+def mistaken_rate(rate: float) -> bool:
+    """True if the rate of a clock [1] is that of a known mistake: half, twice, a quarter, four times."""
+    return any(abs(rate - known) <= _FIT * known for known in _RATES[1:])
 
 
 def in_steps(delay: float, step: float | None) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, in_single_precision, known_difference
 from proofroll.core.certificate import ROUNDED
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, above_round_off, hypothesis
-from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, delay_text, in_steps
+from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, delay_text, in_steps, mistaken_rate
 from proofroll.core.diagnosis.fitting import change_by
 from proofroll.core.diagnosis.lines import differing, single_precision
 from proofroll.core.diagnosis.vectors import ReportedVector
@@ -94,13 +94,14 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
             delay, *sizes = moved
             says = f"every sample is {delay_text(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
-            causes.append(("late", says, remedy, sizes, in_steps(delay, evidence.step)))
+            causes.append(("late", says, remedy, sizes, 1, in_steps(delay, evidence.step)))
         if (paced := best_clock_factor(time, reported, true)) is not None:
             rate, *sizes = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
             remedy = "the step that the engine takes is not the one that is counted"
-            causes.append(("clock", says, remedy, sizes, change_by(rate)))
-        for name, says, remedy, (difference, remainder), change in causes:
+            mistaken = mistaken_rate(rate)
+            causes.append(("clock", says, remedy, sizes, int(not mistaken), np.inf if mistaken else change_by(rate)))
+        for name, says, remedy, (difference, remainder), fitted, change in causes:
             yield Cause(
                 id=name,
                 says=says,
@@ -109,7 +110,7 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
                 before=difference,
                 after=remainder,
                 remedy=remedy,
-                fitted=1,
+                fitted=fitted,
                 covers=covers,
                 closes=_CLOCK,
                 change=change,

@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES
-from proofroll.core.diagnosis.clocks import best_delay
+from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, mistaken_rate
 from proofroll.core.number_format import number, spaced
 
 _DEGREE = np.pi / 180
@@ -125,9 +125,10 @@ def _damped(item: GivenVariable, times: FloatArray) -> Iterator[tuple[str, Float
 
 
 def _late(variables: Mapping[str, GivenVariable], times: FloatArray) -> Iterator[str]:
-    """Clause on the one delay that explains all variables that differ; before it the motion stands at its start.
+    """Clause on the one delay or known rate of a clock that explains all variables that differ.
 
-    Places tell it where they are given: velocities that jump, and quaternions of any sign, follow no curve.
+    Before a delay the motion stands at its start. Places tell both where they are given: velocities that jump, and
+    quaternions of any sign, follow no curve.
     """
     places = {name: item for name, item in variables.items() if item.unit in {"m", "rad"}}
     variables = places if any(item.wrong for item in places.values()) else variables
@@ -154,6 +155,15 @@ def _late(variables: Mapping[str, GivenVariable], times: FloatArray) -> Iterator
         which = "the record" if wrong.keys() == moving.keys() else " and ".join(wrong)
         verb, word = "is" if len(wrong) == 1 or which == "the record" else "are", "late" if delay > 0 else "early"
         yield f"{which} {verb} {word} by {abs(delay):.3g} s (off by {off} % of the way, by {left} % with that)"
+        return
+    paced = best_clock_factor(times, values, true) if wrong.keys() == moving.keys() else None
+    # a pendulum of another length has another rate, but hardly one of these
+    if paced is not None and mistaken_rate(paced[0]) and paced[2] <= _AT_ANOTHER_TIME * paced[1]:
+        off, left = (number(100 * part, 2) for part in paced[1:])
+        yield (
+            f"the record runs {paced[0]:.3g} times as fast as its times say (off by {off} % of the way, by {left} % "
+            "with that)"
+        )
 
 
 def _exchanged(variable_a: GivenVariable, variable_b: GivenVariable) -> bool:

@@ -72,6 +72,25 @@ def test_a_record_at_other_times_is_named(delay: float) -> None:
     assert not [cause for cause in said(one_at(TIMES - delay), two_at(0.9 * TIMES - delay)) if "the record" in cause]
 
 
+@pytest.mark.parametrize("rate", [0.5, 2.0, 4.0])
+def test_a_clock_at_another_rate_is_named(rate: float) -> None:
+    """Times that are doubled, halved or a quarter are told of the whole record, and of no single coordinate."""
+    (only,) = said(one_at(rate * TIMES), two_at(rate * TIMES))
+    assert only.startswith(f"the record runs {rate:g} times as fast as its times say (off by ")
+    assert said(one_at(rate * TIMES), TWO) == []
+
+
+def test_a_state_at_half_its_times_is_no_other_gravity() -> None:
+    """A whole state whose times are halved has its clock as its cause, where the balance of momentum doubles, too."""
+    scene = load_scene("pendulum")
+    times = 0.02 * np.arange(51)
+    true = truth(scene.fully_asked, times)
+    run = {name: true[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB", "q_WB")}
+    judged = proofroll.judge({"time": times / 2, **run}, scene)
+    assert [cause.partition(" (")[0] for cause in judged.causes] == ["the record runs 2 times as fast as its times say"]
+    assert "gravity" not in str(judged)
+
+
 def test_a_late_record_of_a_motion_that_jumps_is_named() -> None:
     """Its places tell the delay, and no start that was not taken is told beside it."""
     scene = load_scene("two_spheres")
