@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proofroll.core.errors import ProofrollError
 from proofroll.core.events import events_of
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
@@ -111,11 +110,19 @@ def test_a_ball_on_the_rim_leaves_it_in_both_routes() -> None:
     assert float(found["gap"][-1]) > 0.1
 
 
-@pytest.mark.nightly
-def test_a_ball_that_rolls_into_the_tip_of_a_cone_is_no_endless_run() -> None:
-    """There the wall has no direction: whatever is said of it, it is said."""
-    with pytest.raises(ProofrollError):
-        truth(load_scene("cone", speed=0.0, normal_spin=0.0), np.linspace(0, 2.0, 21))
+@pytest.mark.drill
+def test_a_truth_ends_at_the_tip_of_a_cone() -> None:
+    """A ball that rolls straight into it has values up to there, with a constant acceleration, and the true reason."""
+    scene = load_scene("cone", speed=0.0, normal_spin=0.0)
+    t = np.linspace(0, 2.0, 21)
+    found = truth(scene, t)
+    rising, k, slope, start = 0.2, 0.4, 0.6, 0.3
+    down = G * np.sin(slope) / (1 + k)
+    end = (rising + np.sqrt(rising**2 + 2 * down * start)) / down
+    assert found.attrs["ends"] == pytest.approx(end, rel=1e-4)
+    assert "comes to the tip of its cone" in found.attrs["ended"]
+    known = t[: found.sizes["time"]]
+    assert found["s"].to_numpy() == pytest.approx(start + rising * known - down * known**2 / 2, abs=1e-12)
 
 
 def test_a_small_swing_passes_the_bottom_of_a_bowl() -> None:

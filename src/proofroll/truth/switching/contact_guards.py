@@ -54,7 +54,8 @@ class ContactGuard(NamedTuple):
         contact: index of the contact; -1: all contacts.
         kind: ``close``: a gap closes; ``lift``: a normal force reaches zero; ``still``: a slip stops; ``break``: the
             friction of a sticking contact reaches its bound; ``turn``: its line has turned so far that its sense has
-            to be taken anew; ``flat``: a disc lies flat, or capsules touch along a line; ``tear``: Painlevé's measure
+            to be taken anew; ``flat``: a disc lies flat, capsules touch along a line, or
+            a ball comes to the tip of a cone; ``tear``: Painlevé's measure
             reaches zero; ``share``: the motion begins to depend on how contacts share a load; ``grip``: no distribution
             of a shared load that sticking contacts can bear is left; ``pass``: the nearest features of solids are left.
         border: number of the border by which features are left.
@@ -115,7 +116,7 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
         if acting.along is not None and contact.friction:  # a joint that rubs has none, and its line never turns
             guards.append(ContactGuard(k, "turn"))
         parallel = features is not None and features.needs_angle(acting.feature)
-        if parallel or (isinstance(contact, BodyContact) and contact.of_disc):
+        if parallel or (isinstance(contact, BodyContact) and contact.may_lie):
             guards.append(ContactGuard(k, "flat"))
     if any(acting.kind == "slip" and contact.friction for contact, acting in zip(contacts, mode, strict=True)):
         guards.append(ContactGuard(-1, "tear"))

@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
     SphereShape,
     Wall,
 )
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, Shaft
+from proofroll.elements.mechanism.scene.shapes.walls import ConeWall, CurvedWall, Shaft
 from proofroll.truth.numerics.scalars import (
     Scalar,
     add,
@@ -78,10 +78,16 @@ def touch_in_scalars(
     features = contact.features
     if features is None:
         touch = _touch(contact.shape_a, a, contact.shape_b, b, root)
-        for disc, of in ((contact.shape_a, a), (contact.shape_b, b)):
-            if isinstance(disc, CircleShape):
-                leaning = cross(turned(of.R, floats(disc.normal)), touch.normal)
+        ends = ((contact.shape_a, a), (contact.shape_b, b))
+        for (shape, body), (partner, of) in (ends, ends[::-1]):
+            if isinstance(shape, CircleShape):
+                leaning = cross(turned(body.R, floats(shape.normal)), touch.normal)
                 touch = touch._replace(tilt=root(dot(leaning, leaning)))
+            elif isinstance(shape, ConeWall) and isinstance(partner, SphereShape):
+                centre = minus(plus(of.p, turned(of.R, floats(partner.centre))), body.p)
+                seen = minus(turned_back(body.R, centre), floats(shape.point))
+                beside = cross(floats(shape.axis), seen)
+                touch = touch._replace(tilt=mul(1 / (partner.radius or 1.0) ** 2, dot(beside, beside)))
         return touch
     *measures, tilt = _measures(features, a, b, root)
     shape_a, shape_b = features.shapes(feature)

@@ -21,6 +21,7 @@ from proofroll.core.event_location import locate_rise_within, points_within
 from proofroll.core.stalling import StepCount, StepWatch
 from proofroll.elements.mechanism.contact.acting import ContactMode
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.followed_paths import TOLERANCES
 from proofroll.truth.numerics.compiled_once import compiled_once, heyoka
@@ -41,6 +42,8 @@ from proofroll.truth.switching.contact_symbols import (
 from proofroll.truth.switching.planar_slip import Led, LedValues
 from proofroll.truth.switching.turning_symbols import follows
 
+# Part of the way to a place where the rates have a kink, as at the tip of a cone: a step across it has no series.
+_BEFORE = 0.99
 _BACK = np.append(2.0 ** -np.arange(50.0), 0.0)  # places before the rise of a guard, in parts of the last step
 _CORRECTIONS = 6  # of Newton's method for the variable of integration at a time, at most
 
@@ -165,7 +168,12 @@ class CompiledMode:
             began[k] = [Symbol(heyoka.par[3 * place + axis], constants) for axis in range(3)]
         solved = symbols.solved([Symbol(entry, constants) for entry in state], mode, clamped, began, functions)
         slips = slip_symbols(mode, contacts, solved)
-        guards = [*guard_symbols(guards_of(contacts, mode), contacts, solved, began, functions), *solved.within_limits]
+        conditions = guards_of(contacts, mode)
+        tips = {k for k, contact in enumerate(contacts) if isinstance(contact, BodyContact) and contact.has_tip}
+        self._kinks = {
+            number for number, guard in enumerate(conditions) if guard.kind == "flat" and guard.contact in tips
+        }
+        guards = [*guard_symbols(conditions, contacts, solved, began, functions), *solved.within_limits]
         stated, led = stated_symbols(mode, contacts, solved), led_symbols(mode, solved)
         values = [*guards, *slips, *led, *stated, *solved.rates, 1.0]
         self._stated, self._first_rate = len(stated), len(guards) + len(slips) + len(led) + len(stated)
@@ -272,6 +280,10 @@ class CompiledMode:
             )
             grazes += step.inside(np.array(crests))[-1].tolist() if crests else []
             if rise is not None:
+                if rise[1] in self._kinks and not self._slips:
+                    place = step.start + _BEFORE * (rise[0] - step.start)
+                    steps += self._steps(pars, steps.pop().first, float(step.inside(np.array([place]))[-1, 0]))
+                    rise = steps[-1].end, rise[1]
                 break
         last = steps[-1].last if rise is None else steps[-1].inside(np.array([rise[0]]))[:, 0]
         end, guard = (until, None) if rise is None else (float(last[-1]), rise[1])

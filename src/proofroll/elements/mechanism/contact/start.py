@@ -184,7 +184,7 @@ def check_contacts(mechanism: Mechanism) -> None:
         if touching.gap < -scale.gap:
             advice = f"they overlap by {-touching.gap:.3g} m at the start; move one"
             raise InputError(f"pairs.{contact.name}", between, advice)
-        if touching.gap <= scale.gap and not touching.normal.any():
+        if touching.gap <= scale.gap and (not touching.normal.any() or (contact.has_tip and touching.flat)):
             advice = "they touch at several points at once, without one normal; move one"
             raise InputError(f"pairs.{contact.name}", between, advice)
         slip = float(np.linalg.norm(touching.slide - touching.normal * (touching.normal @ touching.slide)))

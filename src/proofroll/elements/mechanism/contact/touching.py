@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
     SphereShape,
     Wall,
 )
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, EdgeLine, Shaft
+from proofroll.elements.mechanism.scene.shapes.walls import ConeWall, CurvedWall, EdgeLine, Shaft
 
 # Sine of the angle between a disc and its plane, or two capsules, up to which they are parallel: digits of a file.
 FLAT = 1e-9
@@ -54,8 +54,8 @@ class Touching(NamedTuple):
             spheres, and for solids, on a [m].
         place_rate: velocity of that point in the world, as it moves over both bodies [m/s].
         slide: velocity of a's material relative to b's at that point [m/s]; along the normal it is the gap's rate.
-        tilt: sine of the angle between a disc and its plane, or between two capsules whose sides are the nearest; 1 for
-            other shapes.
+        tilt: sine of the angle between a disc and its plane, or between two capsules whose sides are the nearest;
+            square of the distance of a sphere's centre from a cone's axis over its radius; 1 for other shapes.
         feature: number of the nearest features of solids.
         borders: of these features.
         absent: True for a contact of two boxes that lies beyond a border; its gap is the way there.
@@ -74,12 +74,16 @@ class Touching(NamedTuple):
 
     @property
     def flat(self) -> bool:
-        """True for a disc on its plane, or parallel capsules, which touch along an edge or a line, not at one point."""
+        """True for a disc on its plane, parallel capsules, or a ball in a cone's tip: they touch at many points."""
         return self.tilt <= FLAT
 
 
 def lying(contact: BodyContact, time: float) -> NotUnique:
-    """Error of a disc that lies flat, or of capsules that are parallel, from a time on [s]."""
+    """Error of a disc that lies flat, of parallel capsules, or of a ball in the tip of a cone, from a time on [s]."""
+    if contact.has_tip:
+        return NotUnique(
+            f"{contact.name} comes to the tip of its cone at t = {time:.6g} s, where the wall has no normal; end before"
+        )
     if contact.features is not None:
         return NotUnique(
             f"the capsules of {contact.name} touch along a line at t = {time:.6g} s: {PARALLEL}; end before, or turn "
@@ -111,13 +115,13 @@ def touch(contact: BodyContact, a: Moving, b: Moving, feature: int | None = None
         return _touch_capsule(contact.box_slot, a, b, feature)
     if features is None:
         result = _touch(contact.shape_a, a, contact.shape_b, b)
-        discs = ((contact.shape_a, a), (contact.shape_b, b))
-        tilts = (
-            float(np.linalg.norm(cross(of.R @ disc.normal, result.normal)))
-            for disc, of in discs
-            if isinstance(disc, CircleShape)
-        )
-        return result._replace(tilt=next(tilts, 1.0))
+        ends = ((contact.shape_a, a), (contact.shape_b, b))
+        for (shape, body), (partner, of) in (ends, ends[::-1]):
+            if isinstance(shape, CircleShape):
+                result = result._replace(tilt=float(np.linalg.norm(cross(body.R @ shape.normal, result.normal))))
+            elif isinstance(shape, ConeWall) and isinstance(partner, SphereShape):
+                result = result._replace(tilt=_from_tip(partner, of, shape, body))
+        return result
     *measures, tilt = _measures(features, a, b)
     feature = features.nearest(*measures) if feature is None else feature
     shape_a, shape_b = features.shapes(feature)
@@ -268,6 +272,12 @@ def _on_curve(sphere: SphereShape, body: Moving, wall: CurvedWall, wall_body: Mo
     n_rate = cross(wall_body.w, n) + axes @ (near.bend @ (axes.T @ slides))
     place, rate = centre - sphere.radius * n, body.velocity(centre) - sphere.radius * n_rate
     return near.distance - sphere.radius, n, n_rate, place, rate
+
+
+def _from_tip(sphere: SphereShape, body: Moving, cone: ConeWall, cone_body: Moving) -> float:
+    """Square of the distance of a sphere's centre from the axis of a cone over its radius [1]; it is smooth."""
+    seen = cone.frame.T @ (cone_body.R.T @ (body.p + body.R @ sphere.centre - cone_body.p) - cone.point)
+    return float(seen[:2] @ seen[:2]) / (sphere.radius or 1.0) ** 2
 
 
 def _on_plane(shape: ConvexShape, body: Moving, plane: HalfSpace, wall_body: Moving) -> _Lying:

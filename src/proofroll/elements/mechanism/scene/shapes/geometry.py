@@ -353,9 +353,14 @@ class BodyContact:
         return None
 
     @property
-    def of_disc(self) -> bool:
-        """True if one of the shapes is a circle."""
-        return isinstance(self.shape_a, CircleShape) or isinstance(self.shape_b, CircleShape)
+    def has_tip(self) -> bool:
+        """True if one of the shapes is a cone, whose tip has no normal."""
+        return isinstance(self.shape_a, ConeWall) or isinstance(self.shape_b, ConeWall)
+
+    @property
+    def may_lie(self) -> bool:
+        """True if one of the shapes is a circle, which may lie flat, or a cone."""
+        return self.has_tip or isinstance(self.shape_a, CircleShape) or isinstance(self.shape_b, CircleShape)
 
 
 def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[BodyContact, ...]:
