@@ -10,9 +10,8 @@ from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.tables import remarks
+from proofroll.report.comparison.tables import observables, remarks
 from proofroll.report.labels import SYMBOLS, engine_title, engine_words, name_of, step, verdict_text
-from proofroll.report.terminal.tables import columns
 from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
@@ -55,6 +54,14 @@ def choice_table(groups: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
     said = ", ".join(f"{SYMBOLS[word]} {CHOICE_MEANINGS[word]}{held_in if word == 'agrees' else ''}" for word in shown)
     table = "\n".join(["```{container} matrix", *lines, "```"])
     return f"{table}\n\nMotion to 1e-4 of the path with some setting and step that was run: {said}; empty: not run.\n"
+
+
+def columns(content: ReportedComparison) -> list[tuple[str, str]]:
+    """(name, unit) of the observables of the table: headline motions, and the first headline reaction."""
+    units = observables(content)
+    shown = [name for name in content.headlines("motion") if name in units]
+    shown += [name for name in content.headlines("reaction") if name in units][:1]
+    return [(name, units[name]) for name in shown]
 
 
 def verdict_table(content: ReportedComparison) -> str:

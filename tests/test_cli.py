@@ -414,7 +414,7 @@ def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Pa
     )
     assert code == 3, err
     assert f"{engine}" in out
-    assert "failed" in out
+    assert "1 fails." in out
 
 
 def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
@@ -680,7 +680,7 @@ def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
     (page,) = (tmp_path / "out" / "stability").glob("*.html")
     text = page.read_text(encoding="utf-8")
     assert 'class="heat"' in text
-    assert "projection solver rotating_frame default" in text
+    assert "projection solver rotating frame, default" in text
 
 
 @pytest.mark.drill

@@ -10,7 +10,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -156,6 +156,32 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
 
         with nullcontext() if moves else _now_and_then(line):
             yield lambda description, count=1: progress.update(task, advance=count, description=description)
+
+
+@contextmanager
+def growing(lines: Callable[[], Sequence[RenderableType]], last: Callable[[], str], *, shown: bool) -> Iterator[bool]:
+    """Context manager with growing lines on a terminal, which it removes at the end; yields True if it shows them.
+
+    Args:
+        lines: gives the lines so far; the last ones that fit the screen are shown.
+        last: gives the line below them, of progress.
+        shown: False to show nothing.
+    """
+    from rich.console import Group
+    from rich.live import Live
+    from rich.text import Text
+
+    console, moves = _standard_error()
+    if not (shown and moves):
+        yield False
+        return
+
+    def visible() -> Group:
+        line = Text(f"{last()}{_waited_for()}", overflow="ellipsis", no_wrap=True)
+        return Group(*lines()[-max(1, console.height - 2) :], line)
+
+    with Live(get_renderable=visible, console=console, transient=True):
+        yield True
 
 
 @contextmanager

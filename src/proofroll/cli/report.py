@@ -256,7 +256,8 @@ def _exit_code(content: ReportContent, compared: int, unmade: Collection[str]) -
 def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     """Tables and lines for the terminal: verdicts, further studies, what to look at first, path, and the choice."""
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
-    from proofroll.report.terminal.tables import answer_table, change_lines, first_lines, part_lines, verdict_parts
+    from proofroll.report.terminal.tables import answer_table, change_lines, first_lines, part_lines
+    from proofroll.report.terminal.verdicts import verdict_parts
 
     for item in content.comparisons:
         yield from verdict_parts(item)

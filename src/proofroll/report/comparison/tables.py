@@ -14,7 +14,7 @@ from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import bound_words, names, symbol
 from proofroll.running.timing import Interval
 
-_COMPILES = 10.0  # s before the first step, beyond which the time is listed; to compile equations takes one or two
+COMPILES = 10.0  # s before the first step, beyond which the time is listed; to compile equations takes one or two
 
 
 def observables(content: ReportedComparison) -> dict[str, str]:
@@ -31,7 +31,7 @@ def seconds_before(content: ReportedComparison) -> dict[int, float]:
     longest: dict[int, float] = {}
     for run in content.runs:
         longest[run.row] = max(longest.get(run.row, 0.0), run.build_seconds or 0.0)
-    return longest if max(longest.values(), default=0.0) > _COMPILES else {}
+    return longest if max(longest.values(), default=0.0) > COMPILES else {}
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.run.step_limits import ServoSteps, servo_steps
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.report.comparison.summary import outcome_content
-from proofroll.report.terminal.tables import verdict_parts
+from proofroll.report.terminal.verdicts import verdict_parts
 
 
 def sliders(kp: float, kd: float, masses: tuple[float, ...] = (2.0,), gear: float = 1.0, **more: object) -> Mechanism:
