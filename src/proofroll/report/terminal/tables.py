@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import os
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
-from rich.table import Column, Table
-from rich.text import Text
-
-from proofroll.report.page.answer import answer, speed_words, told
+from proofroll.core.number_format import counted
+from proofroll.core.verdict import Verdict
+from proofroll.report.labels import SYMBOLS
+from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
 from proofroll.report.parts import part_kinds
-from proofroll.report.terminal.screen import Screen, numeric, plain_table
+from proofroll.report.terminal.answers import answers, kind_sentences
+from proofroll.report.terminal.screen import Screen
+from proofroll.report.terminal.verdicts import WIDTH as _COLUMNS
+from proofroll.report.terminal.verdicts import verdict_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
     from proofroll.report.changes import Against
-    from proofroll.report.page.choice_matrix import ChoiceMatrix
+    from proofroll.report.comparison.records import ReportedComparison
     from proofroll.report.page.records import ReportContent
 
 WIDTH = 100
-_WORD = 14  # characters of the longest word
+_FINE = (Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE)
 
 
 def console() -> Screen:
@@ -33,6 +40,45 @@ def console() -> Screen:
         out.width = WIDTH
     out.width = out.width or 80  # COLUMNS=0 means unknown
     return out
+
+
+def report_lines(content: ReportContent, out: Path) -> Iterator[str]:
+    """Lines of a report: the answer, what to look at first, a count for each comparison, further studies, files."""
+    rows = [row for item in content.comparisons for row in item.rows]
+    if content.choice.rows:
+        yield from kind_sentences(answers(content.choice, FIRST_TOLERANCE, forces=False))
+    agree = sum(row.verdict is Verdict.AGREES for row in rows)
+    first, *others = first_lines(content)
+    counts = f"{agree} of {counted(len(rows), 'settings')} {'agrees' if agree == 1 else 'agree'}. " if rows else ""
+    yield f"{counts}{first}"
+    yield from (*others, "", *comparison_lines(content.comparisons), "")
+    yield from part_lines(content)
+    yield from change_lines(content.against)
+    yield from filter(None, [content.beyond_budget, content.omission_sentences])
+    expected = rows and all(item.as_expected for item in content.comparisons)
+    yield f"{'All as expected. ' if expected else ''}{out / 'report.html'} · report.json · report.csv"
+    if any(row.verdict not in _FINE for row in rows):
+        yield "Why a setting differs or fails: proofroll compare NAME"
+
+
+def comparison_lines(comparisons: Sequence[ReportedComparison]) -> list[str]:
+    """Count of the settings that agree, name, and counts of other verdicts of each comparison; in two columns if short.
+
+    The first sign says whether all is as expected.
+    """
+    entries, longest = [], max((len(item.name) for item in comparisons), default=0)
+    for item in comparisons:
+        verdicts = [verdict_of(row) for row in item.rows]
+        signs = [f"{SYMBOLS[word]} {verdicts.count(word)}" for word in list(Verdict)[1:] if word in verdicts]
+        count = f"{'✓' if item.as_expected else '✗'} {verdicts.count(Verdict.AGREES):>2} of {len(verdicts):>2}"
+        entries.append(f"{count}  {item.name:{longest}}  {' '.join(signs)}")
+    width = max(map(len, entries), default=0) + 2
+    if 2 * width > _COLUMNS:
+        return [entry.rstrip() for entry in entries]
+    half = (len(entries) + 1) // 2
+    return [
+        f"{left:{width}}{right}".rstrip() for left, right in zip_longest(entries[:half], entries[half:], fillvalue="")
+    ]
 
 
 def part_lines(content: ReportContent) -> list[str]:
@@ -77,26 +123,3 @@ def first_lines(content: ReportContent) -> list[str]:
 def _one_line(text: str) -> str:
     """Text without line breaks, which quoted messages may have."""
     return " ".join(text.split())
-
-
-def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes: bool = False) -> Table:
-    """The answer of the first screen: for each kind of scenes, or each scene, what to take, its speed, and the next."""
-    answered = answer(matrix, tolerance, forces)
-    table = plain_table(
-        Column("scene" if scenes else "kind of scene", min_width=_WORD),
-        Column("take", min_width=_WORD),
-        *numeric("× real time"),
-        Column("next engine", min_width=_WORD),
-        *([] if forces else [Column("if forces count", min_width=_WORD)]),
-        title=f"The cheapest that holds {answered.question.words}",
-    )
-    for item in answered.scenes if scenes else answered.kinds:
-        taken = item.taken
-        table.add_row(
-            Text(item.column.title),
-            Text(told(matrix, taken) if taken else item.closest_words),
-            Text(speed_words(taken) if taken else "–"),
-            Text("; ".join([item.next_words, *item.exceptions])),
-            *([] if forces else [Text(item.forces_words)]),
-        )
-    return table
