@@ -73,7 +73,8 @@ def compare(
     the file gets a row without claims.
     """
     from proofroll.report.comparison.summary import outcome_content
-    from proofroll.report.terminal.verdicts import WIDTH, verdict_parts
+    from proofroll.report.terminal.screen import WIDTH
+    from proofroll.report.terminal.verdicts import verdict_parts
     from proofroll.running.idle_workers import Workers
     from proofroll.studies.comparison.by_name import comparison_named
 

@@ -178,7 +178,7 @@ def _from_report(
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
     from proofroll.report.terminal.answers import advice_lines, answers
-    from proofroll.report.terminal.verdicts import WIDTH
+    from proofroll.report.terminal.screen import WIDTH
 
     path, lines = report.path, report.lines
     for name in engines:

@@ -71,8 +71,8 @@ def report(
     from proofroll.report.page.growing import begun
     from proofroll.report.page.html import templates
     from proofroll.report.parts import all_parts, parts_of
+    from proofroll.report.terminal.screen import WIDTH
     from proofroll.report.terminal.tables import report_lines
-    from proofroll.report.terminal.verdicts import WIDTH
     from proofroll.running.idle_workers import Workers
     from proofroll.running.store import alone_in
     from proofroll.studies.comparison.by_name import comparison_named

@@ -12,8 +12,8 @@ from proofroll.report.labels import SYMBOLS, engine_words
 from proofroll.report.page.answer import ColumnAnswer, answer, speed_range, told
 from proofroll.report.page.choice_cell import CANNOT, NO_RUN, ChoiceCell
 from proofroll.report.page.choice_matrix import ChoiceMatrix
+from proofroll.report.terminal.screen import WIDTH
 
-_WIDTH = 80
 _SPEED = 11
 
 
@@ -119,7 +119,7 @@ def scene_lines(columns: Sequence[ColumnAnswer]) -> Iterator[str]:
         speed = item.taken.text if item.taken else "–"
         take = told(item.matrix, item.taken) if item.taken else item.closest_words
         head = f"{item.column.name:{width}}{speed:>{_SPEED + 2}}  "
-        yield textwrap.fill(take, _WIDTH, initial_indent=head, subsequent_indent=" " * len(head))
+        yield textwrap.fill(take, WIDTH, initial_indent=head, subsequent_indent=" " * len(head))
     ties = [f"{item.column.name} {item.matrix.title(tie.engine)}" for item in scenes for tie in item.tied]
     lead = sum(lead_open(item) for item in scenes)
     last = [f"Ties: {', '.join(ties)}."] if ties else []
@@ -178,12 +178,12 @@ def take_lines(item: ColumnAnswer, tolerance: str, shown_over: str) -> Iterator[
 
 def setting_lines(costs: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """A line for each formulation in a scene or kind, the cheapest first; below it why it does not hold."""
-    yield f"  {'setting':{_WIDTH - 2 - _SPEED}}{'× real time':>{_SPEED}}"
+    yield f"  {'setting':{WIDTH - 2 - _SPEED}}{'× real time':>{_SPEED}}"
     for cost in sorted(costs, key=lambda cost: (not cost["holds"], cost["cost"] or 0.0)):
         engine, _, formulation = cost["engine"].partition(" ")
         setting = cost["setting"].removeprefix("at ").replace(" at ", ", ")
         name = ", ".join(filter(None, (engine_words(engine, formulation), setting if cost["holds"] else "")))
         speed = cost["text"] if cost["holds"] else "–"
-        yield f"{SYMBOLS.get(cost['state'], '·')} {name:{_WIDTH - 2 - _SPEED}}{speed:>{_SPEED}}"
+        yield f"{SYMBOLS.get(cost['state'], '·')} {name:{WIDTH - 2 - _SPEED}}{speed:>{_SPEED}}"
         if not cost["holds"]:
             yield f"    {cost['text']}"

@@ -12,8 +12,8 @@ from proofroll.report.labels import SYMBOLS
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.answers import answers, kind_sentences
+from proofroll.report.terminal.screen import WIDTH as _COLUMNS
 from proofroll.report.terminal.screen import Screen
-from proofroll.report.terminal.verdicts import WIDTH as _COLUMNS
 from proofroll.report.terminal.verdicts import verdict_of
 
 if TYPE_CHECKING:

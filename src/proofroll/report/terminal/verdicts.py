@@ -24,11 +24,10 @@ from proofroll.report.comparison.spread import ALONE, Spread
 from proofroll.report.comparison.tables import COMPILES
 from proofroll.report.labels import SYMBOLS, engine_title, omitted_lines, row_words, symbol, unit, unjudged
 from proofroll.report.page.choice_cell import speed
-from proofroll.report.terminal.screen import numeric, plain_table, unbroken
+from proofroll.report.terminal.screen import WIDTH, numeric, plain_table, unbroken
 from proofroll.running.case import Status, host_sentences
 from proofroll.studies.comparison.outcome import SEVERITY
 
-WIDTH = 80
 _SETTING, _ERROR, _SPEED = 42, 27, 9  # characters of the columns behind the sign
 _INDENT = 4
 _WIDEST = 8  # largest number of spreads that are listed
