@@ -313,11 +313,15 @@ def show(
         out.print(part)
 
 
-def show_lines(lines: Iterable[str]) -> None:
-    """Prints lines within the width of the terminal; the continuation of a longer line is indented by two more."""
+def show_lines(lines: Iterable[str], *, widest: int | None = None) -> None:
+    """Prints lines within the width of the terminal; the continuation of a longer line is indented by two more.
+
+    ``widest``: as of :func:`show`.
+    """
     from proofroll.report.terminal.tables import console
 
     out = console()
+    out.width = min(out.width, widest or out.width)
     for line in lines:
         indent = " " * (len(line) - len(line.lstrip()) + 2)
         parts = textwrap.wrap(line, out.width, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False)
