@@ -106,6 +106,7 @@ def recommend(
         )
     (scene,) = scenes
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
+    from proofroll.report.terminal.screen import WIDTH
     from proofroll.report.tradeoff.tables import answer_lines
     from proofroll.studies.tradeoff.recommend import recommend as answered
     from proofroll.studies.tradeoff.requirements import Requirements
@@ -125,7 +126,7 @@ def recommend(
     if lines and not as_json:
         typer.echo("\n".join(_own_lines(recommendation)))  # unbroken, as a program reads them
     else:
-        options.show(recommendation, as_json, lambda: answer_lines(recommendation))
+        options.show(recommendation, as_json, lambda: answer_lines(recommendation), widest=WIDTH)
     raise typer.Exit(options.OK if recommendation.answer.choice and recommendation.affordable else options.CONTRADICTED)
 
 
