@@ -10,7 +10,7 @@ from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.tables import observables, remarks
+from proofroll.report.comparison.tables import observables
 from proofroll.report.labels import SYMBOLS, engine_title, engine_words, name_of, step, verdict_text
 from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
@@ -82,6 +82,11 @@ def verdict_table(content: ReportedComparison) -> str:
 def caveat_list(content: ReportedComparison) -> str:
     """Notes on all settings of a comparison, a line each."""
     return "".join(f"- {line}\n" for line in closing_notes(content))
+
+
+def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
+    """(row, remark) for each remark but the one on equations of the truth, which is a closing note."""
+    return [(name, text) for name, row, _ in content.lines() for text in row.remarks if text != row.shared]
 
 
 def remark_list(content: ReportedComparison) -> str:

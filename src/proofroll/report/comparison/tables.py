@@ -162,11 +162,6 @@ def _part_taken(line: Mapping[str, Any]) -> float:
     return difference / allowed if allowed else math.inf if difference else 0.0
 
 
-def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
-    """(row, remark) for each remark but the one on equations of the truth, which is a closing note."""
-    return [(name, text) for name, row, _ in content.lines() for text in row.remarks if text != row.shared]
-
-
 def with_results(content: ReportedComparison, spread: Spread) -> list[tuple[int, str]]:
     """Number and name of each row that has numbers in a spread."""
     rows = {row for line in spread.lines for row, value in enumerate(line.values) if value is not None}

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.number_format import error, number
-from proofroll.report.labels import curve_names, engine_words, listed, name_of, omitted_lines, step
+from proofroll.report.labels import engine_words, listed, name_of, omitted_lines, step
 from proofroll.report.page.choice_cell import speed
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from proofroll.report.tradeoff.part import Advice
     from proofroll.studies.study_store import Measured
     from proofroll.studies.tradeoff.recommend import Choice, Recommendation
-    from proofroll.studies.tradeoff.records import Corner, CurveBudget, MeasuredPoint, TradeoffStudy
+    from proofroll.studies.tradeoff.records import Corner, MeasuredPoint, TradeoffStudy
 
 _TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)  # parts of a quantity's size, with a column each
 _SCATTER = 2.0  # ratio of the ends of a cost's interval beyond which it is unknown
@@ -104,7 +104,7 @@ def tradeoff_parts(study: TradeoffStudy, shown: Sequence[str], *, every_point: b
         yield from ("", point_table(study, study.points, shown, "Every point"))
         if study.over:
             yield from ("", corner_table(study, shown[0]))
-        yield from ("", budget_table(study, shown[0]), "")
+        yield ""
         yield from (f"{item.curve}: {item.sentence}" for item in study.budgets if item.quantity == shown[0])
         yield from study.findings[:-1]
     yield from ("", effort(study), *study.findings[-1:])
@@ -230,59 +230,6 @@ def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
         return "–", f"{listed(missing[0].parameters)}{more}: {missing[0].message}"
     corner = max(corners, key=lambda c: c.errors[quantity])
     return error(corner.errors[quantity]), listed(corner.parameters)
-
-
-def budget_table(study: TradeoffStudy, quantity: str) -> Table:
-    """Table of every curve: the makeup of its error, and the dominant part at the coarse and at the fine end."""
-    unit = study.quantities[quantity].unit
-    title = f"What the error of {quantity} consists of [{unit}]: the coarse end, then the fine end"
-    table = plain_table(
-        *unbroken("engine formulation setting", "order (declared)", "at steps [s]"),
-        *numeric("limit off", "known to", "floor"),
-        *unbroken("dominated by"),
-        title=title,
-    )
-    names = curve_names(study.points)
-    for item in study.budgets:
-        if item.quantity != quantity:
-            continue
-        limit = (item.model_form, item.model_form_bar, item.floor)
-        ends = [_DOMINANT.get(end, end) for end in (item.coarse, item.fine)]
-        table.add_row(
-            Text(names[item.curve]),
-            Text(_order(item), style="yellow" if item.contradicts_declaration else ""),
-            _steps(item),
-            *(number(value) for value in limit),
-            " → ".join(dict.fromkeys(ends)),
-        )
-    return table
-
-
-# Short names that fit a column.
-_DOMINANT = {
-    "time step": "step",
-    "model form": "model",
-    "round-off or solver tolerance": "floor",
-    "truth's own error bar": "truth",
-    "too few runs reached the end": "too few runs",
-    "there is no step and no tolerance": "nothing",
-}
-
-
-def _order(item: CurveBudget) -> str:
-    declared = "" if item.declared is None else f" ({item.declared})"
-    if item.order is None:
-        return f"–{declared}"
-    if item.order_low is None or item.order_high is None:
-        return f"{item.order:.2f} ±?{declared}"  # from two differences, whose scatter is unknown
-    return f"{item.order:.2f} ±{(item.order_high - item.order_low) / 2:.2f}{declared}"
-
-
-def _steps(item: CurveBudget) -> str:
-    """Coarsest and finest step between which the order was observed."""
-    if item.order_from is None:
-        return ""
-    return f"{number(item.order_from)} → {number(item.order_to)}"
 
 
 def answer_lines(advice: Recommendation) -> Iterator[str]:
