@@ -103,7 +103,8 @@ def _lines(judged: Judged, file: str, asked: str, names: Mapping[str, str], *, e
     for item in judged.compared:
         if everything or item.agrees is judged.agrees:
             text = "; ".join(part for part in str(item).split("; ") if everything or not part.startswith(_BAR))
-            kinds.setdefault(item.judgement.observable if everything else item.judgement.unit, f"{sign} {text}")
+            kind = item.judgement.observable if everything else item.judgement.unit
+            kinds.setdefault(kind, f"{'✓' if item.agrees else '✗'} {text}")
     yield from kinds.values()
     yield from (f"  cause: {cause}" for cause in judged.causes)
     units = {item.judgement.observable: item.judgement.unit for item in judged.compared}

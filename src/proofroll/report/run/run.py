@@ -168,7 +168,8 @@ def _ended_words(content: RunContent) -> str:
     """Sentence on the end of a run: who reached what time, how fast, and the time before the first step."""
     words = engine_words(content.engine, content.settings.get("formulation")), content.settings.get("preset")
     known = [name for name in ("dt", "rtol") if content.settings.get(name) is not None][:1]
-    title = ", ".join(filter(None, (*words, *(step(name, content.settings[name]) for name in known))))
+    steps = [step(name, content.settings[name]) for name in known]
+    title = ", ".join(filter(None, (*words, *precision_words(content.precision), *steps)))
     if content.status != Status.DONE or content.engine == "truth":
         return f"{title}: {content.message}; {content.wall_seconds:.2g} s of computing"
     speed = f" ({number(content.until / content.wall_seconds)}× real time)" if content.wall_seconds else ""
