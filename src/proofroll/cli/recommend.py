@@ -218,9 +218,9 @@ def _from_report(
         "advice": advised,
         "engines": costs,
     }
-    given = answers(matrix, part, forces), advised[-1].sentence, costs, durations
+    arguments = answers(matrix, part, forces), advised[-1].sentence, costs, durations
     words = f"{number(part)} {'of the path' if bound.relative else unit}"
-    parts = partial(advice_lines, *given, words, forces=forces, every_setting=every_setting)
+    parts = partial(advice_lines, *arguments, words, forces=forces, every_setting=every_setting)
     options.show(content, as_json, parts, widest=WIDTH)
     single = [item for item, column in zip(advised, matrix.columns, strict=False) if not column.whole]
     chosen = [bool(item.choice) for item in single if item.judged]

@@ -119,8 +119,8 @@ def value_table(
         for row in rows:
             table.add_row(*row)
         return table
-    right_aligned = [Column(justify="right"), Column(justify="right")]
-    table = Table("", right_aligned[0], "", " ", right_aligned[1], "", box=None, pad_edge=False, show_header=False)
+    columns = [Column(justify="right" if number in {1, 4} else "left") for number in range(6)]
+    table = Table(*columns, box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
     half = (len(rows) + 1) // 2
     for left, right in zip_longest(rows[:half], rows[half:], fillvalue=()):
         table.add_row(*left, *right)

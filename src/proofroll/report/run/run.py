@@ -167,14 +167,14 @@ def _event_text(event: Event) -> str:
 def _ended_words(content: RunContent) -> str:
     """Sentence on the end of a run: who reached what time, how fast, and the time before the first step."""
     words = engine_words(content.engine, content.settings.get("formulation")), content.settings.get("preset")
-    known = [name for name in ("dt", "rtol") if content.settings.get(name) is not None][:1]
-    steps = [step(name, content.settings[name]) for name in known]
+    resolution = [name for name in ("dt", "rtol") if content.settings.get(name) is not None][:1]
+    steps = [step(name, content.settings[name]) for name in resolution]
     title = ", ".join(filter(None, (*words, *precision_words(content.precision), *steps)))
     if content.status != Status.DONE or content.engine == "truth":
         return f"{title}: {content.message}; {content.wall_seconds:.2g} s of computing"
     speed = f" ({number(content.until / content.wall_seconds)}× real time)" if content.wall_seconds else ""
-    before = content.build_seconds or 0.0
-    build = f", after {number(before)} s before the first step" if before > _BUILD else ""
+    seconds = content.build_seconds or 0.0
+    build = f", after {number(seconds)} s before the first step" if seconds > _BUILD else ""
     return f"{title} reached {content.until:g} s in {content.wall_seconds:.2g} s{speed}{build}."
 
 

@@ -141,8 +141,8 @@ def engine_lines(item: ColumnAnswer) -> Iterator[str]:
         if cell.state in {NO_RUN, CANNOT}:
             continue
         speeds = speed_range(cell) if cell.held else "–"
-        title, held = item.matrix.title(cell.engine), f"{cell.held} of {len(cell.each)}"
-        yield f"{title:{width}}{held:>10}{speeds:>{_SPEED + 5}}  {_relative(item, cell, least)}"
+        title, count = item.matrix.title(cell.engine), f"{cell.held} of {len(cell.each)}"
+        yield f"{title:{width}}{count:>10}{speeds:>{_SPEED + 5}}  {_relative(item, cell, least)}"
 
 
 def _by_scene(item: ColumnAnswer) -> list[tuple[ChoiceCell, ...]]:

@@ -48,9 +48,9 @@ def report_lines(content: ReportContent, out: Path) -> Iterator[str]:
     if content.choice.rows:
         yield from kind_sentences(answers(content.choice, FIRST_TOLERANCE, forces=False))
     agree = sum(row.verdict is Verdict.AGREES for row in rows)
-    first, *others = first_lines(content)
+    sentence, *others = first_lines(content)
     counts = f"{agree} of {counted(len(rows), 'settings')} {'agrees' if agree == 1 else 'agree'}. " if rows else ""
-    yield f"{counts}{first}"
+    yield f"{counts}{sentence}"
     yield from (*others, "", *comparison_lines(content.comparisons), "")
     yield from part_lines(content)
     yield from change_lines(content.against)

@@ -207,12 +207,12 @@ def row_lines(
     away = row.verdict is Verdict.FAILED and all(run.status == Status.MISSING for run in runs)
     sign = "·" if left_out or away else SYMBOLS[verdict_of(row)]
     if worst is not None and math.isfinite(worst.error):
-        found = f"{symbol(worst.observable)} {number(worst.error)} of {number(worst.tolerance)}{spaced(worst.unit)}"
+        excess = f"{symbol(worst.observable)} {number(worst.error)} of {number(worst.tolerance)}{spaced(worst.unit)}"
     else:
-        found = "not run" if left_out else "missing" if away else str(row.verdict)
-    room = _SETTING + _ERROR - max(_ERROR, len(found) + 1)
+        excess = "not run" if left_out else "missing" if away else str(row.verdict)
+    room = _SETTING + _ERROR - max(_ERROR, len(excess) + 1)
     title = _cut(row, rows, room - 1)
-    line = Text(f"{sign} {title:{room}}{found:{_SETTING + _ERROR - room}}{_speed(row):>{_SPEED}}")
+    line = Text(f"{sign} {title:{room}}{excess:{_SETTING + _ERROR - room}}{_speed(row):>{_SPEED}}")
     line.stylize(STYLES[row.verdict], 0, 1)
     yield line
     notes = [_why(row, runs), *(f"{told.sentence}: {told.cause.remedy}" for told in row.diagnosis)]
@@ -222,8 +222,8 @@ def row_lines(
     if orders:
         notes += [_judged(item) for item in row.observables.values()]
         notes += [remark for remark in row.remarks if remark != row.shared]
-    before = max((run.build_seconds or 0.0 for run in runs), default=0.0)
-    notes += [f"{number(before)} s before its first step"] if before > COMPILES else []
+    build = max((run.build_seconds or 0.0 for run in runs), default=0.0)
+    notes += [f"{number(build)} s before its first step"] if build > COMPILES else []
     for note in filter(None, notes):
         yield indented(note)
 
@@ -330,11 +330,11 @@ def closing_lines(content: ReportedComparison, engines: Sequence[ReportedRow], *
 def _counts(rows: Sequence[ReportedRow], *, of: bool = False, noun: bool = False) -> str:
     """Counts of rows by verdict: ``7 of 9 agree, 1 differs``; ``noun``: of witnesses."""
     parts: list[str] = []
-    for verdict, (one, many) in _COUNTS.items():
+    for verdict, (singular, plural) in _COUNTS.items():
         if count := sum(verdict_of(row) is verdict for row in rows):
-            first = f" of {counted(len(rows), 'settings')}" if of and not parts and len(rows) > 1 else ""
+            share = f" of {counted(len(rows), 'settings')}" if of and not parts and len(rows) > 1 else ""
             what = f" witness{'es' if count > 1 else ''}" if noun and not parts else ""
-            parts.append(f"{count}{first}{what} {one if count == 1 else many}")
+            parts.append(f"{count}{share}{what} {singular if count == 1 else plural}")
     return ", ".join(parts)
 
 

@@ -96,10 +96,10 @@ def tradeoff_parts(study: TradeoffStudy, shown: Sequence[str], *, every_point: b
         shown: quantities with a column; all else is about the first of them.
         every_point: True to list all points, corners, and the makeup of errors.
     """
-    held = _held(study, shown[0]) if study.quantities[shown[0]].scale else {}
-    yield from _lead(held, shown[0])
-    if held:
-        yield from ("", *_held_lines(held))
+    cheapest = _held(study, shown[0]) if study.quantities[shown[0]].scale else {}
+    yield from _lead(cheapest, shown[0])
+    if cheapest:
+        yield from ("", *_held_lines(cheapest))
     if every_point:
         yield from ("", point_table(study, study.points, shown, "Every point"))
         if study.over:
@@ -118,35 +118,35 @@ def _held(study: TradeoffStudy, quantity: str) -> dict[str, dict[float, Measured
 
     The formulations are in the order of their cost at ``FIRST_TOLERANCE``; those that hold nothing are left out.
     """
-    held: dict[str, dict[float, MeasuredPoint]] = {}
+    cheapest: dict[str, dict[float, MeasuredPoint]] = {}
     for tolerance in (FIRST_TOLERANCE, *_TOLERANCES):
         for point in holding(study, Requirements(quantity, Tolerance(tolerance, True))):
             name = engine_words(point.engine, point.settings.get("formulation"))
             if point.seconds_per_second is not None:
-                held.setdefault(name, {}).setdefault(tolerance, point)
-    return held
+                cheapest.setdefault(name, {}).setdefault(tolerance, point)
+    return cheapest
 
 
-def _lead(held: Mapping[str, Mapping[float, MeasuredPoint]], quantity: str) -> Iterator[str]:
+def _lead(cheapest: Mapping[str, Mapping[float, MeasuredPoint]], quantity: str) -> Iterator[str]:
     """Sentences: what to take at ``FIRST_TOLERANCE``, whether it leads at every tolerance, and what is next."""
-    at_first = [(name, points[FIRST_TOLERANCE]) for name, points in held.items() if FIRST_TOLERANCE in points]
+    at_first = [(name, points[FIRST_TOLERANCE]) for name, points in cheapest.items() if FIRST_TOLERANCE in points]
     asked = f"{number(FIRST_TOLERANCE)} of the size of {quantity}"
     if not at_first:
         yield f"Nothing that was measured holds {asked}."
         return
     (name, best), *others = at_first
-    least = {size: min(x[size].cost for x in held.values() if size in x) for size in held[name]}
-    leads = all(held[name][size].cost <= cost for size, cost in least.items())
+    least = {size: min(x[size].cost for x in cheapest.values() if size in x) for size in cheapest[name]}
+    leads = all(cheapest[name][size].cost <= cost for size, cost in least.items())
     everywhere = " It leads wherever it holds" if leads else " Others lead at other tolerances"
     second = f"; next is {others[0][0]}: {_speed_of(others[0][1])}" if others else ""
     yield f"Take {point_words(best)}: {_speed_of(best)} at {asked}.{everywhere}{second}."
 
 
-def _held_lines(held: Mapping[str, Mapping[float, MeasuredPoint]]) -> Iterator[str]:
+def _held_lines(cheapest: Mapping[str, Mapping[float, MeasuredPoint]]) -> Iterator[str]:
     """A line for each engine with its formulation: speed of its cheapest point at each tolerance."""
     yield f"{'× real time, cheapest that holds':36}" + "".join(f"{number(size):>9}" for size in _TOLERANCES)
     unknown = False
-    for name, points in held.items():
+    for name, points in cheapest.items():
         cells = [_cell(points[size]) if size in points else "–" for size in _TOLERANCES]
         yield f"{name:36}" + "".join(f"{cell:>9}" for cell in cells)
         unknown = unknown or "?" in cells
