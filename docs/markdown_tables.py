@@ -10,9 +10,8 @@ from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.tables import remarks
+from proofroll.report.comparison.tables import observables
 from proofroll.report.labels import SYMBOLS, engine_title, engine_words, name_of, step, verdict_text
-from proofroll.report.terminal.tables import columns
 from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
@@ -57,6 +56,14 @@ def choice_table(groups: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
     return f"{table}\n\nMotion to 1e-4 of the path with some setting and step that was run: {said}; empty: not run.\n"
 
 
+def columns(content: ReportedComparison) -> list[tuple[str, str]]:
+    """(name, unit) of the observables of the table: headline motions, and the first headline reaction."""
+    units = observables(content)
+    shown = [name for name in content.headlines("motion") if name in units]
+    shown += [name for name in content.headlines("reaction") if name in units][:1]
+    return [(name, units[name]) for name in shown]
+
+
 def verdict_table(content: ReportedComparison) -> str:
     """One line per engine with settings: the worst verdict and the largest errors over all points of the parameters."""
     names = columns(content)
@@ -75,6 +82,11 @@ def verdict_table(content: ReportedComparison) -> str:
 def caveat_list(content: ReportedComparison) -> str:
     """Notes on all settings of a comparison, a line each."""
     return "".join(f"- {line}\n" for line in closing_notes(content))
+
+
+def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
+    """(row, remark) for each remark but the one on equations of the truth, which is a closing note."""
+    return [(name, text) for name, row, _ in content.lines() for text in row.remarks if text != row.shared]
 
 
 def remark_list(content: ReportedComparison) -> str:

@@ -176,7 +176,7 @@ def test_a_file_that_run_wrote_knows_its_scene(tmp_path: Path) -> None:
     given = ["--engine", "projection", "--until", "0.1", "--set", "length=2", "--out", path]
     assert CliRunner().invoke(app, ["run", "pendulum", *given]).exit_code == 0
     done = CliRunner().invoke(app, ["judge", path])
-    assert (done.exit_code, done.output.splitlines()[0]) == (0, "agrees with the truth of pendulum")
+    assert (done.exit_code, done.output.splitlines()[0]) == (0, "✓ run.nc agrees with the truth of pendulum")
     xr.load_dataset(path, engine="scipy").drop_attrs().to_netcdf(other := tmp_path / "other.nc", engine="scipy")
     assert CliRunner().invoke(app, ["judge", str(other)]).exit_code != 0
 
@@ -425,7 +425,7 @@ def test_the_command(proofroll: Proofroll, tmp_path: Path) -> None:
     given = ["--scene", "pendulum", "--tolerance", "q.pivot=1e-6 rad", "--because", BECAUSE]
     code, out, err = proofroll("judge", str(right), *given)
     assert (code, err) == (0, "")
-    assert out.startswith("agrees with the truth of pendulum (tolerance: a first look)")
+    assert out.startswith("✓ right.nc agrees with the truth of pendulum (tolerance: a first look)")
     code, out, _ = proofroll("judge", str(wrong), *given, "--json")
     found = json.loads(out)
     assert (code, found["agrees"], found["compared"][0]["verdict"]) == (1, False, "differs")

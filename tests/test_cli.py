@@ -195,12 +195,12 @@ def test_run_of_the_truth(proofroll: Proofroll) -> None:
 
 
 def test_run_for_a_person(proofroll: Proofroll) -> None:
-    """Without ``--json`` a run is a table with units, within 100 columns; one of no length is the initial state."""
+    """Without ``--json`` a run is a table with units, within 80 columns; one of no length is the initial state."""
     code, out, err = proofroll(*with_option("--until", "0"))
     assert (code, err) == (0, "")
-    assert ["gamma", "0", "rad"] in [line.split() for line in out.splitlines()]
-    assert "smallest N on the way: " in out
-    assert max(map(len, out.splitlines())) <= 100
+    assert " gamma 0 rad " in " ".join(out.split())
+    assert "smallest N " in out
+    assert max(map(len, out.splitlines())) <= 80
 
 
 @pytest.mark.drill
@@ -414,7 +414,7 @@ def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Pa
     )
     assert code == 3, err
     assert f"{engine}" in out
-    assert "failed" in out
+    assert "1 fails." in out
 
 
 def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
@@ -680,7 +680,7 @@ def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
     (page,) = (tmp_path / "out" / "stability").glob("*.html")
     text = page.read_text(encoding="utf-8")
     assert 'class="heat"' in text
-    assert "projection solver rotating_frame default" in text
+    assert "projection solver rotating frame, default" in text
 
 
 @pytest.mark.drill
@@ -714,7 +714,7 @@ def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
         code, out, err = proofroll(*arguments, *asked, "--out", str(tmp_path / "run.nc"))
         assert (code, err) == (0, "")
         assert ("q_WB" in read(tmp_path / "run.nc")) == bool(asked)
-        assert ("\nattitude.w " in out) == bool(asked)
+        assert ("attitude.w " in out) == bool(asked)
 
 
 @pytest.mark.drill

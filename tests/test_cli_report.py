@@ -98,8 +98,9 @@ def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path, out: 
     assert code == 0, err
     assert "1 of 2, comparisons" in err
     assert "2 of 2, figures" in err
-    assert f"The report is in {out / 'report.html'}" in " ".join(said.split())
-    assert max(map(len, said.splitlines())) <= 100
+    assert f"All as expected. {out / 'report.html'} · report.json · report.csv" in " ".join(said.split())
+    assert "✓  1 of  1  claim" in said
+    assert max(map(len, said.splitlines())) <= 80
     content = json.loads((out / "report.json").read_text(encoding="utf-8"))
     (figures,) = content["figures"]
     assert figures["study"]["statements"][0]["holds"] is True
@@ -111,15 +112,12 @@ def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path, out: 
         assert (out / run["trajectory"]).is_file()
 
 
-def test_the_terminal_ends_with_the_choice(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
-    """The last lines are the answer of the first screen as a table; a witness is no engine to take."""
+def test_the_terminal_begins_with_the_choice(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
+    """The first line is the answer of the first screen; a witness is no engine to take."""
     (name,) = files(tmp_path, claim=COMPARISON.replace('"oracle"', '"reduced[formulation=closed_form]"'))
     code, said, err = proofroll("report", name, "--out", str(out))
     assert code == 0, err
-    _, _, table = said.partition("The cheapest that holds 0.1 mm per metre of the true path")
-    head, line = (" ".join(text.split()) for text in table.strip().splitlines())
-    assert head == "kind of scene take × real time next engine if forces count"
-    assert line.startswith("Rolling balls no engine was run –")
+    assert said.startswith("Rolling balls: no engine was run.\n1 of 1 setting agrees. ")
     html = (out / "report.html").read_text(encoding="utf-8")
     assert "The cheapest that holds 0.1 mm per metre of the true path:" in unescape(html)
 
@@ -282,7 +280,7 @@ def test_a_budget_is_spent_briefly_first_and_grows(
 
     speeds, verdicts, said = made(most=3)
     assert (speeds, verdicts) == ([[4.0], [4.0]], ["agrees", "not-judged"])
-    assert "Left out for lack of processor time: reduced[formulation=closed_form] at speed=4." in said
+    assert "Runs left out for lack of processor time: 1." in said
     assert "did not suffice" not in said
     assert "Runs left out for lack of processor time: 1. The same command goes on with them." in said
     assert "lack of processor time: 1" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -136,11 +136,12 @@ def test_recommend_from_stored_curves(proofroll: Proofroll, folder: Path) -> Non
 
 
 def test_recommend_for_a_person(proofroll: Proofroll, folder: Path) -> None:
-    """The lines name engine, step, error, cost and range, within 100 columns."""
+    """The lines name engine, step, error, speed and range, within 80 columns."""
     code, out, _ = proofroll(*asked(folder))
     assert code == 0
-    assert all(len(line) <= 100 for line in out.splitlines())
-    for words in ("use Exudyn carrier matched, dt", "Cheaper ones fail", "speed 3 to 5", "nothing is known beyond"):
+    assert all(len(line) <= 80 for line in out.splitlines())
+    assert out.startswith("Take Exudyn carrier, matched, dt ")
+    for words in ("× real time, ", " off.", "Cheaper fails: ", "speed 3 to 5"):
         assert words in " ".join(out.split())
 
 
@@ -233,28 +234,28 @@ def test_an_answer_needs_no_library_of_pages(
     assert json.loads(out)["points"]
     code, out, err = proofroll(*given)
     assert (code, err) == (0, "")
-    assert "The Pareto front of the engines for z" in out
+    assert "× real time, cheapest that holds" in out
     assert "no diagram: drawing needs matplotlib: pip install 'proofroll[report]'" in " ".join(out.split())
     assert not list(tmp_path.glob("*.svg"))
 
 
 @pytest.mark.drill
 def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> None:
-    """Tables fit 100 columns, the diagram and pyperf's file are written, and an answer comes from what was measured."""
+    """Lines fit 80 columns, the diagram and pyperf's file are written, and an answer comes from what was measured."""
     given = ["--set", "speed=3", "--until", "0.1", "--engine", ENGINE, "--out", str(tmp_path)]
     code, out, err = proofroll("tradeoff", "sphere_in_cylinder", *given)
     assert (code, err) == (0, "")
-    assert all(len(line) <= 100 for line in out.splitlines())
-    assert "The Pareto front of the engines for z" in out
-    assert "order (declared)" in out
+    assert all(len(line) <= 80 for line in out.splitlines())
+    assert "× real time, cheapest that holds" in out
+    assert "order (declared)" not in out
     (drawn,) = (tmp_path / "tradeoff").glob("*.svg")
-    assert "Exudyn carrier matched" in drawn.read_text()
+    assert "Exudyn carrier, matched" in drawn.read_text()
     (timings,) = (tmp_path / "tradeoff").glob("*.pyperf.json")
     assert len(pyperf.BenchmarkSuite.load(str(timings)).get_benchmarks()) >= 6
 
     code, out, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given)
     assert (code, err) == (0, "")
-    assert "use Exudyn carrier matched" in out
+    assert "Take Exudyn carrier, matched" in out
     code, _, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given[:4], *given[-2:])
     assert code == 2
     assert f"the stored curves are of {ENGINE}; choose among these" in err

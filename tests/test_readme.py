@@ -236,7 +236,7 @@ def test_the_table_of_the_cheapest_is_as_claimed() -> None:
         cell = cells[3] if claim.levels else cells[2]
         names = [parse_engine(text) for text in claim.engine]
         assert any(
-            cell.strip().startswith(f"{engine_words(spec.name, spec.options['formulation'])} ") for spec in names
+            cell.strip().startswith(f"{engine_words(spec.name, spec.options['formulation'])}, ") for spec in names
         )
 
 

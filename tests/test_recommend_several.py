@@ -43,7 +43,7 @@ def test_several_scenes_are_advised_from_a_report(proofroll: Proofroll, report: 
     ]  # fmt: skip
     code, out, _ = proofroll("recommend", "arm", "ball", "--tolerance", "0.1 %", "--out", str(report.parent))
     assert code == 0
-    assert "Shown over 1 s (arm), 1 s (ball)." in out
+    assert "Tolerance: 1e-3 of the path. Shown over 1 s." in out
     assert "Over all, 2 scenes, to 1e-3: alpha joints holds it in 1; beta joints brings it to 2." in " ".join(
         out.split()
     )
@@ -54,7 +54,7 @@ def test_forces_and_engines_of_several_scenes(proofroll: Proofroll, report: Path
     given = ("--report", str(report), "--tolerance", "0.1 %")
     code, out, _ = proofroll("recommend", "arm", "--forces", *given)
     assert code == 0
-    assert "and forces within 1e-3 of the largest" in " ".join(out.split())
+    assert "Tolerance: 1e-3 of the path, with forces." in out
     assert "alpha joints, tuned, dt 1e-3 s" in " ".join(out.split())
     code, out, _ = proofroll("recommend", "arm", "ball", "--engine", "alpha", *given)
     assert code == 1
@@ -66,7 +66,7 @@ def test_names_of_a_list_and_names_that_a_report_lacks(proofroll: Proofroll, rep
     given = ("--tolerance", "1e-3 of path", "--report", str(report))
     code, out, _ = proofroll("recommend", "trees,rolling", *given)
     assert code == 0
-    assert [line.split()[0] for line in out.splitlines()[3:5]] == ["arm", "ball"]
+    assert [line.split()[0] for line in out.splitlines()[4:6]] == ["arm", "ball"]
     for name, advice in {
         "pendulum": f"{report} has no runs of it; proofroll report pendulum makes them",
         "nothing": f"{report} has no such scene, comparison or group; the groups there are trees, ball rolling",
@@ -146,9 +146,10 @@ def test_one_scene_is_answered_from_the_report_of_the_folder(proofroll: Proofrol
         "alpha joints": (True, 0.2), "beta joints": (True, 0.7), "gamma joints": (False, None),
     }  # fmt: skip
     text = proofroll("recommend", "pendulum", "--out", str(tmp_path))[1]
-    assert text.startswith("Tolerance: 1e-4 of the path.")
-    assert [row.split()[0] for row in text.splitlines() if " joints " in row][-3:] == [
-        "alpha", "beta", "gamma",
+    assert text.startswith("Take alpha joints, default, dt 1e-3 s: ≥ 5× real time.\nTolerance: 1e-4 of the path.")
+    assert "Shown over 1 s of " in text
+    assert [row.split()[:2] for row in text.splitlines() if row[:1] in {"✓", "✗", "↘"}] == [
+        ["✓", "alpha"], ["✓", "beta"], ["↘", "gamma"],
     ]  # fmt: skip
     code, _, err = proofroll("recommend", "heavy_top", "--tolerance", "1e-3", "--out", str(tmp_path))
     assert code == 2

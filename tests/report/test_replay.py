@@ -193,7 +193,7 @@ def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) ->
     assert content["start"] == 1, "the scene as its file has it"
     for case, numbers in zip(content["cases"], content["packed"], strict=True):
         names = {ball["name"]: ball["shown"] for ball in case["runs"]}
-        assert names == {"truth": True, "alpha fine default (dt 1e-3 s)": True, "beta only (dt 1e-3 s)": True}
+        assert names == {"truth": True, "alpha fine, default, dt 1e-3 s": True, "beta only, dt 1e-3 s": True}
         bytes_said = sum(4 * width * length for _, _, width, length, _ in case["arrays"])
         assert len(gzip.decompress(base64.b64decode(numbers))) == bytes_said
     silent = next(i for i, ball in enumerate(content["cases"][0]["runs"]) if ball["name"].startswith("beta"))
@@ -220,7 +220,7 @@ def replay_with(made: Any, engine: str, change: Callable[[Any], Any]) -> dict[st
 def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) -> None:
     """A setting that is not the default but off by more than a hundredth of the ball's radius is a ghost, not shown."""
     balls = replay_with(made, "alpha[formulation=fine]", lambda p: p + 1e-3)["runs"]
-    assert {ball["name"]: ball["shown"] for ball in balls}["alpha fine matched (dt 1e-3 s)"] is False
+    assert {ball["name"]: ball["shown"] for ball in balls}["alpha fine, matched, dt 1e-3 s"] is False
 
 
 def test_a_ball_that_flies_off_is_dropped_where_it_leaves(made: Any) -> None:

@@ -19,7 +19,7 @@ from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.page.advice import advice
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, report_content
-from proofroll.report.terminal.tables import verdict_parts
+from proofroll.report.terminal.verdicts import verdict_parts
 from proofroll.running.case import Status
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run

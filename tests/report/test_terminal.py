@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,61 +9,12 @@ from typing import Any
 
 import pytest
 from folded import whole
-from rich.console import Console
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.page.records import ReportContent
 from proofroll.report.parts import PartEntry
-from proofroll.report.terminal.tables import (
-    WIDTH,
-    console,
-    dash_notes,
-    first_lines,
-    part_lines,
-    verdict_parts,
-    verdict_table,
-)
-
-
-def test_the_table_of_verdicts_is_plain_where_nobody_watches(content: ReportContent) -> None:
-    """Into a pipe go no colour codes and no boxes, and no line is longer than 100 characters."""
-    out = io.StringIO()
-    Console(file=out, width=WIDTH).print(verdict_table(content.comparisons[0]))
-    text = out.getvalue()
-    assert "\x1b" not in text
-    assert not set(text) & set("│─┏┃━┼")
-    assert max(map(len, text.splitlines())) <= WIDTH
-    for row in content.comparisons[0].rows:
-        assert {"gamma": "missing"}.get(row.name, row.verdict) in text
-
-
-def test_a_column_without_numbers_is_left_out(content: ReportContent) -> None:
-    """Where nothing was timed no column of costs takes the room of names."""
-
-    def head(comparison: ReportedComparison) -> list[str]:
-        return [str(column.header) for column in verdict_table(comparison).columns]
-
-    found = content.comparisons[0]
-    untimed = replace(found, rows=[replace(row, seconds_per_second=None) for row in found.rows])
-    assert "s/s" in head(found)
-    assert [name for name in head(found) if name != "s/s"] == head(untimed)
-
-
-def test_dashes_have_their_meaning_below_the_table(content: ReportContent) -> None:
-    """A row without values and one without an order are told below the table; without dashes there is no such line."""
-    found = content.comparisons[0]
-    lines = [line for line in verdict_parts(found) if str(line).startswith("–: ")]
-    assert lines == dash_notes(found)
-    with_values = replace(found, rows=[row for row in found.rows if row.observables])
-    orders = [
-        replace(row, observables={name: replace(item, order=order) for name, item in row.observables.items()})
-        for row, order in zip(2 * with_values.rows[:1], (2.0, None), strict=True)
-    ]
-    assert dash_notes(replace(found, rows=orders[:1])) == []
-    assert "no order is measured" in dash_notes(replace(found, rows=orders))[0]
-    assert "no value" not in dash_notes(replace(found, rows=orders))[0]
-    assert "no value" in dash_notes(replace(found, rows=[orders[0], replace(orders[0], observables={})]))[0]
+from proofroll.report.terminal.tables import WIDTH, console, first_lines, part_lines
+from proofroll.report.terminal.verdicts import verdict_parts
 
 
 @pytest.mark.drill
@@ -75,7 +25,7 @@ def test_a_comparison_without_its_truth_is_one_sentence(everything: Any, tmp_pat
     rows = [replace(row, verdict=unjudged, verdicts={unjudged: 2}) for row in found.rows]
     lacking = replace(found, name="lacking", title="Lacking", rows=rows, beyond_budget=["the truth", "alpha, dt 0.1"])
     said = "Not judged: the processor time did not suffice for the truth: 4 settings."
-    assert list(verdict_parts(lacking)) == ["Lacking", said, ""]
+    assert list(verdict_parts(lacking)) == ["Lacking", said]
     content = replace(everything.content, comparisons=[found, lacking])
     both = replace(everything, content=content, curves=2 * everything.curves)
     text = whole(both.write(tmp_path / "report.html").read_text(encoding="utf-8"))

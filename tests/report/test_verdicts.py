@@ -29,7 +29,7 @@ from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, choice_matrix
 from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.html import page, templates
 from proofroll.report.page.records import report_content
-from proofroll.report.terminal.tables import closing_lines, verdict_table
+from proofroll.report.terminal.verdicts import verdict_parts
 from proofroll.running.case import Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
@@ -80,14 +80,18 @@ def outcome(made: tuple[Outcome, Store]) -> Outcome:
     return with_runs(made[0], runs)
 
 
-def printed(content: ReportedComparison, width: int) -> str:
-    """The table and the lines under it as they stand on a terminal of this width."""
+def printed(content: ReportedComparison, width: int = 80, *, orders: bool = False) -> str:
+    """A comparison as it stands on a terminal of this width."""
     out = io.StringIO()
     console = Console(file=out, width=width, highlight=False)
-    console.print(verdict_table(content))
-    for line in closing_lines(content):
-        console.print(line, markup=False)
+    for part in verdict_parts(content, orders=orders):
+        console.print(part, markup=False)
     return out.getvalue()
+
+
+def told(content: ReportedComparison, *, orders: bool = False) -> str:
+    """The same in one line."""
+    return " ".join(printed(content, orders=orders).split())
 
 
 def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -> None:
@@ -101,25 +105,24 @@ def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -
     assert row.verdict == "refused"
     assert verdict_text(row) == "refused 1/11 ✓10"
     assert row.reason == "at speed=6: one coefficient only"
-    assert "⊘ refused 1/11 ✓10" in printed(content, 100)
+    assert "at speed=6: one coefficient only" in told(content)
     of_row, runs_of_row = next(iter(rows_by_engine(content).values()))[0]
     assert (verdict_text(of_row, runs_of_row), of_row.observables["z"].verdict) == ("refused 1/11 ✓10", "agrees")
     ((at_point, run_there),) = next(iter(rows_by_engine(content, "speed=6").values()))[:1]
     assert (verdict_text(at_point, run_there), len(run_there)) == ("refused", 1)
 
 
-def test_the_price_of_compiling_has_a_column(made: tuple[Outcome, Store]) -> None:
-    """Where an engine takes long before its first step the table tells it for each row; else it has no such column."""
+def test_the_price_of_compiling_is_told(made: tuple[Outcome, Store]) -> None:
+    """Where an engine takes long before its first step its row says so, and the page has a column; else neither."""
     run = made[0].runs[0]
     runs = {
         seconds: [dataclasses.replace(answered(run), result=dataclasses.replace(run.result, build_seconds=seconds))]
         for seconds in (0.02, 23.5)
     }
     contents = [outcome_content(with_runs(made[0], {0: one})) for one in runs.values()]
-    quick, slow = (printed(content, 100) for content in contents)
-    assert "s before" in slow
-    assert re.search(r" 24 ", slow)
-    assert "s before" not in quick
+    quick, slow = (printed(content) for content in contents)
+    assert "    24 s before its first step" in slow.splitlines()
+    assert "first step" not in quick
     pages = [str(templates().get_template("parts.html").module.matrix(one, None, "", "")) for one in contents]
     assert ["before <small>s</small>" in page for page in pages] == [False, True]
     assert re.search(r'<td class="n">24</td>', pages[1])
@@ -152,36 +155,36 @@ def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
 
 
 def test_another_limit_and_no_limit_are_two_answers_on_the_terminal(outcome: Outcome) -> None:
-    """Under the table each row that does not agree says which of the two it is, with order, limit error and bar."""
-    lines = closing_lines(outcome_content(outcome))
-    (other,) = (line for line in lines if "another limit" in line)
-    (none,) = (line for line in lines if "no limit shown" in line)
-    assert other.startswith("✗ alpha fine matched (dt 1e-3 s): z at speed=")
-    assert other.endswith("another limit: off by 0.05 ± 2e-4 m, order 1")
-    assert none.endswith("no limit shown: off by 0.06 ± 0.1 m, no order")
+    """Below each row that does not agree it says which of the two it is; --orders adds order, limit error and bar."""
+    content = outcome_content(outcome)
+    text = told(content)
+    assert "✗ alpha fine, matched, dt 1e-3 s z 0.05 of 1e-3 m" in text
+    assert "order 1, smaller steps stay 0.05 m off" in text
+    assert "smaller steps do not settle" in text
+    assert "limit off by" not in text
+    assert "order 1, limit off by 0.05 ± 2e-4 m" in told(content, orders=True)
 
 
 @pytest.mark.parametrize("width", [80, 100])
 def test_nothing_is_cut_on_a_narrow_terminal(outcome: Outcome, width: int) -> None:
-    """No line is too long, no word ends in an ellipsis, and every verdict is whole."""
+    """No line is too long, no word ends in an ellipsis, and each row is one line with its sign."""
     content = outcome_content(outcome)
     text = printed(content, width)
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= width
-    for row in content.rows:
-        assert f"{SYMBOLS[row.verdict]} {row.verdict}" in text
+    assert sorted(line[0] for line in text.splitlines() if " of 1e-3 m" in line) == sorted("✓✗✗◐")
 
 
 def test_a_wrong_limit_within_tolerance_is_marked(outcome: Outcome) -> None:
-    """The row agrees, with a star that leads to the limit's error; JSON, terminal and page have it."""
+    """The row agrees, and below it stands the limit's error; JSON, terminal and page have it."""
     content = outcome_content(outcome)
     row = content.rows[2]
     assert row.verdict == "agrees"
-    assert "✓ agrees*" in printed(content, 100)
+    assert "z agrees at this step only, its limit is 0.4 mm off" in told(content)
     assert "agrees*" in [verdict_text(*line) for lines in rows_by_engine(content).values() for line in lines]
     (remark,) = row.remarks
     assert "shown not to be the truth: off by 4e-4 ± 1e-7 m, order 2" in remark
-    assert f"* beta only: {remark}" in [line.replace(" (dt 1e-3 s)", "") for line in closing_lines(content)]
+    assert remark in told(content, orders=True)
     assert content.runs_of(2)[0].judgements[0].remarks
 
 
@@ -190,18 +193,18 @@ def test_what_could_not_be_judged_is_not_said_to_be_as_expected(made: tuple[Outc
     rows = made[0].comparison.rows
     runs = {rows.index(run.row): [answered(run)] for run in made[0].runs}
     content = outcome_content(with_runs(made[0], runs))
-    assert closing_lines(content)[-1].startswith("Every verdict is as")
+    assert "As the file expects." in told(content)
     assert "All of this was expected." in conclusions(content, NOTHING, [], None).answer
     assert counted(content).endswith("; as expected")
     nothing = Result(Status.NO_TRUTH, "there is no truth here")
     runs[0] = [dataclasses.replace(run, result=nothing, judgements=[]) for run in runs[0]]
     content = outcome_content(with_runs(made[0], runs))
-    assert "Nothing contradicts the comparison file; 1 of its runs could not be judged." in closing_lines(content)
+    assert "Nothing contradicts the file; 1 of its runs could not be judged." in told(content)
     assert "Nothing of it was unexpected." in conclusions(content, NOTHING, [], None).answer
     assert counted(content).endswith("; nothing is contradicted")
     away = Result(Status.MISSING, "beta is not installed here")
     runs[0] = [dataclasses.replace(run, result=away) for run in runs[0]]
-    assert any("1 of its runs could not" in line for line in closing_lines(outcome_content(with_runs(made[0], runs))))
+    assert "1 of its runs could not" in told(outcome_content(with_runs(made[0], runs)))
 
 
 def test_where_nothing_is_claimed_nothing_is_said_to_be_expected(made: tuple[Outcome, Store]) -> None:
@@ -226,7 +229,7 @@ def test_who_is_silent_or_shares_equations_is_marked(outcome: Outcome) -> None:
     assert row.reason == "agrees, but does not report F2, N"
     assert detail(row) == "does not report F2, N"
     assert row.remarks == ["rests on the same equations as the truth itself (alike)"]
-    assert "◐ incomplete*" in printed(content, 100)
+    assert "z 0 of 1e-3 m – does not report F2, N" in told(content)
     assert counted(content) == "4 settings: ✓ 1 agrees, ◐ 1 incomplete, ✗ 2 differs; as expected"
     said = three_sentences([content], {}, NOTHING)[0]
     assert said.startswith("Of 4 settings in one comparison, 1 agrees with the truth in every observable")
@@ -267,7 +270,7 @@ def test_rows_of_one_scheme_are_no_witnesses_for_one_another(
     )
     page_text = " ".join(parse(page(content, [point_curves(outcome)])).text.split())
     assert (said in page_text) is alike
-    assert (said in closing_lines(outcome_content(outcome))) is alike
+    assert (said in told(outcome_content(outcome))) is alike
 
 
 @pytest.mark.parametrize(("third", "shared"), [("semi-implicit Euler", True), ("RK4", False)])
@@ -282,16 +285,15 @@ def test_rows_of_one_declared_scheme_are_named_whatever_their_errors(
         "Same integration scheme (agreement is not independent evidence): "
         "alpha fine default, beta: semi-implicit Euler."
     )
-    lines = closing_lines(dataclasses.replace(content, rows=rows))
-    assert (said in lines) is shared
+    assert (said in told(dataclasses.replace(content, rows=rows))) is shared
 
 
 def test_closest_is_nobody_who_rests_on_the_truth(made: tuple[Outcome, Store]) -> None:
     """A row that shares the truth's equations is not named as the closest, however small its error is."""
     content, choice = outcome_content(made[0]), report_content([made[0]], "proofroll report invented").choice
-    assert "closest is alpha fine matched" in three_sentences([content], {}, choice)[0]
+    assert "closest is alpha fine, matched" in three_sentences([content], {}, choice)[0]
     content.rows[0] = dataclasses.replace(content.rows[0], shared="rests on the same equations")
-    assert "closest is alpha fine default" in three_sentences([content], {}, choice)[0]
+    assert "closest is alpha fine, default" in three_sentences([content], {}, choice)[0]
 
 
 @pytest.mark.parametrize("coarse", [0.19999999, 0.2, 0.20000001])

@@ -123,9 +123,9 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
         "Of 4 settings in one comparison, 1 agrees with the truth in every observable and every case, 1 agrees without "
         "reporting all that is judged"
     )
-    assert "closest is alpha fine matched" in found[0]
+    assert "closest is alpha fine, matched" in found[0]
     assert found[1].startswith(
-        "1 setting differs from the truth and runs to the end without a warning, worst alpha fine default"
+        "1 setting differs from the truth and runs to the end without a warning, worst alpha fine, default"
     )
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a warning.")
     assert found[2] == answer(report.content.choice, FIRST_TOLERANCE, forces=True).sentence
@@ -241,7 +241,7 @@ def test_a_part_that_fails_leaves_a_sentence(
     assert "Traceback" not in said.missing
     text = parse((tmp_path / "report.html").read_text(encoding="utf-8")).text
     assert said.missing in text
-    assert "Closest to the truth is alpha fine matched" in text
+    assert "Closest to the truth is alpha fine, matched" in text
 
 
 def test_an_interrupted_part_takes_nothing_away(made: tuple[Outcome, Store], tmp_path: Path) -> None:

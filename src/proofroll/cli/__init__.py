@@ -1,5 +1,6 @@
 """Command line. Data goes to standard output, progress and problems to standard error."""
 
+import codecs
 import io
 import os
 import re
@@ -36,6 +37,7 @@ from proofroll.cli.tradeoff import tradeoff
 from proofroll.cli.versions import versions
 from proofroll.core.entry_points import broken, leave_out, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, choices
+from proofroll.report.terminal.printable import spelled_out
 from proofroll.running.process_end import INTERRUPTS, end_at_once
 
 app = typer.Typer(
@@ -148,10 +150,11 @@ def _interrupt(number: int, _: object) -> None:
 
 
 def _prepare_output() -> None:
-    """Opens standard output if a shell closed it (``>&-``), and replaces characters that it cannot encode by ``?``."""
+    """Opens standard output if a shell closed it (``>&-``), and writes signs that it cannot encode with letters."""
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 -- open to the end
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")
+        codecs.register_error("signs", spelled_out)
+        sys.stdout.reconfigure(errors="signs")
 
 
 # Cached: a call of ``app`` would make all commands again, which takes longer than many of them.

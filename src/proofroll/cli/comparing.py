@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,18 +18,17 @@ from proofroll.core.number_format import number as written
 
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
-    from proofroll.running.case import Case, Result
+    from proofroll.running.case import Case, EngineFacts, Result
     from proofroll.running.runner import Runner
     from proofroll.running.time_budget import TimeBudget
     from proofroll.studies.comparison.outcome import Outcome
-    from proofroll.studies.comparison.planning import Plan
+    from proofroll.studies.comparison.planning import Plan, Planned
 
     # Parts of comparisons that are run together: the number of a comparison and cases of it.
     _Phase = list[tuple[int, list[Case]]]
 
 # Processor time that is reserved for the last page and for the start of Python [s].
 _PAGE = 8.0
-_LONG = 10.0  # time after which a comparison tells the runs that have ended [s]
 
 
 def compare(
@@ -55,6 +56,12 @@ def compare(
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default about a fiftieth of --until.")
     ] = None,
+    orders: Annotated[
+        bool, typer.Option("--orders", help="Below each setting all judged quantities, with orders and limits.")
+    ] = False,
+    witnesses: Annotated[
+        bool, typer.Option("--witnesses", help="List the solvers that only cross-check the truth, too.")
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
     """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file.
@@ -66,7 +73,8 @@ def compare(
     the file gets a row without claims.
     """
     from proofroll.report.comparison.summary import outcome_content
-    from proofroll.report.terminal.tables import verdict_parts
+    from proofroll.report.terminal.screen import WIDTH
+    from proofroll.report.terminal.verdicts import verdict_parts
     from proofroll.running.idle_workers import Workers
     from proofroll.studies.comparison.by_name import comparison_named
 
@@ -79,14 +87,14 @@ def compare(
     if control is not None:
         options.doubt_numbers(comparison, settings)
 
-    def interrupted(outcome: Outcome) -> None:
+    def show(outcome: Outcome) -> None:
         content = outcome_content(outcome)
-        options.show(content, as_json, lambda: verdict_parts(content))
+        parts = partial(verdict_parts, content, orders=orders, witnesses=witnesses)
+        options.show(content, as_json, parts, widest=WIDTH)
 
     runner = options.new_runner(out, fresh, jobs, scheduler, workers)
-    outcomes = outcomes_of([loaded], engine or [], runner, interrupted=interrupted)
-    content = outcome_content(outcomes[0])
-    options.show(content, as_json, lambda: verdict_parts(content))
+    outcomes = outcomes_of([loaded], engine or [], runner, watched=_Watched(show, moves=not as_json))
+    show(outcomes[0])
     raise typer.Exit(exit_code(outcomes))
 
 
@@ -126,8 +134,8 @@ def outcomes_of(
     finished: Callable[[dict[int, Outcome], bool], None] | None = None,
     budget: float | None = None,
     spent: float = 0.0,
-    interrupted: Callable[[Outcome], None] | None = None,
     *,
+    watched: _Watched | None = None,
     coarser: bool = False,
 ) -> list[Outcome]:
     """Runs all comparisons with one progress bar, one after the other as far as that leaves no worker idle.
@@ -145,8 +153,7 @@ def outcomes_of(
             an equal share of the time left; what it does not use is for later ones.
         spent: part of the budget that was used before [s].
         coarser: see :func:`proofroll.studies.comparison.planning.plan`.
-        interrupted: called with each comparison, judged by the runs that ended, if the user ends the command; ended
-            runs have a line each, too, once that takes long.
+        watched: shows a single comparison while it runs, and what has ended if the user ends the command.
     """
     from proofroll.running.process import processor_seconds
     from proofroll.running.time_budget import TimeBudget
@@ -169,23 +176,19 @@ def outcomes_of(
     limit = TimeBudget(budget, processor_seconds() - begin, owner) if budget else None
     if limit and finished:
         limit.after += _PAGE
-    with options.progress_bar(f"{stage}cases", total=len(owner)) as advance:
-        running = _Comparing(plans, runner, limit, finished, lambda text: advance(f"{stage}{text}"))
-        running.tell_runs = interrupted is not None
-
-        def ended(case: Case, result: Result) -> None:
-            running.add(case, result)
-            advance(f"{stage}{case.engine.name}")
-
-        try:
+    running = _Comparing(plans, runner, limit, finished)
+    try:
+        with watched.screen(running) if watched else options.progress_bar(f"{stage}cases", total=len(owner)) as advance:
+            running.tell = lambda text: advance(f"{stage}{text}")
             for item in plans:
                 if item.comparison.budget:
-                    running.results |= run_plan(item, runner, ended)
+                    running.results |= run_plan(item, runner, running.add)
             for phase in phases:
                 running.run(phase, last=phase is phases[-1])
-        except KeyboardInterrupt:
-            running.show_ended(interrupted)
-            raise
+    except KeyboardInterrupt:
+        if watched:
+            running.show_ended(watched.show)
+        raise
     if not finished:
         for index in range(len(plans)):
             running.judge(index)
@@ -202,6 +205,8 @@ class _Comparing:
         runner: runs their cases.
         limit: processor time of all of them, or None.
         finished: see :func:`outcomes_of`.
+
+    Attributes:
         tell: called with the bar's text after each case.
     """
 
@@ -211,9 +216,9 @@ class _Comparing:
         runner: Runner,
         limit: TimeBudget | None,
         finished: Callable[[dict[int, Outcome], bool], None] | None,
-        tell: Callable[[str], None],
     ) -> None:
-        self.plans, self.runner, self.limit, self.finished, self.tell = plans, runner, limit, finished, tell
+        self.plans, self.runner, self.limit, self.finished = plans, runner, limit, finished
+        self.tell: Callable[[str], None] = lambda _: None
         self.results: dict[str, Result] = {}
         self.ended: dict[int, Outcome] = {}
         self._judged: dict[int, int] = {}
@@ -221,45 +226,36 @@ class _Comparing:
         self._keys = list(dict.fromkeys(case.key for item in plans for case in item.cases))
         self._truths = {case.key for item in plans for case in item.truths.values()}
         self._start, self._reused = time.monotonic(), runner.reused
-        self.tell_runs = False
-        self._untold: list[str] = []
         self._budget = limit.left if limit else 0.0
+
+    @property
+    def so_far(self) -> dict[str, Result]:
+        """Results by key; of cases that have not ended that they were left out."""
+        from proofroll.running.case import Result, Status
+
+        return dict.fromkeys(self._keys, Result(Status.LEFT_OUT, "it has not been run yet")) | self.results
 
     def judge(self, index: int) -> None:
         """Judges a comparison by the cases that have been run so far."""
-        from proofroll.running.case import Result, Status
         from proofroll.studies.comparison.compare import evaluate, left_out
 
         self._judged[index] = self._known(index)
-        so_far = dict.fromkeys(self._keys, Result(Status.LEFT_OUT, "it has not been run yet")) | self.results
+        so_far = self.so_far
         outcome = evaluate(self.plans[index].ended(left_out(so_far)), so_far, self.runner)
         if self._judged[index] < len(self.plans[index].cases):
             outcome = replace(outcome, beyond_budget=[])  # missing cases are not left out yet
         self.ended[index] = outcome
 
     def add(self, case: Case, result: Result) -> None:
-        """Keeps a result; a line on standard error names what has ended, once the comparison takes long."""
-        from proofroll.running.case import Status
-
+        """Keeps a result, and updates the bar's text."""
         self.results[case.key] = result
-        if not self.tell_runs or result.status in {Status.REFUSED, Status.LEFT_OUT}:
-            return
-        engine = case.engine
-        words = [f"{engine.resolution}={engine.settings[engine.resolution]:g}"] if engine.resolution else []
-        name = f"{engine.name}[{','.join([str(engine.settings.get('formulation', '')), *words]).strip(',')}]"
-        reason = "" if result.trajectory else f": {result.message}"
-        self._untold.append(f"{name} {result.status.value} after {result.wall_seconds:.2g} s{reason}")
-        if time.monotonic() - self._start > _LONG:
-            for line in self._untold:
-                options.complain(line)
-            self._untold.clear()
+        self._tell(case)
 
-    def show_ended(self, show: Callable[[Outcome], None] | None) -> None:
+    def show_ended(self, show: Callable[[Outcome], None]) -> None:
         """Shows each comparison with a run that has ended, judged by what there is."""
-        for index, item in enumerate(self.plans if show else ()):
+        for index, item in enumerate(self.plans):
             if any(case.key in self.results for run in item.runs for case in run.ladder.values()):
                 self.judge(index)
-                assert show is not None  # by the loop
                 show(self.ended[index])
 
     def _known(self, index: int) -> int:
@@ -278,7 +274,6 @@ class _Comparing:
 
         def arrived(case: Case, result: Result) -> None:
             self.add(case, result)
-            self._tell(case)
             for _, keys in awaited:
                 keys.discard(case.key)
             self._judge_ended(awaited, last=last)
@@ -332,8 +327,69 @@ class _Comparing:
             # On a machine that does other things, too, processor time passes slower. The rest is judged in the end.
             left = min(left, (self.limit.left + self.limit.after) * (time.monotonic() - self._start) / used)
         ended = sum(self._known(index) == len(item.cases) for index, item in enumerate(self.plans))
-        of = f"{ended} of {many} comparisons ended, " if many > 1 else ""
-        self.tell(f"{of}{f'about {float(written(left, 1)):g} s left, ' if ran else ''}{case.engine.name}")
+        counts = f"{ended} of {many} comparisons ended, " if many > 1 else ""
+        self.tell(f"{counts}{f'about {float(written(left, 1)):g} s left, ' if ran else ''}{_words(case.engine)}")
+
+
+def _words(engine: EngineFacts) -> str:
+    """Engine, formulation and step of a case for a reader."""
+    from proofroll.report.labels import engine_words, step
+
+    size = step(engine.resolution, engine.settings.get(engine.resolution or ""))
+    return ", ".join(filter(None, (engine_words(engine.name, engine.settings.get("formulation")), size)))
+
+
+class _Watched:
+    """A comparison on a terminal: each row when its runs have ended, above a line of progress that is overwritten.
+
+    Both are removed at the end, when the whole answer takes their place. Elsewhere nothing is shown before that.
+
+    Args:
+        show: prints the comparison when it has ended, or the part of it that has.
+        moves: False to show nothing before that.
+    """
+
+    def __init__(self, show: Callable[[Outcome], None], *, moves: bool) -> None:
+        self.show, self._moves = show, moves
+        self._lines: list[Any] = []
+        self._told: set[int] = set()
+
+    @contextmanager
+    def screen(self, running: _Comparing) -> Iterator[Callable[[str], None]]:
+        """Context manager with the rows and the line on standard error; yields a function that updates them."""
+        (planned,) = running.plans
+        keys = {case.key for case in planned.cases}
+        start, texts = time.monotonic(), ["starting"]
+
+        def line() -> str:
+            counts = f"{len(keys & running.results.keys())} of {len(keys)} runs"
+            return f"  {counts}, {time.monotonic() - start:.0f} s, {texts[-1]}"
+
+        with options.growing(lambda: self._lines, line, shown=self._moves) as moves:
+
+            def update(text: str) -> None:
+                texts[:] = [text]
+                if moves:
+                    self._add_rows(running)
+
+            yield update
+
+    def _add_rows(self, running: _Comparing) -> None:
+        """Adds the rows all of whose runs have ended, each once."""
+        from proofroll.report.comparison.summary import outcome_content
+        from proofroll.report.terminal.verdicts import row_lines
+        from proofroll.studies.comparison.compare import evaluate
+
+        (planned,) = running.plans
+        rows: dict[int, list[Planned]] = {}
+        for run in [run for run in planned.runs if not run.witness] or planned.runs:
+            rows.setdefault(id(run.row), []).append(run)
+        for key, runs in rows.items():
+            if key in self._told or not all(run.keys(planned.truths) <= running.results.keys() for run in runs):
+                continue
+            self._told.add(key)
+            content = outcome_content(evaluate(replace(planned, runs=runs), running.so_far, running.runner))
+            self._lines += row_lines(content.rows[0], content.runs, content.rows)
 
 
 def exit_code(outcomes: list[Outcome]) -> int:

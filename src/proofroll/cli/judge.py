@@ -1,14 +1,22 @@
 """Command ``judge``: compares a trajectory from any program with the truth of a scene."""
 
+from __future__ import annotations
+
 import json
-from collections.abc import Mapping
+import shlex
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from proofroll.cli import options
 from proofroll.core.limits import RUN_TIME_LIMIT
+
+if TYPE_CHECKING:
+    from proofroll.studies.judging.judge import Judged
+
+_BAR = "the truth is known"  # beginning of the clause on the truth's error bar
 
 
 def judge(
@@ -36,6 +44,9 @@ def judge(
     ] = "",
     because: Annotated[str, typer.Option(help="Why that is close enough.")] = "",
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the truth is given up.")] = RUN_TIME_LIMIT,
+    everything: Annotated[
+        bool, typer.Option("--all", help="List every quantity with the truth's error bar, and what is not judged.")
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
     """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs.
@@ -56,6 +67,7 @@ def judge(
     if layout:
         raise InputError("--as", layout, "it is for the record of a robot: give --robot and --control, too")
     from proofroll.files.scene_file import load_scene
+    from proofroll.report.terminal.screen import WIDTH
     from proofroll.studies.judging import judge as judging
 
     written: Mapping[str, object] = {}
@@ -70,8 +82,43 @@ def judge(
     if as_json:
         options.write_json(judged.content())
     else:
-        options.show_lines(str(judged).splitlines())
+        asked = f"proofroll judge {shlex.quote(str(run))} --scene {shlex.quote(scene or str(named))}"
+        lines = _lines(judged, run.name, asked, _names(columns), everything=everything)
+        options.show_lines(lines, widest=WIDTH)
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)
+
+
+def _lines(judged: Judged, file: str, asked: str, names: Mapping[str, str], *, everything: bool) -> Iterator[str]:
+    """Answer with its cause, the worst quantity of each kind, and the command that closes a cause; or all of it."""
+    from proofroll.studies.judging.causes import mapping
+    from proofroll.studies.judging.user_trajectory import FROM_STATE
+
+    sign, verb = ("✓", "agrees with") if judged.agrees else ("✗", "differs from")
+    _, *rest = str(judged).splitlines()
+    cause = f": {judged.causes[0].partition(' (')[0]}" if judged.causes else ""
+    because = f" (tolerance: {judged.because})" if judged.because else ""
+    yield f"{sign} {file} {verb} the truth of {judged.scene}{because}{cause}"
+    yield ""
+    kinds: dict[str, str] = {}
+    for item in judged.compared:
+        if everything or item.agrees is judged.agrees:
+            text = "; ".join(part for part in str(item).split("; ") if everything or not part.startswith(_BAR))
+            kind = item.judgement.observable if everything else item.judgement.unit
+            kinds.setdefault(kind, f"{'✓' if item.agrees else '✗'} {text}")
+    yield from kinds.values()
+    yield from (f"  cause: {cause}" for cause in judged.causes)
+    units = {item.judgement.observable: item.judgement.unit for item in judged.compared}
+    closing = [text for cause in judged.causes for text in mapping(cause, units, names)]
+    if closing:
+        new = {text.partition("=")[0] for text in closing}
+        kept = [f"{column}={name}" for column, name in names.items() if column not in new]
+        yield f"Say so: {asked} --map {shlex.quote(','.join([*kept, *closing]))}"
+    elif not judged.agrees and not judged.causes:
+        yield "no simple cause: no other unit, sign, delay or start, no swapped columns, no sum of angles"
+    further = [line.strip() for line in rest[len(judged.compared) + len(judged.causes) :]]
+    yield from (line for line in further if everything or FROM_STATE not in line)
+    if len(kinds) < len(judged.compared):
+        yield "The nearest to its limit of each kind; all: --all." if judged.agrees else "All quantities: --all."
 
 
 def _names(columns: list[str] | None) -> dict[str, str]:

@@ -10,7 +10,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -159,6 +159,32 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
 
 
 @contextmanager
+def growing(lines: Callable[[], Sequence[RenderableType]], last: Callable[[], str], *, shown: bool) -> Iterator[bool]:
+    """Context manager with growing lines on a terminal, which it removes at the end; yields True if it shows them.
+
+    Args:
+        lines: gives the lines so far; the last ones that fit the screen are shown.
+        last: gives the line below them, of progress.
+        shown: False to show nothing.
+    """
+    from rich.console import Group
+    from rich.live import Live
+    from rich.text import Text
+
+    console, moves = _standard_error()
+    if not (shown and moves):
+        yield False
+        return
+
+    def visible() -> Group:
+        line = Text(f"{last()}{_waited_for()}", overflow="ellipsis", no_wrap=True)
+        return Group(*lines()[-max(1, console.height - 2) :], line)
+
+    with Live(get_renderable=visible, console=console, transient=True):
+        yield True
+
+
+@contextmanager
 def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
     """Context manager that prints a line on standard error every few seconds, with the time that has passed."""
     start, ended = time.monotonic(), threading.Event()
@@ -287,11 +313,15 @@ def show(
         out.print(part)
 
 
-def show_lines(lines: Iterable[str]) -> None:
-    """Prints lines within the width of the terminal; the continuation of a longer line is indented by two more."""
+def show_lines(lines: Iterable[str], *, widest: int | None = None) -> None:
+    """Prints lines within the width of the terminal; the continuation of a longer line is indented by two more.
+
+    ``widest``: as of :func:`show`.
+    """
     from proofroll.report.terminal.tables import console
 
     out = console()
+    out.width = min(out.width, widest or out.width)
     for line in lines:
         indent = " " * (len(line) - len(line.lstrip()) + 2)
         parts = textwrap.wrap(line, out.width, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False)

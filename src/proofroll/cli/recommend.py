@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -18,8 +19,6 @@ from proofroll.core.errors import InputError, ProofrollError, require_known
 from proofroll.core.number_format import number
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from proofroll.core.comparison import Tolerance
     from proofroll.report.changes import EarlierReport
     from proofroll.report.long_table import TableLine
@@ -60,6 +59,9 @@ def recommend(
         typer.Option("--lines", help="Print only the lines that make the choice in a model of your own, from curves."),
     ] = False,
     forces: Annotated[bool, typer.Option("--forces", help="Forces count as the motion does; from a report.")] = False,
+    every_setting: Annotated[
+        bool, typer.Option("--scenes", help="Of several scenes list all formulations of each; from a report.")
+    ] = False,
     report: Annotated[
         Path | None, typer.Option(help="A report.json whose runs answer, as they do for several names.")
     ] = None,
@@ -99,9 +101,12 @@ def recommend(
         from proofroll.report.changes import EarlierReport
 
         stored = EarlierReport.read(report or report_file, "--report" if report else "stored report")
-        _from_report(scenes, tolerance, engine or [], stored, forces=forces, as_json=as_json)
+        _from_report(
+            scenes, tolerance, engine or [], stored, forces=forces, every_setting=every_setting, as_json=as_json
+        )
     (scene,) = scenes
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
+    from proofroll.report.terminal.screen import WIDTH
     from proofroll.report.tradeoff.tables import answer_lines
     from proofroll.studies.tradeoff.recommend import recommend as answered
     from proofroll.studies.tradeoff.requirements import Requirements
@@ -121,7 +126,7 @@ def recommend(
     if lines and not as_json:
         typer.echo("\n".join(_own_lines(recommendation)))  # unbroken, as a program reads them
     else:
-        options.show(recommendation, as_json, lambda: answer_lines(recommendation))
+        options.show(recommendation, as_json, lambda: answer_lines(recommendation), widest=WIDTH)
     raise typer.Exit(options.OK if recommendation.answer.choice and recommendation.affordable else options.CONTRADICTED)
 
 
@@ -158,7 +163,14 @@ def _is_in_report(name: str, path: Path) -> bool:
 
 
 def _from_report(
-    names: list[str], tolerance: str, engines: list[str], report: EarlierReport, *, forces: bool, as_json: bool
+    names: list[str],
+    tolerance: str,
+    engines: list[str],
+    report: EarlierReport,
+    *,
+    forces: bool,
+    every_setting: bool,
+    as_json: bool,
 ) -> NoReturn:
     """Prints advice for several scenes from a report's runs, and exits: 1 if in one nothing holds the tolerance."""
     from proofroll.core.comparison import Tolerance
@@ -166,7 +178,8 @@ def _from_report(
     from proofroll.files.toml import named_file
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
-    from proofroll.report.terminal.tables import answer_table
+    from proofroll.report.terminal.answers import advice_lines, answers
+    from proofroll.report.terminal.screen import WIDTH
 
     path, lines = report.path, report.lines
     for name in engines:
@@ -205,11 +218,10 @@ def _from_report(
         "advice": advised,
         "engines": costs,
     }
-    head = f"Tolerance: {number(part)} {'of the path' if bound.relative else unit}."
-    key = "× real time: seconds of motion per second of computing; ≈: to a factor of about two; ≥: at least."
-    shown: list[Table | str] = [answer_table(matrix, part, forces, scenes=True), advised[-1].sentence]
-    shown.append(f"Shown over {', '.join(f'{number(time)} s ({scene})' for scene, time in sorted(durations.items()))}.")
-    options.show(content, as_json, lambda: [head, *shown, *_cost_tables(costs), key])
+    arguments = answers(matrix, part, forces), advised[-1].sentence, costs, durations
+    words = f"{number(part)} {'of the path' if bound.relative else unit}"
+    parts = partial(advice_lines, *arguments, words, forces=forces, every_setting=every_setting)
+    options.show(content, as_json, parts, widest=WIDTH)
     single = [item for item, column in zip(advised, matrix.columns, strict=False) if not column.whole]
     chosen = [bool(item.choice) for item in single if item.judged]
     raise typer.Exit(options.OK if chosen and all(chosen) else options.CONTRADICTED)
@@ -236,25 +248,9 @@ def _engine_costs(matrix: ChoiceMatrix, tolerance: float, *, forces: bool) -> li
                 continue
             held = math.isfinite(cell.cost)
             setting = cell.name.removeprefix(row.name).strip()
-            answer = {"of": column.name, "engine": row.name, "holds": held, "setting": setting}
+            answer = {"of": column.name, "engine": row.name, "holds": held, "state": cell.state, "setting": setting}
             costs.append(answer | {"cost": cell.cost if held else None, "text": cell.text if held else cell.why})
     return costs
-
-
-def _cost_tables(costs: Sequence[Mapping[str, Any]]) -> Iterator[Table]:
-    """Table of every engine for each group or scene, the cheapest first."""
-    from rich.table import Column
-
-    from proofroll.report.terminal.screen import plain_table
-
-    for name in dict.fromkeys(item["of"] for item in costs):
-        table = plain_table(
-            Column(name, overflow="fold"), Column("× real time"), Column("setting, or why not", overflow="fold")
-        )
-        rows = [item for item in costs if item["of"] == name]
-        for item in sorted(rows, key=lambda item: (not item["holds"], item["cost"] or 0.0)):
-            table.add_row(item["engine"], *((item["text"], item["setting"]) if item["holds"] else ("–", item["text"])))
-        yield table
 
 
 def _tolerance(text: str, unit: str) -> Tolerance:

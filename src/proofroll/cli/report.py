@@ -17,8 +17,6 @@ from proofroll.cli.comparing import exit_code, list_omitted_engines, outcomes_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
-    from rich.table import Table
-
     from proofroll.core.comparison import Comparison
     from proofroll.report.page.growing import Report
     from proofroll.report.page.records import ReportContent
@@ -73,6 +71,8 @@ def report(
     from proofroll.report.page.growing import begun
     from proofroll.report.page.html import templates
     from proofroll.report.parts import all_parts, parts_of
+    from proofroll.report.terminal.screen import WIDTH
+    from proofroll.report.terminal.tables import report_lines
     from proofroll.running.idle_workers import Workers
     from proofroll.running.store import alone_in
     from proofroll.studies.comparison.by_name import comparison_named
@@ -115,7 +115,7 @@ def report(
         made.write(out)
         rest = (lambda: budget - _processor_seconds() + begin) if budget else None
         unmade = _make_all(made, parts, missing, runner, out, rest)
-        options.show(made.content, as_json, lambda: _shown(made.content, out))
+        options.show(made.content, as_json, lambda: report_lines(made.content, out), widest=WIDTH)
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes), unmade))
 
 
@@ -251,22 +251,3 @@ def _exit_code(content: ReportContent, compared: int, unmade: Collection[str]) -
     changed = content.against is not None and content.against.changed
     contradicted = compared or changed or any(entry.contradictions for entry in entries)
     return options.CONTRADICTED if contradicted else options.OK
-
-
-def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
-    """Tables and lines for the terminal: verdicts, further studies, what to look at first, path, and the choice."""
-    from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
-    from proofroll.report.terminal.tables import answer_table, change_lines, first_lines, part_lines, verdict_parts
-
-    for item in content.comparisons:
-        yield from verdict_parts(item)
-    yield from part_lines(content)
-    yield from first_lines(content)
-    yield from change_lines(content.against)
-    if content.beyond_budget:
-        yield content.beyond_budget
-    if content.omission_sentences:
-        yield content.omission_sentences
-    yield f"The report is in {out / 'report.html'}, the same content in {out / 'report.json'}."
-    if content.choice.rows:
-        yield answer_table(content.choice, FIRST_TOLERANCE, False)

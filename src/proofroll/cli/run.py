@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -45,6 +47,9 @@ def run(
         Path | None, typer.Option(help="Draw the run to this file, by its ending: html, svg, png or pdf.")
     ] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Show all forces and moments, too.")] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Show forces, velocities, settings and all digits, too.")
+    ] = False,
     matrices: Annotated[
         bool, typer.Option("--matrices", help="Show M, h and g of M v' + h + g = tau at the start, and run nothing.")
     ] = False,
@@ -81,6 +86,7 @@ def run(
     from proofroll.files.scene_sources import resolved
     from proofroll.files.trajectory_file import STORED
     from proofroll.report.run.run import run_content, run_lines
+    from proofroll.report.terminal.screen import WIDTH
     from proofroll.running.runner import run_one
 
     if until is not None:
@@ -112,7 +118,9 @@ def run(
         for told in content.diagnosis:
             options.complain(f"{told.sentence}: {told.cause.remedy}")
     if as_json or done or content.final:
-        options.show(content, as_json, lambda: run_lines(content, forces=forces))
+        judged = f"proofroll compare {scene} --engine {shlex.quote(engine)}" if engine != "truth" else ""
+        parts = partial(run_lines, content, forces=forces, everything=everything, checked=judged)
+        options.show(content, as_json, parts, widest=WIDTH)
     if not done or content.ends is not None:
         raise typer.Exit(options.ENGINE)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,6 +49,7 @@ def tradeoff(
 
     With all engines, and a scene that no file asks about, the study is brief and drops the points beyond --budget.
     """
+    from proofroll.report.terminal.screen import WIDTH
     from proofroll.report.tradeoff.tables import default_quantities, tradeoff_parts
     from proofroll.report.tradeoff.work_precision import svg
     from proofroll.running.store import write_text
@@ -60,13 +62,14 @@ def tradeoff(
     runner = options.new_runner(out, fresh, jobs, scheduler)
     study, path = measure(question, Extent(engine or [], ranges, budget=budget), claims, runner, out)
     shown = [name for name in quantity or [] if name in study.quantities] or default_quantities(study)
-    diagram = f"The diagram is in {path.with_suffix('.svg')}, everything in {path}."
+    diagram = f"{path.with_suffix('.svg')} · {path.name} · every point: --all"
     if not as_json:
         try:
             write_text(path.with_suffix(".svg"), svg(study, shown))
         except Missing as missing:
             diagram = f"There is no diagram: {missing}. Everything is in {path}."
-    options.show(study, as_json, lambda: [*tradeoff_parts(study, shown, every_point=every_point), diagram])
+    parts = partial(tradeoff_parts, study, shown, every_point=every_point)
+    options.show(study, as_json, lambda: [*parts(), diagram], widest=None if every_point else WIDTH)
     raise typer.Exit(options.CONTRADICTED if study.claims.contradictions else options.OK)
 
 

@@ -26,7 +26,7 @@ SYMBOLS = {
     "agrees": "✓",
     "unconfirmed": "○",
     "incomplete": "◐",
-    "converges": "≈",
+    "converges": "↘",
     "ill-posed": "?",
     "not-judged": "□",
     "another-scene": "◇",
@@ -61,8 +61,8 @@ def engine_title(engine: str) -> str:
 
 def engine_words(engine: str, formulation: str | None = None) -> str:
     """Engine and formulation for readers; an engine whose name ends with its formulation says it once."""
-    title = engine_title(engine)
-    return title if not formulation or title.endswith(f" {formulation}") else f"{title} {formulation}"
+    title, words = engine_title(engine), (formulation or "").replace("_", " ")
+    return title if not words or title.endswith(f" {words}") else f"{title} {words}"
 
 
 def precision_words(precision: str) -> tuple[str, ...]:
@@ -149,13 +149,15 @@ def setting(row: Setting) -> str:
     return " ".join(filter(None, (formulation, row.setting))) or str(row.engine)
 
 
+def row_words(row: Setting) -> list[str]:
+    """Engine with formulation, setting and step of a row, each if there is one."""
+    words = engine_words(row.name, row.formulation), row.setting, step(row.resolution, row.resolution_value)
+    return [word for word in words if word]
+
+
 def names(rows: Sequence[Setting]) -> list[str]:
-    """Unique short name of each row; its text in the comparison file if short names coincide."""
-    short = []
-    for row in rows:
-        words = [word for word in (engine_words(row.name, row.formulation), row.setting) if word]
-        size = step(row.resolution, row.resolution_value)
-        short.append(" ".join([*words, f"({size})"] if size else words))
+    """Unique name of each row, as ``MuJoCo joints, matched, dt 1e-3 s``; its text in the file if names coincide."""
+    short = [", ".join(row_words(row)) for row in rows]
     return [name if short.count(name) == 1 else str(row.engine) for name, row in zip(short, rows, strict=True)]
 
 
@@ -177,7 +179,7 @@ def setting_words(engine: str, facts: EngineFacts | SweptSetting) -> str:
 def name_of(point: SweptSetting) -> str:
     """Engine, formulation and setting of a point of a study."""
     words = engine_words(point.engine, point.settings.get("formulation")), setting_words(point.curve, point)
-    return " ".join(filter(None, words))
+    return ", ".join(filter(None, words))
 
 
 def curve_names(points: Iterable[SweptSetting]) -> dict[str, str]:

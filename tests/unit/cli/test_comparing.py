@@ -118,9 +118,7 @@ def test_a_first_look_stays_within_its_budget(
         patch.setattr("proofroll.running.time_budget.TimeBudget.end", lambda *_, **__: None)
         code, out, err = command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path), "--jobs", "1")
     assert code == 0, err
-    said = (
-        "Left out, for 60 s of processor time, building and compiling included, did not suffice: reduced[formulation="
-    )
+    said = "Not run (budget of 60 s used up): reduced[formulation="
     assert said in " ".join(out.split())
     assert "--budget 600" in out.replace("\n", " ")
     code, out, err = command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path), "--json", "--budget", "50")
@@ -148,23 +146,25 @@ def test_rows_that_exist_are_shown_where_a_comparison_is_interrupted(
     asked = ("--engine", "reduced", "--until", "0.1", "--out", str(tmp_path), "--jobs", "1")
     code, out, err = command_line("compare", "sphere_in_cylinder", *asked)
     assert code == 130, err
-    assert "z: error" in out
-    assert "it has not been run yet" in " ".join(out.split())
+    assert "does not" not in out
+    assert "· " in out
+    assert "not run" in out
 
 
 def test_the_time_that_is_left_is_never_less_than_none() -> None:
     """While results that are kept are being judged, a line says nothing about the rest; later it counts what ran."""
     said: list[str] = []
     runner: Any = SimpleNamespace(reused=0, jobs=1)
-    running = _Comparing([], runner, None, None, said.append)
+    running = _Comparing([], runner, None, None)
+    running.tell = said.append
     running._keys = list("abcdefgh")
     for running.runner.reused, running.results in ((6, {"a": None}), (6, dict.fromkeys("abcdefg"))):  # type: ignore[assignment]
-        running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco")))  # type: ignore[arg-type]
-    assert said[0] == "mujoco"
+        running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco", resolution=None, settings={})))  # type: ignore[arg-type]
+    assert said[0] == "MuJoCo"
     assert said[1].startswith("about ")
     assert "-" not in said[1].partition(" s left")[0].replace("e-", "")
     running._start -= 50.0
-    running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco")))  # type: ignore[arg-type]
+    running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco", resolution=None, settings={})))  # type: ignore[arg-type]
     assert said[2].startswith("about 50 s left"), "for a person, without a power of ten"
 
 
@@ -172,10 +172,11 @@ def test_a_spent_budget_leaves_the_time_to_judge() -> None:
     """Of 100 s the runs have used 90: the 10 s that are kept for judging are told, and not 0 s."""
     said: list[str] = []
     runner: Any = SimpleNamespace(reused=0, jobs=1)
-    running = _Comparing([], runner, TimeBudget(100.0, spent=90.0), None, said.append)
+    running = _Comparing([], runner, TimeBudget(100.0, spent=90.0), None)
+    running.tell = said.append
     running._keys, running.results, running._budget = list("abcdefgh"), {"a": None}, 90.0  # type: ignore[assignment]
     running._start -= 90.0
-    running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco")))  # type: ignore[arg-type]
+    running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco", resolution=None, settings={})))  # type: ignore[arg-type]
     assert said[0].startswith("about 10 s left")
 
 
@@ -183,7 +184,7 @@ def test_what_judging_took_is_kept_of_a_budget_for_the_end() -> None:
     """Four of twelve cases took 6 s to judge and to write, so all that have ended by now are given 12 s."""
     budget = TimeBudget(100.0)
     runner: Any = SimpleNamespace(reused=0, jobs=1)
-    running = _Comparing([], runner, budget, None, print)
+    running = _Comparing([], runner, budget, None)
     running._judging, running._judged, running.results = 6.0, {0: 4}, dict.fromkeys("abcdefgh")  # type: ignore[assignment]
     running._keep_for_the_end()
     assert budget.after == 12.0

@@ -1,4 +1,4 @@
-"""Progress on standard error: a bar on a terminal, a line now and then where nothing may move."""
+"""Progress on standard error: a bar or growing rows on a terminal, a line now and then where nothing may move."""
 
 from __future__ import annotations
 
@@ -55,3 +55,32 @@ def test_no_color_moves_nothing(no_color: bool) -> None:
     os.close(ours)
     os.close(theirs)
     assert (b"\x1b" in said) is not no_color
+
+
+GROWING = """
+import sys
+from proofroll.cli.options import growing
+with growing(lambda: ["a row"], lambda: "1 of 2 runs", shown=len(sys.argv) < 2) as moves:
+    pass
+print(moves)
+"""
+
+
+@pytest.mark.parametrize(("more", "moves"), [([], True), (["json"], False)])
+def test_rows_grow_on_a_terminal_alone(more: list[str], moves: bool) -> None:
+    """Rows above a line of progress are shown on a terminal and removed at the end; for a program, never."""
+    ours, theirs = pty.openpty()
+    environment = {key: value for key, value in os.environ.items() if key not in {"NO_COLOR", "TERM", "FORCE_COLOR"}}
+    command = [sys.executable, "-c", GROWING, *more]
+    done = subprocess.run(
+        command, env=environment | {"TERM": "xterm"}, stdout=subprocess.PIPE, stderr=theirs, timeout=120, check=True
+    )
+    os.write(theirs, b"end")
+    said = os.read(ours, 1 << 16)
+    os.close(ours)
+    os.close(theirs)
+    assert done.stdout.decode().strip() == str(moves)
+    assert (b"a row" in said, b"1 of 2 runs" in said) == (moves, moves)
+    assert (b"\x1b[2K" in said.rpartition(b"1 of 2 runs")[2]) is moves, "the line is erased"
+    piped = subprocess.run(command, env=environment, capture_output=True, timeout=120, check=True)
+    assert piped.stderr == b""

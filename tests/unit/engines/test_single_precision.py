@@ -197,12 +197,11 @@ def test_a_comparison_tells_precision_and_floor(
     assert judged["limit"] != "another limit"
     assert judged["order"] is None
     assert judged["reason"].endswith("single precision")
-    code, out, err = command_line("compare", str(file), "--out", str(tmp_path))
-    assert "rk4 matched f32" in out
+    code, out, err = command_line("compare", str(file), "--out", str(tmp_path), "--orders")
+    assert "rk4, matched f32" in out
     assert "single precision" in out, out
     code, out, err = command_line("run", "free_body", "--engine", "single", "--until", "0.01")
-    assert "dt=0.001" in out
-    assert "f32)" in out
+    assert ", f32, dt 1e-3 s reached 0.01 s" in out
 
 
 @pytest.mark.drill

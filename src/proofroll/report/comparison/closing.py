@@ -39,7 +39,9 @@ def _owners(owners: Sequence[ReportedRow], rows: Sequence[ReportedRow]) -> str:
     """Settings of some rows by engine; an engine alone if all of its rows are among them."""
     settings: dict[str, dict[str, None]] = {}
     for row in owners:
-        settings.setdefault(row.name, {})[" ".join(filter(None, (row.formulation, row.setting)))] = None
+        settings.setdefault(row.name, {})[
+            " ".join(filter(None, ((row.formulation or "").replace("_", " "), row.setting)))
+        ] = None
     whole = {row.name for row in rows} - {row.name for row in rows if row not in owners}
     titles = {name: engine_title(name) for name in settings}
     return ", ".join(titles[name] + f" {', '.join(words)}" * (name not in whole) for name, words in settings.items())

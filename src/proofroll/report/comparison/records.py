@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.comparison import Band, Row
@@ -36,9 +37,20 @@ def rough_cost(result: Result, until: float) -> float | None:
     return spent / until if result.status == Status.DONE and not result.host and spent else None
 
 
+class CoarserSteps(StrEnum):
+    """Result of the steps of a ladder that are coarser than the run's own, from the least to the most telling."""
+
+    NOT_RUN = "not run"
+    HELD = "held"  # all of them hold all tolerances
+    FAILED = "failed"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """An engine with settings: ``engine`` as the comparison file writes it, other fields for readers."""
+    """An engine with settings: ``engine`` as the comparison file writes it, other fields for readers.
+
+    ``witness``: True if the engine only cross-checks the truth.
+    """
 
     engine: str
     name: str
@@ -52,6 +64,7 @@ class Setting:
     family: str
     precision: str
     scheme: str
+    witness: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +98,7 @@ class ReportedRow(Setting):
     seconds_per_second: float | None
     rough_cost: float | None
     message: str
+    coarser: CoarserSteps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,6 +128,7 @@ class ReportedRun(Setting):
     versions: dict[str, str]
     trajectory: str | None
     host: str
+    coarser: CoarserSteps
     own: Any = field(default=None, metadata=MERGED)
 
 

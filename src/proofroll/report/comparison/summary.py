@@ -11,6 +11,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.records import (
+    CoarserSteps,
     ReportedComparison,
     ReportedRow,
     ReportedRun,
@@ -147,6 +148,7 @@ def _summary(runs: list[ReportedRun]) -> dict[str, Any]:
         "seconds_per_second": max((x for run in runs if (x := run.seconds_per_second) is not None), default=None),
         "rough_cost": max((x for run in runs if (x := run.rough_cost) is not None), default=None),
         "message": next((run.message for run in runs if run.status != Status.DONE), ""),
+        "coarser": max((run.coarser for run in runs), key=list(CoarserSteps).index),
     }
 
 
@@ -226,6 +228,7 @@ def _run(run: Run, row: int, until: float) -> ReportedRun:
         family=facts.family,
         precision=facts.precision,
         scheme=facts.scheme,
+        witness=facts.witness,
         row=row,
         settings=facts.settings,
         point=point_name(run.parameters),
@@ -249,6 +252,21 @@ def _run(run: Run, row: int, until: float) -> ReportedRun:
         versions=result.versions,
         trajectory=result.trajectory,
         host=result.host,
+        coarser=_coarser(run, facts),
     )
     reason, limit = _why([made])
     return dataclasses.replace(made, reason=reason, limit=limit)
+
+
+def _coarser(run: Run, facts: EngineFacts) -> CoarserSteps:
+    """Result of the coarser steps of a run's ladder."""
+    own_value = facts.settings.get(facts.resolution or "")
+    allowed = {item.observable: item.tolerance for item in run.judgements}
+    rungs = [rung for rung in run.rungs if own_value is not None and rung.value > own_value]
+    held = [
+        rung.errors.keys() == allowed.keys() and all(rung.errors[name] <= allowed[name] for name in allowed)
+        for rung in rungs
+    ]
+    if not held:
+        return CoarserSteps.NOT_RUN
+    return CoarserSteps.HELD if all(held) else CoarserSteps.FAILED

@@ -14,7 +14,7 @@ from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import bound_words, names, symbol
 from proofroll.running.timing import Interval
 
-_COMPILES = 10.0  # s before the first step, beyond which the time is listed; to compile equations takes one or two
+COMPILES = 10.0  # s before the first step, beyond which the time is listed; to compile equations takes one or two
 
 
 def observables(content: ReportedComparison) -> dict[str, str]:
@@ -31,7 +31,7 @@ def seconds_before(content: ReportedComparison) -> dict[int, float]:
     longest: dict[int, float] = {}
     for run in content.runs:
         longest[run.row] = max(longest.get(run.row, 0.0), run.build_seconds or 0.0)
-    return longest if max(longest.values(), default=0.0) > _COMPILES else {}
+    return longest if max(longest.values(), default=0.0) > COMPILES else {}
 
 
 @dataclass(frozen=True)
@@ -160,11 +160,6 @@ def _part_taken(line: Mapping[str, Any]) -> float:
     """Part of its allowance that a certificate line takes; infinite for a difference where none is allowed."""
     difference, allowed = abs(line["difference"]), line["tolerance"]
     return difference / allowed if allowed else math.inf if difference else 0.0
-
-
-def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
-    """(row, remark) for each remark but the one on equations of the truth, which is a closing note."""
-    return [(name, text) for name, row, _ in content.lines() for text in row.remarks if text != row.shared]
 
 
 def with_results(content: ReportedComparison, spread: Spread) -> list[tuple[int, str]]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any
 
 from proofroll.core.bounces import Bounce
@@ -9,27 +10,29 @@ from proofroll.core.number_format import with_bar
 from proofroll.core.quantity import powers_of
 
 FORCES = ("N", "N m")
-_DIGITS = 12
+_DIGITS, _FEW_DIGITS = 12, 7
+_COLUMN = 38  # characters of the widest line that has room beside another
 _ROUND_OFF = 1e-14  # of the largest value of a dimension
 _BOUNCES = 8  # most bounces on the terminal
 _AXES = tuple("xyz")
 
 
-def value_text(value: float, bar: float | None, size: float) -> str:
-    """Text of a value with at most twelve digits: no digit below its error bar, and 0 for round-off.
+def value_text(value: float, bar: float | None, size: float, most: int = _DIGITS) -> str:
+    """Text of a value in few digits: no digit below its error bar, and 0 for round-off.
 
     Args:
         value: to be written.
         bar: error bar; None: it is not known.
         size: largest value of the same dimension.
+        most: largest number of digits.
     """
     if not math.isfinite(value):
         return "–"
     if abs(value) <= max(bar or 0.0, _ROUND_OFF * size):
         return "0"
-    digits = _DIGITS
+    digits = most
     if bar:
-        digits = min(_DIGITS, math.floor(math.log10(abs(value))) - math.ceil(math.log10(bar)) + 1)
+        digits = min(most, math.floor(math.log10(abs(value))) - math.ceil(math.log10(bar)) + 1)
     return f"{value:.{max(digits, 1)}g}"
 
 
@@ -72,39 +75,55 @@ def _listed(parts: Sequence[str]) -> str:
 
 
 def value_table(
-    values: Mapping[str, float], units: Mapping[str, str], bars: Mapping[str, float], shown: Collection[str]
+    values: Mapping[str, float],
+    units: Mapping[str, str],
+    bars: Mapping[str, float],
+    shown: Collection[str],
+    *,
+    all_digits: bool = True,
 ) -> Any:
     """Table of the last values: positions first, then velocities, energies and residuals, then forces.
 
-    Components and numbered contacts with equal texts are one row, see :func:`short_names`.
+    Components and numbered contacts with equal texts are one row, see :func:`short_names`. Short rows without error
+    bars stand in two columns.
 
     Args:
         values: variable -> value.
         units: variable -> unit.
         bars: variable -> error bar, where one is known.
         shown: variables of the table.
+        all_digits: False for seven digits of each value.
     """
     from rich.table import Column, Table
 
-    of_bars = [Column("error bar", justify="right")] if bars else []
-    table = Table("at the end", Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
     sizes: dict[frozenset[tuple[str, float]], float] = {}
     for name, value in values.items():
         if math.isfinite(value):
             dimension = _dimension(units[name])
             sizes[dimension] = max(sizes.get(dimension, 0.0 if dimension else 1.0), abs(value))
+    most = _DIGITS if all_digits else _FEW_DIGITS
     alike: dict[tuple[str, ...], list[str]] = {}
     for name in sorted(shown, key=lambda item: _place(units[item])):
         value, unit = values[name], units[name]
         bar = bars.get(name) if math.isfinite(value) else None
         size = sizes.get(_dimension(unit), 0.0)
-        text, of_bar = (value_text(value, None, size), "") if bar is None else with_bar(value, bar)
+        text, of_bar = (value_text(value, None, size, most), "") if bar is None else with_bar(value, bar)
         family = ".".join(p for p in name.split(".") if not (p.isdigit() or (unit in FORCES and p in _AXES)))
         row = (family, text, unit, *([of_bar] if bars else []))
         alike.setdefault(row, []).append(name)
-    for (_, *cells), names in alike.items():
-        for text in short_names(names):
-            table.add_row(text, *cells)
+    rows = [(text, *cells) for (_, *cells), names in alike.items() for text in short_names(names)]
+    widths = [max(map(len, column), default=0) for column in zip(*rows, strict=True)]
+    if bars or all_digits or sum(widths) + 2 * len(widths) > _COLUMN:
+        of_bars = [Column("error bar", justify="right")] if bars else []
+        table = Table("at the end", Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
+        for row in rows:
+            table.add_row(*row)
+        return table
+    columns = [Column(justify="right" if number in {1, 4} else "left") for number in range(6)]
+    table = Table(*columns, box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
+    half = (len(rows) + 1) // 2
+    for left, right in zip_longest(rows[:half], rows[half:], fillvalue=()):
+        table.add_row(*left, *right)
     return table
 
 

@@ -19,12 +19,14 @@ from proofroll.core.scene import Scene
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
-from proofroll.report.labels import engine_title, omitted_lines, precision_words, settings_text
+from proofroll.report.labels import engine_words, omitted_lines, precision_words, settings_text, step
 from proofroll.report.run.last_values import FORCES, bounce_table, short_names, value_table
-from proofroll.running.case import Case, Result
+from proofroll.running.case import Case, Result, Status
 
 _FEW = 3  # most forces and moments that are shown without being asked for
 _FEW_BODIES = 6  # most bodies whose places are shown where no point is tracked
+_VELOCITIES = ("m/s", "rad/s")
+_BUILD = 1.0  # time before the first step that is told [s]
 _EVENTS = 8  # most events on the terminal; --events and --json have all
 
 
@@ -162,6 +164,20 @@ def _event_text(event: Event) -> str:
     return f"{event.kind.replace('_', '-')}{name} at {time} ± {bar} s"
 
 
+def _ended_words(content: RunContent) -> str:
+    """Sentence on the end of a run: who reached what time, how fast, and the time before the first step."""
+    words = engine_words(content.engine, content.settings.get("formulation")), content.settings.get("preset")
+    resolution = [name for name in ("dt", "rtol") if content.settings.get(name) is not None][:1]
+    steps = [step(name, content.settings[name]) for name in resolution]
+    title = ", ".join(filter(None, (*words, *precision_words(content.precision), *steps)))
+    if content.status != Status.DONE or content.engine == "truth":
+        return f"{title}: {content.message}; {content.wall_seconds:.2g} s of computing"
+    speed = f" ({number(content.until / content.wall_seconds)}× real time)" if content.wall_seconds else ""
+    seconds = content.build_seconds or 0.0
+    build = f", after {number(seconds)} s before the first step" if seconds > _BUILD else ""
+    return f"{title} reached {content.until:g} s in {content.wall_seconds:.2g} s{speed}{build}."
+
+
 def _hidden_forces(content: RunContent) -> list[str]:
     """Forces and moments, which are shown on request if they are more than a few."""
     forces = [name for name, unit in content.units.items() if unit in FORCES]
@@ -184,30 +200,38 @@ def event_csv(content: RunContent) -> str:
     return text.getvalue()
 
 
-def run_lines(content: RunContent, *, forces: bool = True) -> list[Any]:
-    """Lines and tables about a run for the terminal, printed by rich; ``forces``: more than a few are shown, too."""
+def run_lines(content: RunContent, *, forces: bool = True, everything: bool = False, checked: str = "") -> list[Any]:
+    """Lines and tables about a run for the terminal, printed by rich.
+
+    Args:
+        content: of the run.
+        forces: True to show more than a few forces, too.
+        everything: True to show forces, velocities, settings and all digits.
+        checked: command that holds the run against the truth; empty: there is none.
+    """
     from rich.text import Text
 
-    settings = ", ".join(filter(None, (settings_text(content.settings), *precision_words(content.precision))))
-    with_settings = f" ({settings})" if settings else ""
-    lines: list[Any] = [Text(f"{content.scene} in {engine_title(content.engine)}{with_settings}")]
+    lines: list[Any] = [Text(_ended_words(content))]
     lines += [Text(content.step_bound)] if content.step_bound else []
     lines += [Text(words) for words in omitted_lines(content.omitted or [])]
-    lines.append(Text(f"{content.status}: {content.message}"))
     lines += [Text(f"  {cause.sentence}") for cause in content.diagnosis]
     if not content.final:
         return lines
-    hidden = [] if forces else _hidden_forces(content)
-    shown = [name for name in content.final if name not in content.absent and name not in hidden]
-    lines.append(value_table(content.final, content.units, content.error_bars or {}, shown))
+    hidden = [] if forces or everything else _hidden_forces(content)
+    moving = [] if everything else [name for name, of in content.units.items() if of in _VELOCITIES]
+    named = {*content.absent, *hidden, *moving, *([] if everything else ["time"])}
+    shown = [name for name in content.final if name not in named]
+    least = {f"smallest {name}": value for name, value in (content.smallest or {}).items()}
+    units = content.units | {f"smallest {name}": content.units.get(name, "1") for name in content.smallest or {}}
+    bars = content.error_bars or {}
+    table = value_table(content.final | least, units, bars, [*shown, *least], all_digits=everything or bool(bars))
+    lines += ["", table, ""]
     if hidden:
-        lines.append(Text(f"{len(hidden)} forces and moments are not shown; --forces shows them"))
+        lines.append(Text(f"{len(hidden)} forces and moments: --forces"))
     for told in (content.absent, content.uncertain or {}):
         for reason in dict.fromkeys(why for name, why in told.items() if name not in hidden):
             names = [name for name, why in told.items() if why == reason and name not in hidden]
             lines.append(Text(f"{reason}: {', '.join(short_names(names))}"))
-    for name, value in (content.smallest or {}).items():
-        lines.append(Text(f"smallest {name} on the way: {value:.6g} {content.units.get(name, '')}".rstrip()))
     if content.events:
         events = ", ".join(_event_text(event) for event in content.events[:_EVENTS])
         more = len(content.events) - _EVENTS
@@ -215,8 +239,12 @@ def run_lines(content: RunContent, *, forces: bool = True) -> list[Any]:
     if content.bounces:
         table, note = bounce_table(content.bounces)
         lines += [table, Text(note)] if note else [table]
-    build = "" if content.build_seconds is None else f", after {number(content.build_seconds)} s before the first step"
-    lines.append(Text(f"{content.wall_seconds:.3g} s of wall time{build}"))
+    if everything:
+        settings = ", ".join(filter(None, (settings_text(content.settings), *precision_words(content.precision))))
+        lines += [Text(f"settings: {settings}")] if settings else []
+    elif moving:
+        lines.append(Text("velocities, settings, all digits: --all"))
+    lines += [Text(f"is it right? {checked}")] if checked and content.status == Status.DONE else []
     files = ("trajectory", content.trajectory), ("table of events", content.event_table), ("plot", content.plot)
     for what, file in files:
         if file:

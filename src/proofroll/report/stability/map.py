@@ -92,7 +92,7 @@ def heat_map(study: StabilityStudy) -> HeatMap:
     numbers = {(point.curve, point.axis, point.value): number for number, point in enumerate(study.points)}
     groups: dict[str, list[tuple[str, list[int | None]]]] = {}
     for curve, point in {point.curve: point for point in study.points}.items():
-        name = name_of(point).removeprefix(engine_title(point.engine)).strip() or curve
+        name = name_of(point).removeprefix(engine_title(point.engine)).strip(", ") or curve
         groups.setdefault(point.engine, []).append((name, [numbers.get((curve, *column)) for column in columns]))
     seen = {point.failure for point in study.points}
     return HeatMap(axes, groups, {letter: kind for kind, letter in letters(study).items() if kind in seen})

@@ -14,3 +14,17 @@ def printable(text: str) -> str:
 def escaped(text: str) -> str:
     """JSON with control characters as escapes, so that nothing is lost."""
     return _COMMANDS.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+
+
+# Signs in encodings that lack them.
+_SPELLED = {
+    "✓": "ok", "○": "o", "◐": "part", "↘": "~", "✗": "!!", "⊘": "refused", "□": "?", "◇": "other", "·": ".",
+    "≥": "at least", "≈": "about", "×": "x", "–": "-", "±": "+-", "µ": "u", "…": "...", "→": "->", "Δ": "d",
+}  # fmt: skip
+
+
+def spelled_out(error: UnicodeError) -> tuple[str, int]:
+    """Handler of encoding errors (:func:`codecs.register_error`): letters for a sign; ``?`` for other characters."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(_SPELLED.get(sign, "?") for sign in error.object[error.start : error.end]), error.end

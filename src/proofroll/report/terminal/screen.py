@@ -13,6 +13,8 @@ from rich.text import Text
 
 from proofroll.report.terminal.printable import printable
 
+WIDTH = 80  # columns of a command's answer
+
 
 class Screen(Console):
     """A console that sends no control characters to the terminal but those of its own styles."""

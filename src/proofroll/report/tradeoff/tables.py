@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rich.table import Column, Table
 from rich.text import Text
 
+from proofroll.core.comparison import Tolerance
 from proofroll.core.number_format import error, number
-from proofroll.report.labels import curve_names, family_and_caveat, listed, name_of, omitted_lines, step, with_caveat
+from proofroll.report.labels import engine_words, listed, name_of, omitted_lines, step
+from proofroll.report.page.choice_cell import speed
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
+from proofroll.report.terminal.verdicts import measure
 from proofroll.running.timing import CONFIDENCE
-from proofroll.studies.tradeoff.pareto import costs_overlap
+from proofroll.studies.tradeoff.recommend import holding
+from proofroll.studies.tradeoff.requirements import Requirements
 
 if TYPE_CHECKING:
     from proofroll.report.tradeoff.part import Advice
     from proofroll.studies.study_store import Measured
     from proofroll.studies.tradeoff.recommend import Choice, Recommendation
-    from proofroll.studies.tradeoff.records import Corner, CurveBudget, MeasuredPoint, TradeoffStudy
+    from proofroll.studies.tradeoff.records import Corner, MeasuredPoint, TradeoffStudy
 
+_TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)  # parts of a quantity's size, with a column each
+_SCATTER = 2.0  # ratio of the ends of a cost's interval beyond which it is unknown
 _MOST_COLUMNS = 4  # largest number of quantities that are shown by default
 
 
@@ -84,70 +89,108 @@ def _ranges(study: TradeoffStudy) -> str:
 
 
 def tradeoff_parts(study: TradeoffStudy, shown: Sequence[str], *, every_point: bool) -> Iterator[Table | str]:
-    """Parts of a trade-off's text: its fronts or all its points, the makeup of errors, and the conclusions.
+    """Parts of a trade-off's text: what to take, speeds at some tolerances, and counts; or all its points.
 
     Args:
         study: the measured trade-off.
-        shown: quantities with a column; the last tables are about the first of them.
-        every_point: True to list all points and describe errors in sentences, too.
+        shown: quantities with a column; all else is about the first of them.
+        every_point: True to list all points, corners, and the makeup of errors.
     """
+    cheapest = _held(study, shown[0]) if study.quantities[shown[0]].scale else {}
+    yield from _lead(cheapest, shown[0])
+    if cheapest:
+        yield from ("", *_held_lines(cheapest))
     if every_point:
-        yield point_table(study, study.points, shown, "Every point")
-    else:
-        yield from front_tables(study, shown)
-    if study.over:
-        yield from ("", corner_table(study, shown[0]))
-    yield from ("", budget_table(study, shown[0]), "")
-    if every_point:
+        yield from ("", point_table(study, study.points, shown, "Every point"))
+        if study.over:
+            yield from ("", corner_table(study, shown[0]))
+        yield ""
         yield from (f"{item.curve}: {item.sentence}" for item in study.budgets if item.quantity == shown[0])
-    yield from study.findings
+        yield from study.findings[:-1]
+    yield from ("", effort(study), *study.findings[-1:])
     yield from (f"{name}: {reason}" for name, reason in study.absent.items())
     yield from (f"?? {line}" for line in study.claims.undecided)
     yield from (f"!! {line}" for line in study.claims.contradictions)
 
 
-def point_table(
-    study: TradeoffStudy,
-    points: Sequence[MeasuredPoint],
-    quantities: Sequence[str],
-    title: str,
-    ties: Collection[int] | None = None,
-) -> Table:
-    """Table of points, one line each: cost, and error in each quantity.
+def _held(study: TradeoffStudy, quantity: str) -> dict[str, dict[float, MeasuredPoint]]:
+    """Engine with formulation -> tolerance, a part of the quantity's size -> its cheapest point that holds it.
 
-    ``ties``: numbers of the points of a front whose cost is not distinguishable from that of the next; None: no front.
-    A front shows the errors that define it: the largest of a run and of the next finer runs.
+    The formulations are in the order of their cost at ``FIRST_TOLERANCE``; those that hold nothing are left out.
     """
-    caption = Text("cost: wall seconds per simulated second through this adapter")
-    if ties:
-        caption += Text("; ≈ a tie: the cost of a more accurate one is the same within its interval")
-    lucky = [
-        name for p in points for name in quantities if name in p.error and p.envelope_of(name) > (p.error[name] or 0.0)
-    ]
-    if lucky and ties is not None:
-        caption += Text("; errors: where a run comes close by luck that of the next finer ones, which are worse")
+    cheapest: dict[str, dict[float, MeasuredPoint]] = {}
+    for tolerance in (FIRST_TOLERANCE, *_TOLERANCES):
+        for point in holding(study, Requirements(quantity, Tolerance(tolerance, True))):
+            name = engine_words(point.engine, point.settings.get("formulation"))
+            if point.seconds_per_second is not None:
+                cheapest.setdefault(name, {}).setdefault(tolerance, point)
+    return cheapest
+
+
+def _lead(cheapest: Mapping[str, Mapping[float, MeasuredPoint]], quantity: str) -> Iterator[str]:
+    """Sentences: what to take at ``FIRST_TOLERANCE``, whether it leads at every tolerance, and what is next."""
+    at_first = [(name, points[FIRST_TOLERANCE]) for name, points in cheapest.items() if FIRST_TOLERANCE in points]
+    asked = f"{number(FIRST_TOLERANCE)} of the size of {quantity}"
+    if not at_first:
+        yield f"Nothing that was measured holds {asked}."
+        return
+    (name, best), *others = at_first
+    least = {size: min(x[size].cost for x in cheapest.values() if size in x) for size in cheapest[name]}
+    leads = all(cheapest[name][size].cost <= cost for size, cost in least.items())
+    everywhere = " It leads wherever it holds" if leads else " Others lead at other tolerances"
+    second = f"; next is {others[0][0]}: {_speed_of(others[0][1])}" if others else ""
+    yield f"Take {point_words(best)}: {_speed_of(best)} at {asked}.{everywhere}{second}."
+
+
+def _held_lines(cheapest: Mapping[str, Mapping[float, MeasuredPoint]]) -> Iterator[str]:
+    """A line for each engine with its formulation: speed of its cheapest point at each tolerance."""
+    yield f"{'× real time, cheapest that holds':36}" + "".join(f"{number(size):>9}" for size in _TOLERANCES)
+    unknown = False
+    for name, points in cheapest.items():
+        cells = [_cell(points[size]) if size in points else "–" for size in _TOLERANCES]
+        yield f"{name:36}" + "".join(f"{cell:>9}" for cell in cells)
+        unknown = unknown or "?" in cells
+    if unknown:
+        yield f"?: unknown, its timings differ by more than a factor of {_SCATTER:g}."
+
+
+def point_words(point: MeasuredPoint) -> str:
+    """Engine, formulation, setting and step of a point for a reader."""
+    return ", ".join(filter(None, (name_of(point), step(point.resolution, point.step))))
+
+
+def _scatter(point: MeasuredPoint) -> float:
+    """Ratio of the ends of the interval of a point's cost; 1 without an interval."""
+    return point.interval[1] / point.interval[0] if point.interval and point.interval[0] > 0 else 1.0
+
+
+def _cell(point: MeasuredPoint) -> str:
+    """Speed of a point, rough if it was timed once; ``?`` if its timings scatter too much."""
+    if _scatter(point) > _SCATTER:
+        return "?"
+    return speed(point.cost, bool(point.interval and point.confidence))
+
+
+def _speed_of(point: MeasuredPoint) -> str:
+    """The same in a sentence."""
+    if point.seconds_per_second is None:
+        return "not timed"
+    if _scatter(point) > _SCATTER:
+        return f"speed unknown (its timings differ by a factor of {number(_scatter(point))})"
+    return f"{_cell(point)} real time"
+
+
+def point_table(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Sequence[str], title: str) -> Table:
+    """Table of points, one line each: cost, and error in each quantity."""
     errors = numeric(*(f"{study.quantities[name].symbol} [{study.quantities[name].unit}]" for name in quantities))
     table = plain_table(*unbroken("engine formulation setting", "step", "cost s/s"), *errors, title=title)
-    table.caption = caption
+    table.caption = Text("cost: wall seconds per simulated second through this adapter")
     for point in points:
-        by_name = point.error if ties is None else point.envelope
-        shown = [error(by_name.get(name)) if name in point.error else "–" for name in quantities]
+        shown = [error(point.error.get(name)) if name in point.error else "–" for name in quantities]
         if point.status != "done":
             shown = [str(point.status), *[""] * (len(quantities) - 1)]
-        mark = " ≈" if point.id in (ties or ()) else ""
-        table.add_row(Text(name_of(point)), step(point.resolution, point.step), cost_of(point) + mark, *shown)
+        table.add_row(Text(name_of(point)), step(point.resolution, point.step), cost_of(point), *shown)
     return table
-
-
-def front_tables(study: TradeoffStudy, quantities: Sequence[str]) -> Iterator[Table]:
-    """Pareto front of the engines, and the front with the scene's own equations if that is better."""
-    engines, everything = (study.front(key, quantities[0]) for key in ("pareto_engines", "pareto"))
-    title = f"The Pareto front of the engines for {quantities[0]}: nothing is cheaper and more accurate"
-    if engines:
-        yield _front(study, engines, quantities, title)
-    if everything != engines:
-        title = "The front with the scene's own equations, which no engine needs"
-        yield _front(study, everything, quantities, title)
 
 
 def held_first(
@@ -164,16 +207,6 @@ def held_first(
         (point, point.envelope_of(quantity) <= FIRST_TOLERANCE * scale) for point in points
     ]
     return [pair for pair in told if pair[1]] + [pair for pair in reversed(told) if not pair[1]]
-
-
-def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Sequence[str], title: str) -> Table:
-    ties = {cheap.id for cheap, fine in itertools.pairwise(points) if costs_overlap(cheap.interval, fine.interval)}
-    ordered = held_first(study, points, quantities[0])
-    table = point_table(study, [point for point, _ in ordered], quantities, title, ties)
-    if any(holds for _, holds in ordered) and not all(holds for _, holds in ordered):
-        assert isinstance(table.caption, Text)
-        table.caption += Text(f"; first what holds {number(FIRST_TOLERANCE)} of the size, the cheapest first")
-    return table
 
 
 def corner_table(study: TradeoffStudy, quantity: str) -> Table:
@@ -199,97 +232,45 @@ def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
     return error(corner.errors[quantity]), listed(corner.parameters)
 
 
-def budget_table(study: TradeoffStudy, quantity: str) -> Table:
-    """Table of every curve: the makeup of its error, and the dominant part at the coarse and at the fine end."""
-    unit = study.quantities[quantity].unit
-    title = f"What the error of {quantity} consists of [{unit}]: the coarse end, then the fine end"
-    table = plain_table(
-        *unbroken("engine formulation setting", "order (declared)", "at steps [s]"),
-        *numeric("limit off", "known to", "floor"),
-        *unbroken("dominated by"),
-        title=title,
-    )
-    names = curve_names(study.points)
-    for item in study.budgets:
-        if item.quantity != quantity:
-            continue
-        limit = (item.model_form, item.model_form_bar, item.floor)
-        ends = [_DOMINANT.get(end, end) for end in (item.coarse, item.fine)]
-        table.add_row(
-            Text(names[item.curve]),
-            Text(_order(item), style="yellow" if item.contradicts_declaration else ""),
-            _steps(item),
-            *(number(value) for value in limit),
-            " → ".join(dict.fromkeys(ends)),
-        )
-    return table
-
-
-# Short names that fit a column.
-_DOMINANT = {
-    "time step": "step",
-    "model form": "model",
-    "round-off or solver tolerance": "floor",
-    "truth's own error bar": "truth",
-    "too few runs reached the end": "too few runs",
-    "there is no step and no tolerance": "nothing",
-}
-
-
-def _order(item: CurveBudget) -> str:
-    declared = "" if item.declared is None else f" ({item.declared})"
-    if item.order is None:
-        return f"–{declared}"
-    if item.order_low is None or item.order_high is None:
-        return f"{item.order:.2f} ±?{declared}"  # from two differences, whose scatter is unknown
-    return f"{item.order:.2f} ±{(item.order_high - item.order_low) / 2:.2f}{declared}"
-
-
-def _steps(item: CurveBudget) -> str:
-    """Coarsest and finest step between which the order was observed."""
-    if item.order_from is None:
-        return ""
-    return f"{number(item.order_from)} → {number(item.order_to)}"
-
-
 def answer_lines(advice: Recommendation) -> Iterator[str]:
-    """Lines of a recommendation."""
+    """Lines of a recommendation: what to take and what is next, what fails, and over what it was checked."""
     answer = advice.answer
     yield from omitted_lines(advice.omitted or [])
     asked = f"{answer.quantity} to {number(answer.tolerance)} {answer.unit}"
     if answer.choice is None:
         yield f"Nothing that was measured holds {asked} with margin."
         if answer.closest:
-            yield f"Closest: {_line(answer.closest, answer.unit)}"
+            yield f"Closest: {_line(answer.closest, answer.unit)}; {answer.closest.reason}."
     else:
-        yield f"For {asked}, use {_line(answer.choice, answer.unit)}"
+        yield f"Take {_line(answer.choice, answer.unit)}."
         if not advice.affordable:
             yield f"That costs more than the {number(advice.max_cost)} s per simulated second of --max-cost."
     if answer.ties:
         tie = min(answer.ties, key=lambda t: t.point.envelope_of(answer.quantity))
-        many = f"{len(answer.ties)} others tie in cost, as far as the intervals tell; the most accurate of them"
-        words = many if len(answer.ties) > 1 else "A tie in cost, within the intervals"
-        yield f"{words}: {_line(tie, answer.unit)}"
+        many = f"{len(answer.ties)} others cost the same within the measurement. Most accurate of them"
+        yield f"{many if len(answer.ties) > 1 else 'Tie'}: {_line(tie, answer.unit)}."
+    failure = answer.first_failure
     for choice, words in (
         (advice.best_affordable, "Of those that cost no more"),
-        (answer.runner_up, "Runner-up"),
-        (answer.first_failure, "Cheaper ones fail; the most accurate of them"),
+        (answer.runner_up, "Next"),
+        (failure, "Cheaper fails"),
         (answer.least_model, "If this scene is all you need, its own equations do"),
     ):
         if choice:
-            yield f"{words}: {_line(choice, answer.unit)}"
-    yield "Costs are those of an engine through this adapter; other programs may cost more or less."
-    yield _checked(advice)
+            yield f"{words}: {_line(choice, answer.unit)}{f'; {choice.reason}' if choice is failure else ''}."
+    named = (answer.choice, answer.closest, answer.runner_up, *answer.ties[:1])
+    caveats = dict.fromkeys(f"{name_of(x.point)}: {x.point.caveat}" for x in named if x and x.point.caveat)
+    yield from ("", f"{asked[0].upper()}{asked[1:]}. {_checked(advice)}")
+    yield from [f"Caveats: {'; '.join(caveats)}."] if caveats else []
     if advice.not_measured:
-        yield f"Not among what was measured: {', '.join(advice.not_measured)}."
+        yield f"Not measured: {', '.join(advice.not_measured)}."
     yield _measured(advice.measured)
 
 
 def _line(choice: Choice, of: str) -> str:
-    point = choice.point
-    text = ", ".join(filter(None, (name_of(point), step(point.resolution, point.step))))
-    text += f": error {error(choice.error)} {of}, cost {cost_of(point)} s/s"
-    return with_caveat(f"{text}; {choice.reason}", family_and_caveat(point)) + "."
+    """A point with its speed and error."""
+    off = "without an error" if choice.error is None else f"{measure(choice.error, of)} off"
+    return f"{point_words(choice.point)}: {_speed_of(choice.point)}, {off}"
 
 
 def _checked(advice: Recommendation) -> str:
@@ -298,9 +279,9 @@ def _checked(advice: Recommendation) -> str:
     text = f"Checked over {checked.until:g} s at {listed(advice.parameters) or 'the default parameters'}"
     if over:
         text += f", and at {checked.corners} corners of {', '.join(over)}"
-    return text + "; nothing is known beyond."
+    return f"{text}."
 
 
 def _measured(measured: Measured) -> str:
     machine = measured.machine
-    return f"Measured {measured.when} on {machine['processor']} ({machine['cores']} cores, {machine['system']})."
+    return f"Measured {measured.when[:10]} on {machine['processor']} ({machine['cores']} cores, {machine['system']})."

@@ -10,7 +10,7 @@ from rich.text import Text
 from proofroll.core.number_format import counted, error
 from proofroll.report.labels import SYMBOLS, engine_title
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
-from proofroll.report.terminal.tables import STYLES
+from proofroll.report.terminal.verdicts import STYLES
 from proofroll.robots.check.layers import SHORT
 from proofroll.robots.check.records import AgainstCheck, HeldLayer, ImporterRow, RobotCheck
 from proofroll.robots.files.robot_file import LintRemark

@@ -28,11 +28,18 @@ _LENGTHS = (
     _SIGN,
 )
 _FACTORS = {"rad": _ANGLES, "rad/s": _ANGLES, "m": _LENGTHS, "m/s": _LENGTHS}
+# Beginning of a clause -> unit of the truth -> unit that the columns have.
+_UNITS = {
+    "57.3 times": {"rad": "deg", "rad/s": "deg/s"},
+    "a thousand times": {"m": "mm", "m/s": "mm/s"},
+    "a hundred times": {"m": "cm", "m/s": "cm/s"},
+}
 _FEW = 5  # samples from which a fitted number proves something
 # Part of a difference that a record at other times may leave: a pendulum whose push was left out leaves a fiftieth.
 _AT_ANOTHER_TIME = 1e-2
 # Delay, in intervals of samples, up to which it may be the error of a method of first order: half a step.
 _OWN_ERROR = 0.75
+_ROUND_OFF = 1e-12  # SI units, up to which a difference has no cause
 _LIKE_ITS_TRUTH = 1e-3  # part of a variable's size up to which it needs no cause
 
 
@@ -61,8 +68,8 @@ class GivenVariable:
 
     @property
     def wrong(self) -> bool:
-        """True if it differs by more than a small part of its size."""
-        return self.off > _LIKE_ITS_TRUTH * float(np.max(np.abs(self.true), initial=0.0))
+        """True if it differs by more than a small part of its size, and by more than round-off."""
+        return self.off > max(_ROUND_OFF, _LIKE_ITS_TRUTH * float(np.max(np.abs(self.true), initial=0.0)))
 
 
 def causes_of(variables: Mapping[str, GivenVariable], times: FloatArray, falling: Collection[str]) -> list[str]:
@@ -91,6 +98,24 @@ def causes_of(variables: Mapping[str, GivenVariable], times: FloatArray, falling
     if open_ones and (late := [*_late(variables, times)]):
         return late
     return [*filter(None, sentences.values()), *_first_row(open_ones, times)]
+
+
+def mapping(cause: str, units: Mapping[str, str], columns: Mapping[str, str]) -> list[str]:
+    """Names of columns that close a cause of another unit or of swapped columns, as ``theta=q.pivot[deg]``.
+
+    Args:
+        cause: one of the clauses of :func:`causes_of`.
+        units: variable of the truth -> its unit.
+        columns: of the trajectory -> variable of the truth, as they were named so far.
+    """
+    columns_of = {text.partition("[")[0]: column for column, text in columns.items()}
+    name, _, says = cause.partition(" is ")
+    for start, of_unit in _UNITS.items():
+        if says.startswith(start) and units.get(name) in of_unit:
+            return [f"{columns_of.get(name, name)}={name}[{of_unit[units[name]]}]"]
+    pair, swapped, _ = cause.partition(" are each the other")
+    a, _, b = pair.partition(" and ")
+    return [f"{columns_of.get(a, a)}={b}", f"{columns_of.get(b, b)}={a}"] if swapped else []
 
 
 def _scaled(item: GivenVariable) -> Iterator[tuple[str, FloatArray]]:

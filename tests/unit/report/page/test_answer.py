@@ -10,7 +10,7 @@ from table_lines import ARM, FORCE, LINE, line
 from proofroll.report.page.answer import ReaderQuestion, answer, listed
 from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.page.profile import profile
-from proofroll.report.terminal.tables import answer_table
+from proofroll.report.terminal.answers import answers, engine_lines, kind_sentences, scene_lines
 
 STUDIES = {name: ChoiceStudy(f"A {name}", f"c{number}") for number, name in enumerate(("arm", "chain", "ball"))}
 BETA = line(engine="beta", row=3, error=1e-9, cost=0.5)
@@ -148,16 +148,31 @@ def test_kinds_are_listed_as_in_a_sentence(words: list[str], text: str) -> None:
 
 
 def test_the_terminal_shows_the_same_answer() -> None:
-    """A line for each kind: what to take with its step, speed, the next engine, and what forces change."""
-    table = answer_table(choice_matrix([*ARM, BETA, BALL], STUDIES, NAMES), 1e-3, False)
-    lines = list(zip(*([str(cell) for cell in column.cells] for column in table.columns), strict=True))
-    assert lines[0][:4] == (
-        "Trees",
-        "Alpha joints, default, dt 1e-3 s",
-        "≥ 100×",
-        "beta joints, 50× the cost, lead open",
-    )
-    assert lines[1][:3] == ("Rolling balls", "none; closest Alpha joints: off by 0.1, finer steps come closer", "–")
+    """A sentence for each kind, a line for each scene with speed, setting and step, and what is tied or open."""
+    columns = answers(choice_matrix([*ARM, BETA, BALL], STUDIES, NAMES), 1e-3, forces=False)
+    assert kind_sentences(columns) == [
+        "Alpha for trees (≥ 100×).",
+        "Rolling balls: none; closest Alpha joints: off by 0.1, finer steps come closer.",
+    ]
+    assert [" ".join(line.split()) for line in scene_lines(columns)] == [
+        "scene × real time take",
+        "arm ≥ 100× Alpha joints, default, dt 1e-3 s",
+        "ball – none; closest Alpha joints: off by 0.1, finer steps come closer",
+        "",
+        "Lead open in 1: a rival that holds it ran no coarser step.",
+    ]
+
+
+def test_the_terminal_shows_engines_of_a_kind() -> None:
+    """Of a kind of several scenes each engine has its share of them, speeds, relative cost, and what it misses."""
+    chain = replace(LINE, study="chain", scene="chain", error=1e-9, cost=0.1)
+    lines = [*ARM, BETA, chain, replace(BETA, study="chain", scene="chain", error=0.2)]
+    columns = answers(choice_matrix(lines, STUDIES, NAMES), 1e-3, forces=False)
+    assert kind_sentences(columns)[0] == "Alpha for 2 of 2 trees (≥ 10–100×)."
+    assert [" ".join(line.split()) for line in engine_lines(columns[0])][1:] == [
+        "Alpha 2 of 2 ≥ 10–100× the cheapest",
+        "beta 1 of 2 ≥ 2× 50 times; off by 0.2 in chain",
+    ]
 
 
 def test_the_profile_counts_the_scenes_of_each_engine() -> None:

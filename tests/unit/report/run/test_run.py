@@ -65,15 +65,20 @@ def test_a_variable_without_value_says_why(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "said"), [(0.25, "1 s of wall time, after 0.25 s before the first step"), (None, "1 s of wall time")]
+    ("seconds", "said"),
+    [
+        (2.5, "e reached 1 s in 0.1 s (10× real time), after 2.5 s before the first step."),
+        (0.25, "e reached 1 s in 0.1 s (10× real time)."),
+        (None, "e reached 1 s in 0.1 s (10× real time)."),
+    ],
 )
-def test_what_comes_before_the_first_step_is_told(seconds: float | None, said: str, tmp_path: Path) -> None:
-    """The seconds of building, with what an engine compiles, stand beside those of the run."""
-    result = Result(Status.DONE, "reached 1 s", wall_seconds=1.0, build_seconds=seconds)
+def test_the_first_line_is_the_answer(seconds: float | None, said: str, tmp_path: Path) -> None:
+    """Who reached what time, how fast in real time; seconds of building stand beside it where they are many."""
+    result = Result(Status.DONE, "reached 1 s", wall_seconds=0.1, build_seconds=seconds)
     content = run_content(_case("pendulum"), result, tmp_path / "none.npz")
     assert content.build_seconds == seconds
-    lines = run_lines(dataclasses.replace(content, final={"time": 1.0}, units={"time": "s"}))
-    assert said in [str(line) for line in lines]
+    lines = run_lines(dataclasses.replace(content, final={"time": 1.0}, units={"time": "s"}), checked="a command")
+    assert [str(lines[0]), str(lines[-1])] == [said, "is it right? a command"]
 
 
 def test_an_event_says_to_what_it_happens(tmp_path: Path) -> None:
@@ -104,23 +109,25 @@ def test_digits_end_at_the_error_bar(value: float, bar: float | None, size: floa
 
 
 def test_positions_come_first_and_forces_on_request(tmp_path: Path) -> None:
-    """Positions stand before velocities, energies and forces; many forces are counted only, unless asked for."""
+    """Positions stand before energies and forces; many forces are counted, velocities and the time are for --all."""
     result = Result(Status.DONE, "reached 1 s", wall_seconds=1.0)
     units = {"time": "s", "E": "J", "v": "m/s", "x": "m", "q": "rad"} | {f"force.{axis}": "N" for axis in "abcd"}
     final = dict.fromkeys(units, 1.0)
     content = run_content(_case("pendulum"), result, tmp_path / "none.npz")
     content = dataclasses.replace(content, final=final, units=units)
     texts = []
-    for forces in (False, True):
+    for options in ({"forces": False}, {"forces": True}, {"forces": False, "everything": True}):
         shown = Console(file=io.StringIO(), width=80)
-        for line in run_lines(content, forces=forces):
+        for line in run_lines(content, **options):
             shown.print(line)
         texts.append(shown.file.getvalue())
-    names = [line.split()[0] for line in texts[0].splitlines()[3:8]]
-    assert names == ["time", "x", "q", "v", "E"]
+    assert [line.split() for line in texts[0].splitlines()[2:4]] == [["x", "1", "m", "E", "1", "J"], ["q", "1", "rad"]]
     assert "force.a" not in texts[0]
-    assert "4 forces and moments are not shown; --forces shows them" in texts[0]
+    assert "4 forces and moments: --forces" in texts[0]
     assert "force.a" in texts[1]
+    names = [line.split()[0] for line in texts[2].splitlines()[3:8]]
+    assert names == ["time", "x", "q", "v", "E"]
+    assert "force.a" in texts[2]
 
 
 def _range(text: str) -> list[str]:
@@ -157,9 +164,9 @@ def test_corners_with_equal_values_are_one_row(tmp_path: Path) -> None:
     units = dict.fromkeys(gaps, "m") | dict.fromkeys(forces, "N")
     content = dataclasses.replace(content, final=gaps | forces, units=units)
     shown = Console(file=io.StringIO(), width=80)
-    for line in run_lines(content):
+    for line in run_lines(content, everything=True):
         shown.print(line)
-    rows = [line.split()[:2] for line in shown.file.getvalue().splitlines()[3:-1]]
+    rows = [line.split()[:2] for line in shown.file.getvalue().splitlines()[3:6]]
     assert rows == [
         ["gap.touch.1|3|5|7", "0.4"],
         ["gap.touch.2|4|6|8", "0"],

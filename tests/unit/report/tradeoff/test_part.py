@@ -63,7 +63,7 @@ def test_an_option_of_an_engine_is_part_of_its_setting() -> None:
     matrix = choice_matrix(lines, {lines[0].study: ChoiceStudy("A slope", "c0")})
     assert [row.setting for row in matrix.rows] == ["", "cone=pyramidal", "matched"]
     points = [boundary_point(engine="engine", curve=curve, settings=settings(curve)) for curve in CONES]
-    assert [name_of(point) for point in points] == ["engine free cone=pyramidal", "engine free matched"]
+    assert [name_of(point) for point in points] == ["engine free, cone=pyramidal", "engine free, matched"]
 
 
 def test_a_line_has_the_error_of_its_run_and_the_number_of_its_curve() -> None:

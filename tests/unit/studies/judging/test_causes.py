@@ -16,7 +16,7 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.parts import Point
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.judging.causes import GivenVariable, causes_of
+from proofroll.studies.judging.causes import GivenVariable, causes_of, mapping
 
 TIMES = np.linspace(0.0, 2.0, 41)
 ONE, TWO = np.sin(3 * TIMES) + 0.3, np.cos(2 * TIMES) - 0.1
@@ -49,6 +49,34 @@ def test_a_motion_that_differs_otherwise_has_no_cause() -> None:
     """A wrong amplitude, a slow clock of one coordinate and the truth itself are no mistake of this kind."""
     for one in (1.1 * (ONE - 0.3) + 0.3, np.sin(3 * TIMES - 0.3 * TIMES) + 0.3, ONE):
         assert said(one, TWO) == []
+
+
+def test_round_off_has_no_cause() -> None:
+    """Variables that are zero but for round-off are neither a thousandth of the truth nor another start."""
+    noise = GivenVariable(1e-19 * np.ones(41), 1e-16 * np.ones(41), "m")
+    assert causes_of({"tip.z": noise}, TIMES, []) == []
+
+
+@pytest.mark.parametrize(
+    ("one", "unit", "columns", "closes"),
+    [
+        (ONE * 180 / np.pi, "rad", {}, ["q.a=q.a[deg]"]),
+        (ONE * 1e3, "m", {"x": "q.a"}, ["x=q.a[mm]"]),
+        (-ONE, "m", {}, []),
+    ],
+)
+def test_another_unit_has_a_mapping_that_closes_it(
+    one: Any, unit: str, columns: dict[str, str], closes: list[str]
+) -> None:
+    """The names of columns to type; a sign has none."""
+    (only,) = said(one, TWO, unit)
+    assert mapping(only, {"q.a": unit}, columns) == closes
+
+
+def test_swapped_columns_have_a_mapping() -> None:
+    """Each gets the name of the other."""
+    (only,) = said(TWO, ONE)
+    assert mapping(only, {}, {"first": "q.a"}) == ["first=q.b", "q.b=q.a"]
 
 
 def one_at(times: Any) -> Any:

@@ -77,8 +77,15 @@ def test_columns_of_any_name_and_unit(
     given = ("judge", str(tmp_path / "own.csv"), "pendulum")
     code, out, err = command_line(*given, "--map", "t=time,theta=q.pivot[deg],x=tip.x[cm]")
     assert (code, err) == (0, "")
-    assert "ok q.pivot" in out
-    assert "ok tip.x" in out
+    assert "✓ q.pivot" in out
+    assert "✓ tip.x" in out
+    code, out, err = command_line(*given, "--map", "t=time,theta=q.pivot,x=tip.x[cm]")
+    assert code == 1
+    assert out.startswith("✗ own.csv differs from the truth of pendulum: q.pivot is 57.3 times the truth")
+    assert "--map 't=time,x=tip.x[cm],theta=q.pivot[deg]'" in " ".join(out.split())
+    assert "tip.x" not in [line.partition(" is off")[0][2:] for line in out.splitlines()]
+    out = command_line(*given, "--map", "t=time,theta=q.pivot,x=tip.x[cm]", "--all")[1]
+    assert [line[:7] for line in out.splitlines() if " is off by " in line] == ["✗ q.piv", "✓ tip.x"]
     code, out, err = command_line(*given)
     assert (code, out) == (2, "")
     assert "its first line has the names, here t (ms), theta, x; --map t=time" in err

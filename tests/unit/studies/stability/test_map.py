@@ -159,7 +159,7 @@ def test_reports_of_a_map(small: Any) -> None:
     assert headline(study).startswith("2 points, ")
     console = Console(width=100, record=True, file=open("/dev/null", "w"))  # noqa: SIM115 -- nobody reads it
     console.print(boundary_table(study))
-    assert "projection solver rotating_frame default" in console.export_text()
+    assert "projection solver rotating frame, default" in console.export_text()
     assert len(list(silent_lines(study))) <= 8
     assert set(letters(study)) == set(meanings(load_scene("sphere_in_cylinder")))
     assert len(set(letters(study).values())) == len(letters(study))
@@ -176,7 +176,7 @@ def test_what_is_beyond_counts_its_own_silent_failures() -> None:
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ({}, "good only tuned at V0 = 200: sank in at every step down to dt 1.25e-4 s, off by 150 % of the range"),
+        ({}, "good only, tuned at V0 = 200: sank in at every step down to dt 1.25e-4 s, off by 150 % of the range"),
         ({"too_slow": 1e-5}, "sank in down to dt 1.25e-4 s, finer ones have too many steps"),
         ({"resolution": "rtol", "finest": 1e-9}, "sank in at every tolerance down to rtol 1e-9"),
         ({"sides": {"stable": Boundary(1e-3, True, {}, 2e-3, "", True, None, None, None)}}, "just beyond dt 1e-3 s"),

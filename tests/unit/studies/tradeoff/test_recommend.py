@@ -13,7 +13,7 @@ from proofroll.core.engine_abilities import by_hand
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import load_engine
 from proofroll.files.json_data import plain
-from proofroll.report.tradeoff.tables import answer_lines, corner_table, default_quantities, front_tables
+from proofroll.report.tradeoff.tables import answer_lines, corner_table, default_quantities, tradeoff_parts
 from proofroll.studies.tradeoff.recommend import covers
 from proofroll.studies.tradeoff.recommend import recommend as recommended
 from proofroll.studies.tradeoff.records import Corner, MeasuredPoint, MeasuredQuantity, SparseRun, TradeoffStudy
@@ -98,7 +98,7 @@ def test_costs_that_cannot_be_told_apart_are_ties() -> None:
     assert [tie["engine"] for tie in answer["ties"]] == ["near"]
     assert answer["ties"][0]["reason"]
     assert recommend(study(FAST, SLOW), required(1e-3))["ties"] == []
-    assert any("tie" in line and "near only" in line for line in answer_lines(recommended(measured, required(1e-3))))
+    assert any(line.startswith("Tie: near only") for line in answer_lines(recommended(measured, required(1e-3))))
 
 
 def test_many_ties_are_one_line() -> None:
@@ -106,9 +106,8 @@ def test_many_ties_are_one_line() -> None:
     errors = (2e-5, 1e-6, 3e-5)
     near = [point(3 + k, f"near{k}", 1.01e-2, e, interval=[1e-2, 1.02e-2]) for k, e in enumerate(errors)]
     measured = study(FAST, replace(MIDDLE, interval=[9.9e-3, 1.01e-2]), *near)
-    (line,) = [line for line in answer_lines(recommended(measured, required(1e-3))) if "tie" in line]
-    assert line.startswith("3 others tie in cost")
-    assert "the most accurate of them: near1 only" in line
+    (line,) = [line for line in answer_lines(recommended(measured, required(1e-3))) if "same" in line]
+    assert line.startswith("3 others cost the same within the measurement. Most accurate of them: near1 only")
 
 
 def test_a_factor_is_a_number_as_a_person_writes_it() -> None:
@@ -278,41 +277,32 @@ def test_a_finer_step_that_is_recommended_would_do() -> None:
         assert answer["first_failure"]["reason"].endswith("; the step is too coarse")
 
 
-def test_ties_are_marked_on_the_front() -> None:
-    """A line of the front whose cost cannot be told from that of a more accurate one is marked, and the mark named."""
-    near = point(4, "near", 1.15e-2, 1e-5)
-    for points, marked in (((FAST, MIDDLE, near, SLOW), ["middle"]), ((FAST, MIDDLE, SLOW), [])):
-        numbers = [p.id for p in points]
-        fronts: dict[str, Any] = {"pareto": {"z": numbers}, "pareto_engines": {"z": numbers}}
-        (table,) = front_tables(study(*points, **fronts), ["z"])
-        names, costs = (list(table.columns[index].cells) for index in (0, 2))
-        assert [str(name).split()[0] for name, cost in zip(names, costs, strict=True) if "≈" in str(cost)] == marked
-        assert ("≈" in str(table.caption)) == bool(marked)
+def printed(measured: TradeoffStudy) -> list[str]:
+    """Lines of a trade-off's screen."""
+    return [" ".join(str(part).split()) for part in tradeoff_parts(measured, ["z"], every_point=False)]
 
 
-def test_a_front_begins_with_what_holds() -> None:
-    """Points that hold 1e-4 of the size come first, the cheapest of them first; then the others, the nearest first."""
-    steps = [point(number, f"at{number}", 10.0**-number, 10.0 ** (number - 7)) for number in range(1, 6)]
-    numbers = [item.id for item in reversed(steps)]
-    fronts: dict[str, Any] = {"pareto": {"z": numbers}, "pareto_engines": {"z": numbers}}
-    measured = study(*steps, **fronts)
-    scale = measured.quantities["z"].scale
-    assert scale is not None
-    (table,) = front_tables(measured, ["z"])
-    errors = [float(str(cell)) / scale for cell in table.columns[-1].cells]
-    held = [size for size in errors if size <= 1e-4]
-    assert errors == sorted(held, reverse=True) + sorted(set(errors) - set(held))
-    assert 0 < len(held) < len(errors)
-    assert "first what holds 1e-4 of the size" in str(table.caption)
+def test_a_tradeoff_answers_first() -> None:
+    """What to take at 1e-4 of the size, whether it leads elsewhere, what is next, and a column for each tolerance."""
+    fast, fine = point(1, "fast", 1e-3, 1e-6), point(2, "fine", 0.1, 1e-12)
+    found = printed(study(fast, fine))
+    assert found[0] == (
+        "Take fast only, matched, dt 0.1 s: 1000× real time at 1e-4 of the size of z. It leads wherever it holds; "
+        "next is fine only: 10× real time."
+    )
+    assert found[2:5] == [
+        "× real time, cheapest that holds 1e-3 1e-4 1e-6 1e-8",
+        "fast only 1000× 1000× – –",
+        "fine only 10× 10× 10× 10×",
+    ]
+    assert printed(study(point(1, "rough", 1e-3, 1.0)))[0] == "Nothing that was measured holds 1e-4 of the size of z."
 
 
-def test_a_front_shows_the_errors_by_which_it_is_one() -> None:
-    """A coarse run that is close by luck has the error of its finer neighbours there, and the caption says so."""
-    lucky = point(1, "fast", 1e-3, 1e-6, envelope={"z": 1e-2})
-    fronts: dict[str, Any] = {"pareto": {"z": [1, 2]}, "pareto_engines": {"z": [1, 2]}}
-    (table,) = front_tables(study(lucky, MIDDLE, **fronts), ["z"])
-    assert [str(cell) for cell in table.columns[-1].cells] == ["1e-4", "0.01"]
-    assert "by luck" in str(table.caption)
+def test_a_cost_whose_timings_scatter_is_unknown() -> None:
+    """An interval wider than a factor of two is no speed: a mark in the table, the factor in a sentence."""
+    found = printed(study(replace(point(1, "fast", 1e-3, 1e-6), interval=(1e-3, 17e-3))))
+    assert "speed unknown (its timings differ by a factor of 17)" in found[0]
+    assert found[3:5] == ["fast only ? ? – –", "?: unknown, its timings differ by more than a factor of 2."]
 
 
 def test_what_has_no_curve_is_no_column() -> None:
