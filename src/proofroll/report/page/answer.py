@@ -214,6 +214,10 @@ class FirstAnswer:
         """Answers for single scenes."""
         return [item for item in self.columns if not item.column.whole]
 
+    def chips_of(self, group: str) -> list[Chip]:
+        """Chips of one kind of scenes."""
+        return [chip for item in self.kinds if item.column.group == group for chip in _chips(item.matrix, [item])]
+
     @property
     def sentence(self) -> str:
         """The chips as one sentence."""

@@ -11,7 +11,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.page.answer import FirstAnswer, answer
+from proofroll.report.page.answer import Chip, FirstAnswer, answer
 from proofroll.report.page.choice_cell import CANNOT, NO_RUN, PARTLY, ChoiceCell
 from proofroll.report.page.choice_matrix import (
     ASKED,
@@ -216,7 +216,10 @@ class FirstScreen:
             screens[" ".join(chosen)] = [
                 {
                     "asked": answered.question.words,
-                    "chips": str(macros.chips(answered)),  # type: ignore[attr-defined]
+                    "chips": {
+                        group: str(macros.chips(chips))  # type: ignore[attr-defined]
+                        for group, chips in _chips_by_kind(answered).items()
+                    },
                     "cards": unbroken(str(macros.cards(self, answered))),  # type: ignore[attr-defined]
                     "profile": str(macros.profile(profile(self.matrix, answered, chosen))),  # type: ignore[attr-defined]
                     "use": unbroken(addressed(str(macros.use(self, answered)))),  # type: ignore[attr-defined]
@@ -224,8 +227,15 @@ class FirstScreen:
                 }
                 for answered in answers
             ]
-        content = {"cells": cells, "grid": grid, "screens": screens}
+        groups = ["", *(column.group for column in self.matrix.kinds)]
+        facts = {group: str(macros.facts(self.content.kept(group))) for group in groups}  # type: ignore[attr-defined]
+        content = {"cells": cells, "grid": grid, "screens": screens, "facts": facts}
         return packed(json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "replace"))
+
+
+def _chips_by_kind(answered: FirstAnswer) -> dict[str, list[Chip]]:
+    """Chips of each kind of scenes by its name, and of all under the empty one."""
+    return {"": answered.chips} | {item.column.group: answered.chips_of(item.column.group) for item in answered.kinds}
 
 
 def bar(cell: ChoiceCell) -> int:
