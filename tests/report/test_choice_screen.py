@@ -217,6 +217,30 @@ def test_the_link_to_an_answer_is_copied(report_page: Path, visit: Visiting) -> 
         seen.until(lambda: seen.page.locator(".ask .copy").inner_text() == "copied", what="copied")
 
 
+@pytest.mark.drill
+def test_lines_for_a_model_follow_the_question(written: tuple[Any, Path], visit: Visiting) -> None:
+    """A row's and a card's button open a command and a test of the cheapest engine, and of any other that holds it."""
+    copied = "window.copied = []; navigator.clipboard.writeText = async (text) => { copied.push(text); };"
+    with visit(written[1] / "report.html", before=UNDRAWN + copied) as seen:
+        dialog, title = seen.page.locator("#model"), seen.page.locator("#model-title")
+        for button in ("#answer-cards [data-model]", "#uses [data-model]"):
+            seen.page.locator(button).first.click()
+            dialog.wait_for()
+            taken = seen.page.locator("#uses tbody tr:not(.group) b").first.inner_text()
+            assert title.inner_text().endswith(taken)
+            seen.page.keyboard.press("Escape")
+            dialog.wait_for(state="hidden")
+        ask(seen, 8, False)
+        seen.page.locator("#uses [data-model]").first.click()
+        assert 'tolerance="1e-06 %"' in dialog.inner_text()
+        dialog.get_by_role("button", name="copy: Check it").click()
+        seen.wait("copied.length === 1")
+        assert seen.page.evaluate("copied[0]").startswith("proofroll compare sphere_in_cylinder --engine ")
+        dialog.get_by_role("button", name="Close").click()
+        dialog.wait_for(state="hidden")
+        assert seen.messages == []
+
+
 def test_cells_lead_to_their_evidence(seen: Visit) -> None:
     """Each link of the matrix has its target on the page."""
     there: list[bool] = seen.page.evaluate(

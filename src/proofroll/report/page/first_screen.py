@@ -182,6 +182,10 @@ class FirstScreen:
         """Title of a kind of scenes."""
         return next(column.title for column in self.matrix.kinds if column.group == group)
 
+    def scene_of(self, kind: ChoiceColumn, place: int) -> ChoiceColumn:
+        """Column of one scene of a kind."""
+        return [column for column in self.matrix.columns if not column.whole and column.group == kind.group][place]
+
     @cached_property
     def pictures(self) -> dict[str, Picture]:
         """Small picture of each scene that is drawn, by its name."""
@@ -229,7 +233,24 @@ class FirstScreen:
             ]
         groups = ["", *(column.group for column in self.matrix.kinds)]
         facts = {group: str(macros.facts(self.content.kept(group))) for group in groups}  # type: ignore[attr-defined]
+        texts: dict[str, int] = {}
+        models = [
+            {
+                f"{column.group} {column.name}": {
+                    cell.engine: texts.setdefault(
+                        str(macros.model(self, column, cell, tolerance)),  # type: ignore[attr-defined]
+                        len(texts),
+                    )
+                    for cell in self.matrix.standings(column, tolerance, need)
+                    if cell.holds
+                }
+                for column in self.matrix.columns
+                if not column.whole
+            }
+            for need, tolerance in ASKED
+        ]
         content = {"cells": cells, "grid": grid, "screens": screens, "facts": facts}
+        content |= {"models": models, "texts": [*texts]}
         return packed(json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "replace"))
 
 

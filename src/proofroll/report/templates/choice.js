@@ -121,6 +121,24 @@
   });
   start();
 
+  // Lines for a reader's own model: of a scene's cheapest engine, then of another that holds the tolerance.
+  const dialog = place("model"), engine = place("model-engine");
+  async function model(scene, chosen) {
+    const data = JSON.parse(await unpack("choices")), holding = data.models[Number(table.dataset.at ?? {{ first_decade - decades.start }})][scene];
+    const gone = off(), names = Object.keys(holding).filter((name) => !gone.has(name));
+    engine.replaceChildren(...names.map((name) => new Option(title(name), name)));
+    engine.value = chosen ?? names[0];
+    dialog.dataset.scene = scene;
+    place("model-lines").innerHTML = data.texts[holding[engine.value]];
+    if (!dialog.open) dialog.showModal();
+  }
+  engine.addEventListener("change", () => model(dialog.dataset.scene, engine.value));
+  document.addEventListener("click", ({ target }) => {
+    const button = target.closest("[data-model]");
+    if (button) model(button.dataset.model);
+    if (target === dialog || target.closest("#model .close")) dialog.close();
+  });
+
   // A tooltip in place of the browser's: the first line bold; by pointer, keyboard or touch, Escape closes it.
   const tip = Object.assign(document.createElement("div"), { id: "tip", hidden: true });
   tip.setAttribute("role", "tooltip");

@@ -17,7 +17,6 @@ from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.tradeoff.pareto import costs_overlap
 
 if TYPE_CHECKING:
-    from proofroll.report.tradeoff.part import Advice
     from proofroll.studies.study_store import Measured
     from proofroll.studies.tradeoff.recommend import Choice, Recommendation
     from proofroll.studies.tradeoff.records import Corner, CurveBudget, MeasuredPoint, TradeoffStudy
@@ -65,18 +64,6 @@ def effort(study: TradeoffStudy) -> str:
             f"{text}Every choice holds {range_words}, and at the corners of {_ranges(study)}; nothing is known beyond."
         )
     return f"{text}Every choice holds {range_words}; it was not checked over ranges of the parameters."
-
-
-def advised(advice: Sequence[Advice]) -> dict[str, tuple[str, list[Advice]]]:
-    """Advice by quantity, with the names of the recommended settings."""
-    groups: dict[str, list[Advice]] = {}
-    for item in advice:
-        groups.setdefault(item.answer.quantity, []).append(item)
-    named = {
-        quantity: dict.fromkeys(name_of(item.answer.choice.point) for item in items if item.answer.choice)
-        for quantity, items in groups.items()
-    }
-    return {key: (", then ".join(named[key]) or "nothing holds it", items) for key, items in groups.items()}
 
 
 def _ranges(study: TradeoffStudy) -> str:
