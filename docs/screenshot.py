@@ -18,8 +18,8 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WIDTH, MOST_HEIGHT, DENSITY = 1400, 1100, 2
 # A page of text and flat cells has few colours; a palette makes the file a third as large.
 COLOURS = 128
-# The end of the picture, and the first table of verdicts, which stands below it.
-CARDS, VERDICTS = "#answer-cards", ".matrix"
+# The end of the picture, and the first table of verdicts, which is folded below it.
+CARDS, FOLDED, VERDICTS = "#answer-cards", "#verdicts details", ".matrix"
 # Row for row: what the comparison file calls it, and its verdict.
 ROWS = """(table) => [...document.querySelector(table).querySelectorAll("tbody tr:not(.group, .note)")].map((row) =>
   [row.querySelector("th").title, row.querySelector(".v").textContent.trim().split(" ")[1]])"""
@@ -46,6 +46,8 @@ def screenshot(report: Path, picture: Path) -> None:
         end = page.locator(CARDS).evaluate("(cards) => cards.getBoundingClientRect().bottom + 16")
         area: Any = {"x": 0, "y": 0, "width": WIDTH, "height": min(end, MOST_HEIGHT)}
         image = Image.open(io.BytesIO(page.screenshot(clip=area)))
+        page.locator(FOLDED).first.evaluate("(fold) => { fold.open = true; }")
+        page.locator(VERDICTS).first.wait_for()
         said = PngInfo()
         said.add_text("verdicts", json.dumps(page.evaluate(ROWS, VERDICTS)))
         browser.close()

@@ -19,7 +19,7 @@ from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
-from proofroll.report.page import model_lines, profile
+from proofroll.report.page import model_lines, profile, verdict_strips
 from proofroll.report.page.answer import LENGTHS, speed_range, told
 from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE
 from proofroll.report.page.first_screen import STATES, FirstScreen, bar, look
@@ -125,6 +125,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
     made.globals |= {
         "tables": tables,
         "verdict_matrix": verdict_matrix,
+        "strips": verdict_strips,
         "names": labels.names,
         "curve_names": labels.curve_names,
         "step": labels.step,
