@@ -183,6 +183,13 @@ def test_facts_stand_above_the_cards(two_kinds: Path, everything: Any, visit: Vi
         seen.page.locator("#kind").select_option("trees")
         seen.until(lambda: facts.count() == 2, what="facts of one kind")
         assert f"of {total} settings" in facts.first.inner_text()
+        assert seen.page.locator("#answer-one tbody th").all_inner_texts() == ["arm"], "its scenes, beside its card"
+        edges = "['#answer-one', '#answer-cards'].map((name) => document.querySelector(name).getBoundingClientRect())"
+        scenes, cards = seen.page.evaluate(f"{edges}.map(({{ left, right }}) => [left, right])")
+        assert cards[1] < scenes[0]
+        assert cards[1] - cards[0] <= 340
+        seen.page.locator("#kind").select_option("")
+        seen.until(lambda: seen.page.locator("#answer-one *").count() == 0, what="all kinds")
     assert everything.content.kept("trees").statements == []
 
 

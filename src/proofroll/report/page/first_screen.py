@@ -22,6 +22,7 @@ from proofroll.report.page.choice_matrix import (
 )
 from proofroll.report.page.profile import Profile, profile
 from proofroll.report.pages import addressed, packed, unbroken
+from proofroll.report.parts import Part, PartEntry, part_kinds
 from proofroll.report.pen import Disc, Lettering, Picture, Polyline
 
 if TYPE_CHECKING:
@@ -186,6 +187,15 @@ class FirstScreen:
         """Column of one scene of a kind."""
         return [column for column in self.matrix.columns if not column.whole and column.group == kind.group][place]
 
+    @property
+    def chapters(self) -> dict[str, list[tuple[type[Part], PartEntry, int]]]:
+        """Further studies of each scene: their kind, their entry, and its number among those of the kind."""
+        chapters: dict[str, list[tuple[type[Part], PartEntry, int]]] = {}
+        for kind in part_kinds():
+            for index, entry in enumerate(self.content.entries[kind.key]):
+                chapters.setdefault(entry.scene, []).append((kind, entry, index))
+        return chapters
+
     @cached_property
     def pictures(self) -> dict[str, Picture]:
         """Small picture of each scene that is drawn, by its name."""
@@ -223,6 +233,11 @@ class FirstScreen:
                     "chips": {
                         group: str(macros.chips(chips))  # type: ignore[attr-defined]
                         for group, chips in _chips_by_kind(answered).items()
+                    },
+                    "one": {
+                        group: unbroken(str(macros.one(self, item)))  # type: ignore[attr-defined]
+                        for item in answered.kinds
+                        for group in [item.column.group, *([""] if len(answered.kinds) == 1 else [])]
                     },
                     "cards": unbroken(str(macros.cards(self, answered))),  # type: ignore[attr-defined]
                     "profile": str(macros.profile(profile(self.matrix, answered, chosen))),  # type: ignore[attr-defined]

@@ -149,9 +149,9 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "lengths": LENGTHS,
         "profiles": profile,
         "loop_key": slug,
+        "scene_words": lambda name: name.rpartition("/")[2].replace("_", " ").capitalize(),
         "again": _again,
         "host_sentences": host_sentences,
-        "part_kinds": part_kinds(),
         "report_kinds": report_kinds(),
     }
     for kind in kinds:

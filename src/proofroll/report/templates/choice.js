@@ -20,6 +20,7 @@
     const screen = (own ?? data.screens[rivals.join(" ")])[asked];
     place("asked").textContent = `The cheapest that holds ${screen.asked}${own && gone.size ? `, of ${chosen.map(title).join(" and ")} alone` : ""}:`;
     place("answer-chips").innerHTML = screen.chips[kind.value];
+    place("answer-one").innerHTML = screen.one[kind.value] ?? "";
     place("facts").innerHTML = data.facts[kind.value];
     for (const part of ["cards", "profile", "use"]) place(`answer-${part}`).innerHTML = screen[part];
     rows.forEach((row, i) => [...row.cells].slice(1).forEach((cell, j) => {
@@ -56,7 +57,7 @@
       kind.value = [...kind.options].some((option) => option.value === words.get("kinds")) ? words.get("kinds") : "";
       boxes.forEach((box) => { box.checked = !names || names.includes(box.value); });
       columns(words.get("cols") === "scene" ? "single" : "kinds");
-      if (words.size || table.dataset.at) show();
+      if (table.dataset.at || [...words.keys()].some((name) => name !== "at" && name !== "open")) show();
     },
   );
   document.querySelectorAll(".ask").forEach((form) => form.addEventListener("submit", (event) => event.preventDefault()));

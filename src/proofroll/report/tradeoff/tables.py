@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rich.table import Column, Table
 from rich.text import Text
 
+from proofroll.core.engine_abilities import by_hand
 from proofroll.core.number_format import error, number
 from proofroll.report.labels import curve_names, family_and_caveat, listed, name_of, omitted_lines, step, with_caveat
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
@@ -64,6 +65,20 @@ def effort(study: TradeoffStudy) -> str:
             f"{text}Every choice holds {range_words}, and at the corners of {_ranges(study)}; nothing is known beyond."
         )
     return f"{text}Every choice holds {range_words}; it was not checked over ranges of the parameters."
+
+
+def holding(study: TradeoffStudy) -> tuple[list[MeasuredPoint], int]:
+    """Cheapest point of each engine's setting that holds ``FIRST_TOLERANCE``, the cheapest first; the others' number.
+
+    Equations that are solved for the scene by hand are left out.
+    """
+    scale = study.quantities[study.quantity].scale if study.quantity in study.quantities else None
+    points = [point for point in study.points if not by_hand(point.level)]
+    timed = sorted((x for x in points if x.seconds_per_second), key=lambda x: x.seconds_per_second or 0.0, reverse=True)
+    held = [x for x in timed if scale is not None and x.envelope_of(study.quantity) <= FIRST_TOLERANCE * scale]
+    cheapest = [*{point.curve: point for point in held}.values()]
+    cheapest.sort(key=lambda point: point.seconds_per_second or 0.0)
+    return cheapest, len({point.curve for point in points}) - len(cheapest)
 
 
 def _ranges(study: TradeoffStudy) -> str:
