@@ -33,9 +33,9 @@ def of(cell: ChoiceCell, tolerance: float, date: str) -> ModelLines:
     scene = f'load_scene("{run.scene}", {", ".join(changed)})' if changed else f'"{run.scene}"'
     arguments = [scene, f'"{run.spec}"', f'tolerance="{100 * tolerance:g} %"', f'because="report of {date}"']
     test = [
-        *(["from proofroll import load_scene"] if changed else []),
-        "from proofroll.testing import assert_agrees",
-        *("", "", f"def test_{slug(run.scene).replace('-', '_')}():", "    assert_agrees("),
+        *(["from proofroll import load_scene", "", ""] if changed else []),
+        f"def test_{slug(run.scene).replace('-', '_')}(assert_agrees):",
+        "    assert_agrees(",
         *(f"        {argument}," for argument in [*arguments, f"until={run.until:g}"]),
         "    )",
     ]

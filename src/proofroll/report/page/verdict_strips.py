@@ -14,7 +14,7 @@ from proofroll.report.comparison.verdict_matrix import notes
 LOWEST, HIGHEST = -8, 4
 # Height of a strip and distance of dots above each other [px]; width of a place in which they hide each other [%].
 HEIGHT, RISE, WIDTH = 34, 6.4, 1.6
-_NOBODY = {Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE}
+_UNJUDGED = {Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE}
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ def place(value: float) -> float:
 
 
 def ranked(row: ReportedRow) -> list[WorstJudgement]:
-    """Quantities of a row, that which takes most of its tolerance first; those by which nobody is judged are last."""
-    return sorted(row.observables.values(), key=lambda item: (item.verdict in _NOBODY, -part(item)))
+    """Quantities of a row, that which takes most of its tolerance first; those by which none is judged are last."""
+    return sorted(row.observables.values(), key=lambda item: (item.verdict in _UNJUDGED, -part(item)))
 
 
 def strip(content: ReportedComparison) -> list[Dot]:
@@ -47,7 +47,7 @@ def strip(content: ReportedComparison) -> list[Dot]:
     taken: Counter[int] = Counter()
     dots = []
     for row in content.rows:
-        judged = [item for item in ranked(row)[:1] if item.verdict not in _NOBODY]
+        judged = [item for item in ranked(row)[:1] if item.verdict not in _UNJUDGED]
         for x in (place(part(item)) for item in judged):
             taken[round(x / WIDTH)] += 1
             count = taken[round(x / WIDTH)]
@@ -56,5 +56,5 @@ def strip(content: ReportedComparison) -> list[Dot]:
 
 
 def reason(row: ReportedRow) -> str:
-    """Why a row does not agree: the words of its file where they are about this verdict, else what was found."""
+    """Cause why a row does not agree: the words of its file where they are about its verdict, else its notes."""
     return row.claim.short if row.claim.short and row.verdict in row.claim.expect else "; ".join(notes(row))

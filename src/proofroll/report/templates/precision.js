@@ -23,7 +23,8 @@
       points: curve.points.filter(([, cost, , , errors]) => cost > 0 && errors[quantity] !== null && errors[quantity] <= LARGEST)
         .map(([step, cost, clean, verdict, errors, held]) => ({ step, cost, clean, verdict, error: errors[quantity], held: held[quantity], y: Math.max(errors[quantity], LEAST) })),
     }));
-    return found.filter(({ points }) => points.length);
+    // Of a setting the steps of which none is cheaper and as accurate.
+    return found.map((curve) => ({ ...curve, points: front(curve.points) })).filter(({ points }) => points.length);
   }
   function front(points) {
     const best = [];
