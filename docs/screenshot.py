@@ -18,15 +18,15 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WIDTH, MOST_HEIGHT, DENSITY = 1400, 1100, 2
 # A page of text and flat cells has few colours; a palette makes the file a third as large.
 COLOURS = 128
-# The end of the picture, and the first table of verdicts, which stands below it.
-COUNTS, VERDICTS = ".counts", ".matrix"
+# The end of the picture, and the first table of verdicts, which is folded below it.
+CARDS, FOLDED, VERDICTS = "#answer-cards", "#verdicts details", ".matrix"
 # Row for row: what the comparison file calls it, and its verdict.
 ROWS = """(table) => [...document.querySelector(table).querySelectorAll("tbody tr:not(.group, .note)")].map((row) =>
   [row.querySelector("th").title, row.querySelector(".v").textContent.trim().split(" ")[1]])"""
 
 
 def screenshot(report: Path, picture: Path) -> None:
-    """Photographs the first screen of a report: chips, cards and counts.
+    """Photographs the first screen of a report: chips, facts and cards.
 
     The verdicts of its first comparison are in the picture as text, under ``verdicts``: a test reads them there.
 
@@ -43,9 +43,11 @@ def screenshot(report: Path, picture: Path) -> None:
             viewport={"width": WIDTH, "height": MOST_HEIGHT}, device_scale_factor=DENSITY, color_scheme="light"
         )
         page.goto(report.resolve().as_uri())
-        end = page.locator(COUNTS).evaluate("(counts) => counts.getBoundingClientRect().bottom + 16")
+        end = page.locator(CARDS).evaluate("(cards) => cards.getBoundingClientRect().bottom + 16")
         area: Any = {"x": 0, "y": 0, "width": WIDTH, "height": min(end, MOST_HEIGHT)}
         image = Image.open(io.BytesIO(page.screenshot(clip=area)))
+        page.locator(FOLDED).first.evaluate("(fold) => { fold.open = true; }")
+        page.locator(VERDICTS).first.wait_for()
         said = PngInfo()
         said.add_text("verdicts", json.dumps(page.evaluate(ROWS, VERDICTS)))
         browser.close()

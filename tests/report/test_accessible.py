@@ -126,13 +126,13 @@ def test_text_differs_from_its_background(unfolded: Visit, scheme: str) -> None:
     ground = page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert (ground == "rgb(251, 251, 252)") == (scheme == "light")
     for verdict in ("agrees", "differs"):
-        assert page.locator(f".cell.{verdict}").count() > 0
+        assert page.locator(f".cell .v.{verdict}").count() > 0
     assert page.evaluate("reading.faint", LEAST_CONTRAST) == []
     faint = page.add_style_tag(
-        content=".cell.agrees { color: color-mix(in srgb, var(--agrees) 50%, var(--agrees-bg)) }"
+        content=".cell .v.agrees { color: color-mix(in srgb, var(--agrees) 50%, var(--agrees-bg)) }"
     )
     found = page.evaluate("reading.faint", LEAST_CONTRAST)
-    assert len(found) >= page.locator(".cell.agrees").count()
+    assert len(found) >= page.locator(".cell .v.agrees").count()
     faint.evaluate("(style) => style.remove()")
 
 

@@ -124,6 +124,130 @@ def test_an_engine_is_hidden_on_the_whole_page_and_in_the_answer(seen: Visit, sc
     assert seen.page.evaluate(SHOWN) == framed
 
 
+@pytest.fixture(scope="module")
+def two_kinds(everything: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page of the comparison and of another one whose scene is of another kind."""
+    content = everything.content
+    alike = [replace(line, study="again", scene="arm", group="trees") for line in content.table.lines]
+    again = replace(content.comparisons[0], name="again", title="Again", scene="arm", group="trees")
+    table = replace(content.table, lines=[*content.table.lines, *alike])
+    content = replace(content, comparisons=[content.comparisons[0], again], table=table)
+    both = replace(everything, content=content, curves=2 * everything.curves)
+    return both.write(tmp_path_factory.mktemp("kinds") / "report.html")
+
+
+@pytest.mark.drill
+def test_the_question_is_in_the_address(two_kinds: Path, visit: Visiting) -> None:
+    """Tolerance, forces, kind and open rows are written, survive a link to a place, and are read again."""
+    with visit(two_kinds, before=UNDRAWN) as first:
+        first.page.locator("#tolerance").focus()
+        first.page.keyboard.press("ArrowRight")
+        first.page.locator("#forces").check()
+        first.page.locator("#kind").select_option("trees")
+        first.wait("location.hash === '#tol=1e-5&forces=1&kinds=trees'")
+        first.page.locator("#choice [data-unfold='alpha']").press("Enter")
+        first.wait("location.hash.includes('open=alpha')")
+        first.page.locator(".rail a[href='#verdicts']").click()
+        first.wait("location.hash.endsWith('&at=verdicts') && location.hash.includes('tol=1e-5')")
+        kept = first.page.evaluate("location.hash")
+    with visit(two_kinds, kept, before=UNDRAWN) as again:
+        again.wait("document.getElementById('choice').dataset.at === '10'")
+        assert again.page.locator("#tolerance").input_value() == "5"
+        assert again.page.locator("#forces").is_checked()
+        assert again.page.locator("#kind").input_value() == "trees"
+        assert again.page.locator("#choice [data-unfold='alpha']").get_attribute("aria-expanded") == "true"
+        again.wait("document.getElementById('verdicts').getBoundingClientRect().top < innerHeight / 3")
+        assert again.page.locator("#answer-cards > li:visible h2").all_inner_texts() == ["Trees"]
+        assert all(text.endswith("for trees") for text in again.page.locator("#answer-chips li").all_inner_texts())
+        again.page.evaluate("location.hash = ''")
+        again.wait("document.getElementById('choice').dataset.at === '2'")
+        assert again.page.locator("#kind").input_value() == ""
+        assert again.messages == []
+
+
+def test_facts_stand_above_the_cards(two_kinds: Path, everything: Any, visit: Visiting) -> None:
+    """Agreement, silent errors, limits and statements of the paper are told of all scenes, or of the chosen kind."""
+    kept = everything.content.kept()
+    (statements, section), total = kept.statements[0], sum(kept.verdicts.values())
+    with visit(two_kinds, before=UNDRAWN) as seen:
+        facts = seen.page.locator("#facts > li")
+        told = [" ".join(text.split()) for text in facts.all_inner_texts()]
+        assert told[0].startswith(f"{2 * kept.verdicts['agrees']} of {2 * total} settings agree")
+        assert told[1].startswith(f"{2 * kept.silent} are wrong without a warning. Worst: {kept.worst}")
+        assert told[2].startswith(f"{kept.passed} of {kept.boundaries} limits of stability")
+        assert told[3].startswith(statements)
+        assert facts.locator("a").get_attribute("href") == f"#{section}"
+        ends = "['#facts', '#answer-cards'].map((name) => document.querySelector(name).getBoundingClientRect().top)"
+        above, below = seen.page.evaluate(ends)
+        assert above < below
+        seen.page.locator("#kind").select_option("trees")
+        seen.until(lambda: facts.count() == 2, what="facts of one kind")
+        assert f"of {total} settings" in facts.first.inner_text()
+        assert seen.page.locator("#answer-one tbody th").all_inner_texts() == ["arm"], "its scenes, beside its card"
+        edges = "['#answer-one', '#answer-cards'].map((name) => document.querySelector(name).getBoundingClientRect())"
+        scenes, cards = seen.page.evaluate(f"{edges}.map(({{ left, right }}) => [left, right])")
+        assert cards[1] < scenes[0]
+        assert cards[1] - cards[0] <= 340
+        seen.page.locator("#kind").select_option("")
+        seen.until(lambda: seen.page.locator("#answer-one *").count() == 0, what="all kinds")
+    assert everything.content.kept("trees").statements == []
+
+
+@pytest.mark.drill
+def test_the_back_button_returns_to_the_question_before(report_page: Path, visit: Visiting) -> None:
+    """Each question is a step of the back button, however far the slider was drawn; a fold is none."""
+    with visit(report_page, before=UNDRAWN) as seen:
+        slider = seen.page.locator("#tolerance")
+        slider.focus()
+        for decade in (5, 6):
+            seen.page.keyboard.press("ArrowRight")
+            seen.wait(f"location.hash === '#tol=1e-{decade}'")
+        seen.page.locator("#choice [data-unfold='alpha']").press("Enter")
+        seen.wait("location.hash.includes('open=alpha')")
+        seen.page.go_back()
+        seen.wait("location.hash === '#tol=1e-5'")
+        seen.until(lambda: slider.input_value() == "5", what="the slider is back")
+        seen.page.go_back()
+        seen.until(lambda: slider.input_value() == "4", what="the first question")
+        seen.wait("document.getElementById('choice').dataset.at === '2'")
+
+
+@pytest.mark.drill
+def test_the_link_to_an_answer_is_copied(report_page: Path, visit: Visiting) -> None:
+    """The button copies the address of the page with the question, and says so."""
+    copied = "window.copied = []; navigator.clipboard.writeText = async (text) => { copied.push(text); };"
+    with visit(report_page, "#tol=1e-6", before=UNDRAWN + copied) as seen:
+        button = seen.page.get_by_role("button", name="Copy link to this answer")
+        button.click()
+        seen.wait("copied.length === 1")
+        assert seen.page.evaluate("copied[0]") == f"{report_page.as_uri()}#tol=1e-6"
+        seen.until(lambda: seen.page.locator(".ask .copy").inner_text() == "copied", what="copied")
+
+
+@pytest.mark.drill
+def test_lines_for_a_model_follow_the_question(written: tuple[Any, Path], visit: Visiting) -> None:
+    """A row's and a card's button open a command and a test of the cheapest engine, and of any other that holds it."""
+    copied = "window.copied = []; navigator.clipboard.writeText = async (text) => { copied.push(text); };"
+    with visit(written[1] / "report.html", before=UNDRAWN + copied) as seen:
+        dialog, title = seen.page.locator("#model"), seen.page.locator("#model-title")
+        for button in ("#answer-cards [data-model]", "#uses [data-model]"):
+            seen.page.locator(button).first.click()
+            dialog.wait_for()
+            taken = seen.page.locator("#uses tbody tr:not(.group) b").first.inner_text()
+            assert title.inner_text().endswith(taken)
+            seen.page.keyboard.press("Escape")
+            dialog.wait_for(state="hidden")
+        ask(seen, 8, False)
+        seen.page.locator("#uses [data-model]").first.click()
+        assert 'tolerance="1e-06 %"' in dialog.inner_text()
+        dialog.get_by_role("button", name="copy: Check it").click()
+        seen.wait("copied.length === 1")
+        assert seen.page.evaluate("copied[0]").startswith("proofroll compare sphere_in_cylinder --engine ")
+        dialog.get_by_role("button", name="Close").click()
+        dialog.wait_for(state="hidden")
+        assert seen.messages == []
+
+
 def test_cells_lead_to_their_evidence(seen: Visit) -> None:
     """Each link of the matrix has its target on the page."""
     there: list[bool] = seen.page.evaluate(

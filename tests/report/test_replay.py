@@ -32,7 +32,7 @@ from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.replay import library as replay_library
 from proofroll.report.replay.library import thinned, three
-from proofroll.report.replay.replay import WIDEST_TURN, frame_times, replay_content
+from proofroll.report.replay.replay import WIDEST_TURN, frame_times, joined, replay_content
 
 SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02
 
@@ -223,6 +223,17 @@ def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) ->
     assert {ball["name"]: ball["shown"] for ball in balls}["alpha fine, matched, dt 1e-3 s"] is False
 
 
+def test_it_begins_where_a_ghost_is_furthest_off(made: Any) -> None:
+    """Of all cases, also of another kind, that of the largest distance; without any the scene as it is."""
+    assert replay_content([made[0]], BallReport.replay()).start == 1, "speed=4, as the scene is"
+    found = replay_content([moved(made, "beta", lambda p: p + np.array([0.0, 0.0, 0.1]))], BallReport.replay())
+    assert (found.start, found.largest) == (0, pytest.approx(0.1))
+    near = replace(found, largest=0.05, start=1)
+    both = joined([near, found])
+    assert both is not None
+    assert both.start == len(near.cases) + found.start
+
+
 def test_a_ball_that_flies_off_is_dropped_where_it_leaves(made: Any) -> None:
     """A ghost beyond all bounds has frames until it leaves the picture, and the page says when that is."""
     whole = replay_with(made, "beta", lambda p: np.concatenate([p[:25], 1e9 * p[25:]]))
@@ -396,6 +407,23 @@ def test_errors_of_ghosts_stand_below_the_picture(
         opened.wait("Math.abs(parseFloat(document.querySelector('[data-errors=now]').style.left) - 75) < 1")
         opened.page.locator('[data-part="runs"] input').first.uncheck()
         opened.wait("document.querySelector('[data-part=errors] polyline').style.display === 'none'")
+        assert opened.messages == []
+
+
+@pytest.mark.drill
+def test_a_case_opens_at_the_largest_error_in_sight(
+    made: Any, content: ReportContent, tmp_path: Path, visit: Visiting
+) -> None:
+    """The time shown first is that at which a visible ghost is furthest off; where none is, the start."""
+    file, times = tmp_path / "report.html", np.linspace(0, UNTIL, round(UNTIL / EVERY) + 1)
+    off = 2e-2 * np.exp(-(((times - 0.6) / 0.1) ** 2))
+    replay = replay_content([moved(made, "beta", lambda p: p + off[:, None, None])], BallReport.replay())
+    file.write_text(page(content, [[]], replay=replay), encoding="utf-8")
+    with visit(file, viewport=SMALL) as opened:
+        opened.near(".replay", "document.querySelector('.replay').dataset.ready === ''")
+        opened.until(lambda: abs(clock(opened) - 0.6) < 0.01, what="the time of the largest error")
+        part(opened, "case").select_option("1")
+        opened.until(lambda: clock(opened) == 0, what="the start of a case that agrees")
         assert opened.messages == []
 
 

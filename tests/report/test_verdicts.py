@@ -18,7 +18,6 @@ from rich.console import Console
 from proofroll.core.convergence import Limit, richardson
 from proofroll.core.engine_abilities import Level
 from proofroll.core.verdict import Verdict
-from proofroll.report.comparison import tables
 from proofroll.report.comparison.conclusions import conclusions
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.comparison.records import ReportedComparison
@@ -27,7 +26,7 @@ from proofroll.report.comparison.verdict_matrix import counted, rows_by_engine, 
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, choice_matrix
 from proofroll.report.page.first_sentences import three_sentences
-from proofroll.report.page.html import page, templates
+from proofroll.report.page.html import page
 from proofroll.report.page.records import report_content
 from proofroll.report.terminal.verdicts import verdict_parts
 from proofroll.running.case import Result, Status
@@ -123,9 +122,6 @@ def test_the_price_of_compiling_is_told(made: tuple[Outcome, Store]) -> None:
     quick, slow = (printed(content) for content in contents)
     assert "    24 s before its first step" in slow.splitlines()
     assert "first step" not in quick
-    pages = [str(templates().get_template("parts.html").module.matrix(one, None, "", "")) for one in contents]
-    assert ["before <small>s</small>" in page for page in pages] == [False, True]
-    assert re.search(r'<td class="n">24</td>', pages[1])
 
 
 def test_a_refusal_hides_no_difference_and_no_failure(made: tuple[Outcome, Store]) -> None:
@@ -353,14 +349,3 @@ def test_every_verdict_is_documented() -> None:
     for verdict in Verdict:
         assert f"| {SYMBOLS[verdict]} *{verdict}* |" in page
         assert f"`{verdict}`" in json
-
-
-def test_a_comparison_that_is_not_timed_shows_its_rough_cost(made: tuple[Outcome, Store]) -> None:
-    """The verdict table has the cost of the judged run, marked as rough, and a dash only where nothing ran."""
-    outcome, _ = made
-    results = [dataclasses.replace(run.result, seconds_per_second=None, timings=[]) for run in outcome.runs]
-    results[0] = dataclasses.replace(results[0], wall_seconds=0.25, processor={"advance": 0.2})
-    runs = [dataclasses.replace(run, result=item) for run, item in zip(outcome.runs, results, strict=True)]
-    rows = outcome_content(dataclasses.replace(outcome, runs=runs)).rows
-    assert tables.cost_cell(rows[0], []) == ("≈ 0.2", "of one run beside which others ran: to a factor of about two")
-    assert tables.cost_cell(rows[-1], []) == ("–", "not timed")

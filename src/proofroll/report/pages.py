@@ -28,8 +28,8 @@ _KEY = re.compile(r"<td\b[^>]* data-key\b[^>]*>(.*?)</td>", re.DOTALL)
 
 # What is no running text, and what is: between two tags. A browser breaks a line at the hyphen of ``1e-3``.
 _NO_TEXT = re.compile(r"(<(script|style|svg|option|title)\b.*?</\2>)", re.DOTALL)
-_TEXT = re.compile(r"(?:^|>)([^<]*\de-\d[^<]*)(?=<)")
-_EXPONENT = re.compile(r"\d[\d.]*e-\d+(?: (?:s|m|N|J|rad)\b(?:/s)?)?")
+_TEXT = re.compile(r"(?:^|>)([^<]*(?:\de-\d|\bdt \d)[^<]*)(?=<)")
+_EXPONENT = re.compile(r"(?:\b(?:dt|rtol) )?\d[\d.]*e-\d+(?: (?:s|m|N|J|rad)\b(?:/s)?)?|\bdt \d[\d.]* s\b")
 _WORDS = 12  # of a label or a name in an address
 
 

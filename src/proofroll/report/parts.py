@@ -61,8 +61,8 @@ class Part(Protocol):
         order: position among the parts of a report, the smallest first.
         words: name of the part, for a person.
         command: arguments of ``proofroll`` that make it, with fields of ``asked`` as in ``stability {.scene}``.
-        template: in the folder ``templates`` beside the class's module, with the macros
-            ``section(entry, index, pictures, content)`` and ``link(entry, index, count)``; the latter for the contents.
+        template: in the folder ``templates`` beside the class's module, with the macro
+            ``section(entry, index, pictures, content)``.
         names: additional names for the template; they must differ from those of other parts.
         asked: content of its file.
         engines: engines that the study is restricted to; empty: all.

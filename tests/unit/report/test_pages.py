@@ -67,6 +67,8 @@ def test_numbers_in_running_text_are_kept_whole() -> None:
     """In sentences, lists and labels, with their unit; one alone in a cell, attributes, scripts and pictures stay."""
     whole = '<span class="whole">1e-4</span>'
     assert unbroken("<td>0, 1e-4, 0</td>") == f"<td>0, {whole}, 0</td>"
+    assert unbroken("<b>tuned, dt 0.05 s</b>") == '<b>tuned, <span class="whole">dt 0.05 s</span></b>'
+    assert unbroken("<b>a, rtol 1e-6</b>") == '<b>a, <span class="whole">rtol 1e-6</span></b>'
     assert unbroken("<b>to 1e-4</b> and 1e-4.<i></i>") == f"<b>to {whole}</b> and {whole}.<i></i>"
     assert unbroken("<i><svg></svg>to 1e-4 so</i>") == f"<i><svg></svg>to {whole} so</i>"
     for unit in ("s", "s/s", "m", "N"):

@@ -96,16 +96,6 @@ def cost_title(run: ReportedRun) -> str:
     return f"median of {len(run.timings)} clean runs; {cost_interval(run.cost)} s/s holds it with {percent}"
 
 
-def cost_cell(row: ReportedRow, runs: Sequence[ReportedRun]) -> tuple[str, str]:
-    """Text of the cost of a row's slowest case [s/s], rough ones after ``≈``, and a sentence that describes it."""
-    if row.seconds_per_second is not None:
-        slowest = next(run for run in runs if run.seconds_per_second == row.seconds_per_second)
-        return number(row.seconds_per_second), cost_title(slowest)
-    if row.rough_cost is None:
-        return "–", "not timed"
-    return f"≈ {number(row.rough_cost)}", "of one run beside which others ran: to a factor of about two"
-
-
 def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
     """Reasons for quantities of a certificate to differ by more than round-off: reason -> quantities."""
     quantities: dict[str, list[str]] = {}

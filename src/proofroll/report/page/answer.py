@@ -135,6 +135,35 @@ class ColumnAnswer:
         best_of = {name: item for *_, item, name in reversed(entries)}
         return [item for *_, item, name in entries if best_of[name] is item][:_REASONS]
 
+    def _sizes(self, name: str, setting: str, *, own: bool) -> list[tuple[float, str]]:
+        """Sizes that a method of candidates gives of settings that begin with ``setting``, and their names.
+
+        ``own``: at the step of their row alone.
+        """
+        sizes = {}
+        for row in self.matrix.rows:
+            chosen = row.engine not in self.matrix.witnesses if self.engines is None else row.engine in self.engines
+            if not chosen or row.own_equations or not row.setting.startswith(setting or row.setting or "-"):
+                continue
+            for study in self.column.studies:
+                items = row.found.get(study, ())
+                first = {item.row: item for item in reversed(items)}
+                for item in first.values() if own else items:
+                    size = getattr(item, name)(self.asked.forces)
+                    if size is not None and math.isfinite(size):
+                        sizes[size] = f"{take_words(self.matrix, row)}, {row.setting}"
+        return sorted(sizes.items())
+
+    @property
+    def most_accurate(self) -> tuple[float, str] | None:
+        """Least error that a setting keeps without luck, relative to the quantity's size, and the setting."""
+        return next(iter(self._sizes("tolerance", "", own=False)), None)
+
+    @property
+    def worst_default(self) -> tuple[float, str] | None:
+        """Largest error of an engine's default setting, relative to the quantity's size, and the setting."""
+        return next(reversed(self._sizes("error", "default", own=True)), None)
+
     @property
     def next_words(self) -> str:
         """The next engine and what it costs relative to the one to take; or what it does not do."""
@@ -213,6 +242,10 @@ class FirstAnswer:
     def scenes(self) -> list[ColumnAnswer]:
         """Answers for single scenes."""
         return [item for item in self.columns if not item.column.whole]
+
+    def chips_of(self, group: str) -> list[Chip]:
+        """Chips of one kind of scenes."""
+        return [chip for item in self.kinds if item.column.group == group for chip in _chips(item.matrix, [item])]
 
     @property
     def sentence(self) -> str:

@@ -41,6 +41,8 @@ class Candidate:
 
     Attributes:
         row: number of its row in the study.
+        spec: engine with all of it, as a command has it: ``name[key=value,…]``.
+        scene, place, until: name of the scene, its changed parameters in words, and the length of the run [s].
         name: engine, formulation, setting and step, for a person.
         setting: engine, formulation and setting, without the step.
         step: its step [s] or tolerance; None: it has neither.
@@ -57,6 +59,10 @@ class Candidate:
     """
 
     row: int
+    spec: str
+    scene: str
+    place: str
+    until: float
     name: str
     setting: str
     step: float | None
@@ -132,6 +138,10 @@ def _candidate(
     held = [_worst([largest(lines, role, bounds) for lines in judged.values()]) for role in _ROLES]
     return Candidate(
         row=table_line.row,
+        spec=_spec(table_line, value),
+        scene=table_line.scene,
+        place=table_line.place,
+        until=table_line.until,
         name=name,
         setting=_name(table_line, None),
         step=value,
@@ -204,6 +214,14 @@ def _ladder(lines: Sequence[TableLine], role: str) -> LadderResult:
 def _worst(errors: Sequence[float | None]) -> float | None:
     sizes = [item for item in errors if item is not None]
     return max(sizes) if sizes and len(sizes) == len(errors) else None
+
+
+def _spec(line: TableLine, value: float | None) -> str:
+    """Engine with formulation, preset, further options and step, as a command has it."""
+    options = [f"{key}={word}" for key in ("formulation", "preset") if (word := getattr(line, key))]
+    options += [word for word in line.setting.split() if "=" in word]
+    options += [f"{line.resolution}={value!r}"] if line.resolution and value is not None else []
+    return f"{line.engine}[{','.join(options)}]" if options else line.engine
 
 
 def _name(line: TableLine, value: float | None) -> str:

@@ -44,6 +44,7 @@ class ChoiceCell(NamedTuple):
         scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
         engine, formulation: names of an engine and its best formulation, or of several; empty: not of an engine.
         by_scene: best cell of that engine in each scene.
+        run: the run that holds the tolerance.
     """
 
     state: str
@@ -60,6 +61,7 @@ class ChoiceCell(NamedTuple):
     engine: str = ""
     formulation: str = ""
     by_scene: tuple["ChoiceCell", ...] = ()
+    run: Candidate | None = None
 
     @property
     def holds(self) -> bool:
@@ -167,6 +169,7 @@ def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> Choic
             clean=item.clean,
             open=is_open,
             name=item.name,
+            run=item,
         )
     if sized:
         size, item = min(sized, key=lambda entry: entry[0])

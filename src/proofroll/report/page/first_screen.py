@@ -11,7 +11,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.page.answer import FirstAnswer, answer
+from proofroll.report.page.answer import Chip, FirstAnswer, answer
 from proofroll.report.page.choice_cell import CANNOT, NO_RUN, PARTLY, ChoiceCell
 from proofroll.report.page.choice_matrix import (
     ASKED,
@@ -22,6 +22,7 @@ from proofroll.report.page.choice_matrix import (
 )
 from proofroll.report.page.profile import Profile, profile
 from proofroll.report.pages import addressed, packed, unbroken
+from proofroll.report.parts import Part, PartEntry, part_kinds
 from proofroll.report.pen import Disc, Lettering, Picture, Polyline
 
 if TYPE_CHECKING:
@@ -182,6 +183,19 @@ class FirstScreen:
         """Title of a kind of scenes."""
         return next(column.title for column in self.matrix.kinds if column.group == group)
 
+    def scene_of(self, kind: ChoiceColumn, place: int) -> ChoiceColumn:
+        """Column of one scene of a kind."""
+        return [column for column in self.matrix.columns if not column.whole and column.group == kind.group][place]
+
+    @property
+    def chapters(self) -> dict[str, list[tuple[type[Part], PartEntry, int]]]:
+        """Further studies of each scene: their kind, their entry, and its number among those of the kind."""
+        chapters: dict[str, list[tuple[type[Part], PartEntry, int]]] = {}
+        for kind in part_kinds():
+            for index, entry in enumerate(self.content.entries[kind.key]):
+                chapters.setdefault(entry.scene, []).append((kind, entry, index))
+        return chapters
+
     @cached_property
     def pictures(self) -> dict[str, Picture]:
         """Small picture of each scene that is drawn, by its name."""
@@ -216,7 +230,15 @@ class FirstScreen:
             screens[" ".join(chosen)] = [
                 {
                     "asked": answered.question.words,
-                    "chips": str(macros.chips(answered)),  # type: ignore[attr-defined]
+                    "chips": {
+                        group: str(macros.chips(chips))  # type: ignore[attr-defined]
+                        for group, chips in _chips_by_kind(answered).items()
+                    },
+                    "one": {
+                        group: unbroken(str(macros.one(self, item)))  # type: ignore[attr-defined]
+                        for item in answered.kinds
+                        for group in [item.column.group, *([""] if len(answered.kinds) == 1 else [])]
+                    },
                     "cards": unbroken(str(macros.cards(self, answered))),  # type: ignore[attr-defined]
                     "profile": str(macros.profile(profile(self.matrix, answered, chosen))),  # type: ignore[attr-defined]
                     "use": unbroken(addressed(str(macros.use(self, answered)))),  # type: ignore[attr-defined]
@@ -224,8 +246,32 @@ class FirstScreen:
                 }
                 for answered in answers
             ]
-        content = {"cells": cells, "grid": grid, "screens": screens}
+        groups = ["", *(column.group for column in self.matrix.kinds)]
+        facts = {group: str(macros.facts(self.content.kept(group))) for group in groups}  # type: ignore[attr-defined]
+        texts: dict[str, int] = {}
+        models = [
+            {
+                f"{column.group} {column.name}": {
+                    cell.engine: texts.setdefault(
+                        str(macros.model(self, column, cell, tolerance)),  # type: ignore[attr-defined]
+                        len(texts),
+                    )
+                    for cell in self.matrix.standings(column, tolerance, need)
+                    if cell.holds
+                }
+                for column in self.matrix.columns
+                if not column.whole
+            }
+            for need, tolerance in ASKED
+        ]
+        content = {"cells": cells, "grid": grid, "screens": screens, "facts": facts}
+        content |= {"models": models, "texts": [*texts]}
         return packed(json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "replace"))
+
+
+def _chips_by_kind(answered: FirstAnswer) -> dict[str, list[Chip]]:
+    """Chips of each kind of scenes by its name, and of all under the empty one."""
+    return {"": answered.chips} | {item.column.group: answered.chips_of(item.column.group) for item in answered.kinds}
 
 
 def bar(cell: ChoiceCell) -> int:

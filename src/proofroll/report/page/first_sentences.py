@@ -12,7 +12,7 @@ from proofroll.report.comparison.spread import ALONE
 from proofroll.report.labels import off_by, with_caveat
 from proofroll.report.page.answer import answer
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
-from proofroll.report.parts import PartEntry
+from proofroll.report.parts import PartEntry, part_kinds
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class Kept:
         silent: number of settings that are wrong though every run ended as done.
         worst: the one furthest off, and by how much; empty without any.
         passed, boundaries: limits of stability or accuracy that are passed without a warning, of how many.
+        statements: count of the statements of each reproduced article that hold, and its section.
     """
 
     verdicts: dict[str, int]
@@ -31,6 +32,7 @@ class Kept:
     worst: str
     passed: int
     boundaries: int
+    statements: list[tuple[str, str]]
 
 
 def kept(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]]) -> Kept:
@@ -45,6 +47,13 @@ def kept(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequen
         worst=f"{name}, {text}" if wrong else "",
         passed=sum(study.silent for study in maps),
         boundaries=sum(study.boundaries for study in maps),
+        statements=[
+            (kind.line(entry), entry.section)
+            for kind in part_kinds()
+            if kind.key == "figures"
+            for entry in entries.get(kind.key, ())
+            if entry.study is not None
+        ],
     )
 
 

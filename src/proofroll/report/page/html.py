@@ -19,8 +19,8 @@ from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
-from proofroll.report.page import profile
-from proofroll.report.page.answer import LENGTHS, speed_range
+from proofroll.report.page import model_lines, profile, verdict_strips
+from proofroll.report.page.answer import LENGTHS, speed_range, told
 from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE
 from proofroll.report.page.first_screen import STATES, FirstScreen, bar, look
 from proofroll.report.pages import environment, folded, packed, rendered, slug
@@ -125,6 +125,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
     made.globals |= {
         "tables": tables,
         "verdict_matrix": verdict_matrix,
+        "strips": verdict_strips,
         "names": labels.names,
         "curve_names": labels.curve_names,
         "step": labels.step,
@@ -143,12 +144,14 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "look": look,
         "bar": bar,
         "speed_range": speed_range,
+        "told": told,
+        "model_lines": model_lines,
         "lengths": LENGTHS,
         "profiles": profile,
         "loop_key": slug,
+        "scene_words": lambda name: name.rpartition("/")[2].replace("_", " ").capitalize(),
         "again": _again,
         "host_sentences": host_sentences,
-        "part_kinds": part_kinds(),
         "report_kinds": report_kinds(),
     }
     for kind in kinds:

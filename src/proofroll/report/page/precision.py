@@ -1,7 +1,6 @@
 """Work–precision pictures of a study: error against cost of every run."""
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -56,12 +55,6 @@ class WorkPrecision:
 
     quantities: list[str]
     curves: list[PrecisionCurve]
-
-    @property
-    def entries(self) -> list[int]:
-        """Number of curves of each engine in the picture of the first quantity; they decide its height."""
-        drawn = (x.engine for x in self.curves if any(_is_drawn(p) for p in x.points))
-        return list(Counter(drawn).values())
 
 
 def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:
@@ -125,9 +118,3 @@ def _shown(sizes: Sequence[float | None]) -> list[float | None]:
 
 def _short(value: float) -> float:
     return float(f"{value:.3g}")
-
-
-def _is_drawn(point: PrecisionPoint) -> bool:
-    """True if a point of the first quantity is drawn: it has a cost, and an error no larger than the quantity."""
-    error = point.errors[0]
-    return point.cost > 0 and error is not None and error <= 1.0

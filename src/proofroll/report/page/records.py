@@ -168,10 +168,14 @@ class ReportContent:
         """Sheet of each scene by its name."""
         return {item.scene: item.evidence.sheet for item in reversed(self.comparisons) if item.evidence is not None}
 
-    @property
-    def kept(self) -> Kept:
-        """Counts of verdicts, of settings that are silently wrong, and of limits that are passed silently."""
-        return kept(self.comparisons, self.entries)
+    def kept(self, group: str = "") -> Kept:
+        """Facts of all scenes, or of a group's: agreement, silent errors, limits passed, statements that hold."""
+        comparisons = [item for item in self.comparisons if group in {"", item.group}]
+        scenes = {item.scene for item in comparisons}
+        entries = {
+            key: [item for item in items if not group or item.scene in scenes] for key, items in self.entries.items()
+        }
+        return kept(comparisons, entries)
 
     @property
     def beyond_budget(self) -> str:

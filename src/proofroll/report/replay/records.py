@@ -166,7 +166,8 @@ class Replay:
 
     Attributes:
         library: three.js from :func:`proofroll.report.replay.library.three`, or None.
-        start: number of the case to begin with.
+        start: number of the case to begin with, in which a ghost is furthest off.
+        largest: distance of that ghost [m].
         cases: descriptions of the cases.
         packed: the numbers of each case.
         speeds: speeds of the replay that a person can choose.
@@ -177,3 +178,4 @@ class Replay:
     cases: list[ReplayCase]
     packed: list[str]
     speeds: tuple[float, ...] = SPEEDS
+    largest: float = 0.0

@@ -40,7 +40,8 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind, page_engines: Sequ
             if point.reference is not None and np.isfinite(point.reference.dataset["p_WB"]).all():
                 shown_in.setdefault(point.case.key, (point, []))[1].append((outcome, name))
     looks = {id(outcome): _looks(outcome, page_engines) for outcome in outcomes}
-    cases, numbers = [], []
+    digests = {outcome.scene.digest for outcome in outcomes}
+    cases, numbers, furthest = [], [], []
     for point, shared in shown_in.values():
         assert point.reference is not None  # only points with a truth are listed
         true = point.reference.dataset["p_WB"].to_numpy()
@@ -62,18 +63,21 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind, page_engines: Sequ
         content, packed_numbers = case_content(replayed, kind)
         cases.append(content)
         numbers.append(packed_numbers)
-    digests = {outcome.scene.digest for outcome in outcomes}
-    start = next((number for number, (point, _) in enumerate(shown_in.values()) if point.scene.digest in digests), 0)
-    return Replay(three(), start, cases, numbers)
+        off = max((ghost.distance for ghost in ghosts if np.isfinite(ghost.distance)), default=0.0)
+        furthest.append((off, point.scene.digest in digests))
+    largest = max(furthest, default=(0.0, False))
+    return Replay(three(), furthest.index(largest) if furthest else 0, cases, numbers, largest=largest[0])
 
 
 def joined(parts: list[Replay]) -> Replay | None:
-    """One replay of several kinds of scenes, starting with the first; None if no part has cases."""
+    """One replay of several kinds of scenes, starting where a ghost is furthest off; None if no part has cases."""
     parts = [part for part in parts if part.cases]
     if not parts:
         return None
     cases, numbers = [case for part in parts for case in part.cases], [item for part in parts for item in part.packed]
-    return replace(parts[0], cases=cases, packed=numbers)
+    worst = max(parts, key=lambda part: part.largest)
+    before = sum(len(part.cases) for part in parts[: parts.index(worst)])
+    return replace(worst, start=before + worst.start, cases=cases, packed=numbers)
 
 
 def frame_times(until: float, fastest: float) -> FloatArray:

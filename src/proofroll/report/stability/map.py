@@ -2,47 +2,23 @@
 
 from __future__ import annotations
 
-import math
-import string
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from proofroll.core.engine_abilities import by_hand
 from proofroll.core.number_format import number
+from proofroll.core.verdict import Verdict
 from proofroll.report.labels import engine_title, name_of, step
 from proofroll.report.pages import slug
-from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, NOT_RUN, REFUSED, TOO_SLOW, WRONG_MODEL
+from proofroll.studies.failure import NOT_RUN, REFUSED
 
 if TYPE_CHECKING:
     from proofroll.studies.stability.axes import Axis
     from proofroll.studies.stability.records import BoundaryPoint, StabilityStudy
 
-# Letters for kinds of failure beyond a boundary, in any scene; "!" is added where the engine was silent.
-_LETTERS = {
-    DIVERGED: "d",
-    LOST_PHASE: "p",
-    GAVE_UP: "g",
-    CRASHED: "x",
-    TOO_SLOW: "t",
-    REFUSED: "r",
-    WRONG_MODEL: "m",
-}
-# Steps per natural time with the lightest and the darkest colour; tolerances are coloured by their decades.
-_FEWEST, _MOST = 8.0, 1e5
-_TOLERANCE_DECADES = 13
-
-
-def letters(study: StabilityStudy) -> dict[str, str]:
-    """Letter of each kind of failure; kinds without a fixed one take the first free letter of their name."""
-    letter_of = dict(_LETTERS)
-    for kind in study.meanings:
-        if kind not in letter_of:
-            left = (
-                letter
-                for letter in kind + string.ascii_letters
-                if letter.isalpha() and letter not in letter_of.values()
-            )
-            letter_of[kind] = next(left, kind)
-    return letter_of
+# Steps per natural time beyond which a setting that is right is dear: twice those of a smooth curve.
+_MANY = 130
 
 
 def address(point: BoundaryPoint) -> str:
@@ -50,20 +26,19 @@ def address(point: BoundaryPoint) -> str:
     return slug(f"{point.curve} {point.axis} {point.value:g}")
 
 
-def cell(study: StabilityStudy, point: BoundaryPoint) -> tuple[str, float | None]:
-    """Text of a cell and its colour, from 0 (lightest, cheap) to 1 (darkest); None: no colour."""
-    largest, failure = point.largest_accurate, point.failure
-    beyond = (letters(study).get(failure, failure) + ("!" if point.silent else "")) if failure else ""
+def cell(point: BoundaryPoint) -> tuple[str, str]:
+    """Text of a cell, steps per natural time or the tolerance that are accurate, and the verdict that it looks like."""
+    largest = point.largest_accurate
+    if point.failure == REFUSED:
+        return "⊘", Verdict.REFUSED
     if point.problem:
-        return f"? {beyond}".strip(), None
+        return "?", Verdict.NOT_JUDGED
     if largest is None:
-        return f"– {beyond}".strip(), None
+        return "–", Verdict.DIFFERS
     if point.resolution != "dt":
-        text, shade = number(largest), -math.log10(largest) / _TOLERANCE_DECADES
-    else:
-        steps = point.period / largest
-        text, shade = f"{steps:.0f}", math.log(max(steps, _FEWEST) / _FEWEST) / math.log(_MOST / _FEWEST)
-    return f"{text} {beyond}".strip(), min(max(shade, 0.0), 1.0)
+        return number(largest), Verdict.AGREES
+    steps = point.period / largest
+    return f"{float(f'{steps:.2g}'):g}", Verdict.AGREES if steps <= _MANY else Verdict.CONVERGES
 
 
 @dataclass(frozen=True)
@@ -72,30 +47,48 @@ class HeatMap:
 
     Attributes:
         axes: axes with points, each with the values that have points.
-        groups: engine -> rows of the table: name of a setting, and in each column the number of its point, or None.
-        letters: letters that occur, and the failures that they stand for.
+        groups: engine -> rows of the table: name of a setting, and in each column its point, or None.
+        sentences: engine -> where its settings are right, and how often they are wrong without a warning.
     """
 
     axes: list[Axis]
-    groups: dict[str, list[tuple[str, list[int | None]]]]
-    letters: dict[str, str]
+    groups: dict[str, list[tuple[str, list[BoundaryPoint | None]]]]
+    sentences: dict[str, str]
 
 
 def heat_map(study: StabilityStudy) -> HeatMap:
-    """Heat map as a table, by engine and axis."""
+    """Heat map as a table, by engine and axis; equations solved for the scene by hand have no row beside engines."""
+    shown = [point for point in study.points if not by_hand(point.level)] or study.points
     mapped = [
-        replace(axis, values=list(dict.fromkeys(point.value for point in study.points if point.axis == axis.name)))
+        replace(axis, values=list(dict.fromkeys(point.value for point in shown if point.axis == axis.name)))
         for axis in study.axes
     ]
     axes = [axis for axis in mapped if axis.values]
     columns = [(axis.name, value) for axis in axes for value in axis.values]
-    numbers = {(point.curve, point.axis, point.value): number for number, point in enumerate(study.points)}
-    groups: dict[str, list[tuple[str, list[int | None]]]] = {}
-    for curve, point in {point.curve: point for point in study.points}.items():
+    at = {(point.curve, point.axis, point.value): point for point in shown}
+    groups: dict[str, list[tuple[str, list[BoundaryPoint | None]]]] = {}
+    for curve, point in {point.curve: point for point in shown}.items():
         name = name_of(point).removeprefix(engine_title(point.engine)).strip(", ") or curve
-        groups.setdefault(point.engine, []).append((name, [numbers.get((curve, *column)) for column in columns]))
-    seen = {point.failure for point in study.points}
-    return HeatMap(axes, groups, {letter: kind for kind, letter in letters(study).items() if kind in seen})
+        groups.setdefault(point.engine, []).append((name, [at.get((curve, *column)) for column in columns]))
+    return HeatMap(axes, groups, {engine: _sentence(rows) for engine, rows in groups.items()})
+
+
+def _sentence(rows: Sequence[tuple[str, Sequence[BoundaryPoint | None]]]) -> str:
+    """Sentence on an engine's settings, alike ones together: at how many places they are right, and what they hide."""
+    alike: dict[str, list[str]] = {}
+    silent, limits = 0, 0
+    for name, cells in rows:
+        points = [point for point in cells if point is not None and not point.problem]
+        right = sum(point.largest_accurate is not None for point in points)
+        words = "everywhere" if right == len(points) else f"at {right} of {len(points)} places" if right else "nowhere"
+        alike.setdefault(words, []).append(name)
+        silent += sum(point.silent for point in points)
+        limits += sum(bool(point.failure) for point in points)
+    text = "; ".join(f"{', '.join(names)} right {words}" for words, names in alike.items())
+    hidden = (
+        f"wrong without a warning beyond {silent} of {limits} limits" if silent else "never wrong without a warning"
+    )
+    return f"{text}; {hidden}."
 
 
 def reporting(point: BoundaryPoint) -> str:

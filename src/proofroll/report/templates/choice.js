@@ -3,7 +3,7 @@
   const table = document.getElementById("choice");
   if (!table) return;
   const place = (id) => document.getElementById(id);
-  const slider = place("tolerance"), forces = place("forces");
+  const slider = place("tolerance"), forces = place("forces"), kind = place("kind");
   const first = {{ decades.start }}, count = {{ decades|length }}, lengths = {{ lengths|tojson }};
   const rows = [...table.querySelectorAll("[data-place]")];
   const boxes = [...document.querySelectorAll("[name=engine]")];
@@ -15,12 +15,14 @@
     const decade = Number(slider.value), asked = (forces.checked ? count : 0) + decade - first;
     place("tolerated").textContent = `1e-${decade}`;
     slider.setAttribute("aria-valuetext", `1e-${decade} of the path, ${lengths[decade]} per metre`);
-    place("in-words").textContent = `${lengths[decade]} of error per metre of path${forces.checked ? `, and 1e-${decade} of the largest force` : ""}`;
     const data = JSON.parse(await unpack("choices"));
     const gone = off(), chosen = rivals.filter((name) => !gone.has(name)), own = data.screens[chosen.join(" ")];
     const screen = (own ?? data.screens[rivals.join(" ")])[asked];
     place("asked").textContent = `The cheapest that holds ${screen.asked}${own && gone.size ? `, of ${chosen.map(title).join(" and ")} alone` : ""}:`;
-    for (const part of ["chips", "cards", "profile", "use"]) place(`answer-${part}`).innerHTML = screen[part];
+    place("answer-chips").innerHTML = screen.chips[kind.value];
+    place("answer-one").innerHTML = screen.one[kind.value] ?? "";
+    place("facts").innerHTML = data.facts[kind.value];
+    for (const part of ["cards", "profile", "use"]) place(`answer-${part}`).innerHTML = screen[part];
     rows.forEach((row, i) => [...row.cells].slice(1).forEach((cell, j) => {
       const [look, inner] = data.cells[data.grid[i][j][asked]];
       cell.className = `s-${look} ${cell.classList.contains("of-kind") ? "of-kind" : "of-scene"}${screen.best[j] === i ? " best" : ""}`;
@@ -34,11 +36,30 @@
   function hide(within) {
     const gone = off();
     within.querySelectorAll("[data-engine]").forEach((part) => part.classList.toggle("off", gone.has(part.dataset.engine)));
+    within.querySelectorAll("[data-kind]").forEach((part) => { part.hidden = kind.value !== "" && part.dataset.kind !== kind.value; });
   }
   everywhere(hide);
+  // A step of the back button when a control is let go; the answer follows while the slider is drawn.
   slider.addEventListener("input", show);
-  forces.addEventListener("change", show);
-  boxes.forEach((box) => box.addEventListener("change", show));
+  [slider, forces, kind, ...boxes].forEach((control) => control.addEventListener("change", () => { address.ask(control); show(); }));
+  address.keep(
+    (words) => {
+      if (Number(slider.value) !== {{ first_decade }}) words.set("tol", `1e-${slider.value}`);
+      if (forces.checked) words.set("forces", "1");
+      if (kind.value) words.set("kinds", kind.value);
+      if (boxes.some((box) => !box.checked)) words.set("engines", boxes.filter((box) => box.checked).map((box) => box.value).join(","));
+      if (table.className === "single") words.set("cols", "scene");
+    },
+    (words) => {
+      const names = words.get("engines")?.split(",");
+      slider.value = words.has("tol") ? Math.round(-Math.log10(Number(words.get("tol")))) || {{ first_decade }} : {{ first_decade }};
+      forces.checked = words.get("forces") === "1";
+      kind.value = [...kind.options].some((option) => option.value === words.get("kinds")) ? words.get("kinds") : "";
+      boxes.forEach((box) => { box.checked = !names || names.includes(box.value); });
+      columns(words.get("cols") === "scene" ? "single" : "kinds");
+      if (table.dataset.at || [...words.keys()].some((name) => name !== "at" && name !== "open")) show();
+    },
+  );
   document.querySelectorAll(".ask").forEach((form) => form.addEventListener("submit", (event) => event.preventDefault()));
 
   // Rows unfold: engines to formulations, formulations to settings.
@@ -58,7 +79,9 @@
   };
   table.addEventListener("click", ({ target }) => {
     const button = target.closest("[data-unfold]");
-    if (button) fold(button, button.getAttribute("aria-expanded") !== "true");
+    if (!button) return;
+    fold(button, button.getAttribute("aria-expanded") !== "true");
+    address.note();
   });
   const all = place("formulations");
   all.addEventListener("click", () => {
@@ -66,13 +89,15 @@
     all.setAttribute("aria-pressed", open);
     all.textContent = open ? "hide formulations" : "show all formulations";
     table.querySelectorAll(".engine [data-unfold]").forEach((button) => fold(button, open));
+    address.note();
   });
   const kinds = [...document.querySelectorAll("[data-columns]")];
-  kinds.forEach((button) => button.addEventListener("click", () => {
-    table.className = button.dataset.columns;
-    kinds.forEach((other) => other.setAttribute("aria-pressed", other === button));
+  function columns(which) {
+    table.className = which;
+    kinds.forEach((button) => button.setAttribute("aria-pressed", button.dataset.columns === which));
     start();
-  }));
+  }
+  kinds.forEach((button) => button.addEventListener("click", () => { columns(button.dataset.columns); address.ask(button); }));
 
   // The cells are one stop of the Tab key; arrows, Home and End walk.
   const seen = (part) => part && part.offsetParent !== null;
@@ -96,6 +121,24 @@
     next.focus();
   });
   start();
+
+  // Lines for a reader's own model: of a scene's cheapest engine, then of another that holds the tolerance.
+  const dialog = place("model"), engine = place("model-engine");
+  async function model(scene, chosen) {
+    const data = JSON.parse(await unpack("choices")), holding = data.models[Number(table.dataset.at ?? {{ first_decade - decades.start }})][scene];
+    const gone = off(), names = Object.keys(holding).filter((name) => !gone.has(name));
+    engine.replaceChildren(...names.map((name) => new Option(title(name), name)));
+    engine.value = chosen ?? names[0];
+    dialog.dataset.scene = scene;
+    place("model-lines").innerHTML = data.texts[holding[engine.value]];
+    if (!dialog.open) dialog.showModal();
+  }
+  engine.addEventListener("change", () => model(dialog.dataset.scene, engine.value));
+  document.addEventListener("click", ({ target }) => {
+    const button = target.closest("[data-model]");
+    if (button) model(button.dataset.model);
+    if (target === dialog || target.closest("#model .close")) dialog.close();
+  });
 
   // A tooltip in place of the browser's: the first line bold; by pointer, keyboard or touch, Escape closes it.
   const tip = Object.assign(document.createElement("div"), { id: "tip", hidden: true });

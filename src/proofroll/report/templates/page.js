@@ -8,6 +8,43 @@ function everywhere(action) {
   document.addEventListener("built", (event) => action(event.target));
 }
 
+// The address: `#verdicts` is a place, `#tol=1e-5&kinds=loops&at=verdicts` a question and a place.
+const address = (() => {
+  const parts = [];  // of the question: [function that writes it into parameters, function that takes it from them]
+  let taking = false;
+  const read = () => {
+    const text = location.hash.slice(1);
+    return new URLSearchParams(text.includes("=") ? text : { at: decodeURIComponent(text) });
+  };
+  // The hash of the present question with a place.
+  function asked(at) {
+    const words = new URLSearchParams();
+    parts.forEach(([write]) => write(words));
+    const question = String(words).replaceAll("%2C", ",");
+    return `#${[question, at && (question ? `at=${encodeURIComponent(at)}` : at)].filter(Boolean).join("&")}`;
+  }
+  function write(at, how) {
+    const hash = asked(at);
+    if (!taking && hash !== (location.hash || "#")) history[how](null, "", hash);
+  }
+  function take() {
+    taking = true;
+    const words = read();
+    parts.forEach(([, of]) => of(words));
+    taking = false;
+  }
+  document.addEventListener("DOMContentLoaded", take);
+  addEventListener("hashchange", take);
+  return {
+    asked,
+    at: () => read().get("at"),
+    // A question asked in a section is a step of the back button; what is opened on the way is none.
+    ask: (control) => write([control.closest("section")?.id].find((id) => id && id !== "answer"), "pushState"),
+    note: () => write(read().get("at"), "replaceState"),
+    keep: (...part) => parts.push(part),
+  };
+})();
+
 // A fold is built when it is opened; until then it is a text, which may contain further folds.
 const folds = (() => {
   const button = document.getElementById("unfold");
@@ -65,6 +102,22 @@ const folds = (() => {
     if (watch) document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
   });
   addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(ready));
+  // What a reader opened is in the address: folds of the class "kept" and rows of the matrix.
+  const opened = () => [...document.querySelectorAll("details.kept[open], [data-unfold][aria-expanded=true]")];
+  const named = (part) => part.dataset.unfold ?? part.id;
+  document.addEventListener("toggle", ({ target }) => { if (target.matches("details.kept")) address.note(); }, true);
+  address.keep(
+    (words) => { const names = opened().map(named); if (names.length) words.set("open", names.join(",")); },
+    (words) => {
+      const names = (words.get("open") ?? "").split(",").filter(Boolean), there = opened();
+      there.filter((part) => !names.includes(named(part))).forEach((part) => { if (part.open) part.open = false; else part.click(); });
+      names.filter((name) => !there.some((part) => named(part) === name)).forEach((name) => {
+        const row = document.querySelector(`[data-unfold="${CSS.escape(name)}"]`), fold = document.getElementById(name);
+        if (fold?.matches("details.kept")) fold.open = true;
+        else row?.click();
+      });
+    },
+  );
   return { find, all };
 })();
 
@@ -72,7 +125,7 @@ const folds = (() => {
 (() => {
   async function reveal() {
     document.querySelectorAll(".target").forEach((element) => element.classList.remove("target"));
-    const target = location.hash && (await folds.find(decodeURIComponent(location.hash.slice(1))));
+    const target = address.at() && (await folds.find(address.at()));
     if (!target) return;
     for (let fold = target.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
     for (const fold of target.querySelectorAll(":scope > details:only-of-type")) fold.open = true;
@@ -81,11 +134,16 @@ const folds = (() => {
     // A section that is not drawn has no place for what is in it yet.
     target.closest("main > section")?.style.setProperty("content-visibility", "visible");
     target.scrollIntoView();
+    if (target.hasAttribute("tabindex")) target.focus({ preventScroll: true });
   }
   addEventListener("hashchange", reveal);
   document.addEventListener("click", (event) => {
     const link = event.target.closest("a[href^='#']");
-    if (link && link.hash === location.hash) reveal();
+    if (!link || event.ctrlKey || event.metaKey || event.shiftKey) return;
+    const hash = address.asked(decodeURIComponent(link.hash.slice(1)));
+    event.preventDefault();
+    if (hash === location.hash) reveal();
+    else location.hash = hash;
   });
   reveal();
 })();
@@ -108,7 +166,7 @@ addEventListener("load", () => {
   const links = [...rail.querySelectorAll("ul a")];
   const place = (link) => document.getElementById(link.hash.slice(1));
   links.forEach((link) => jump.append(new Option(link.textContent, link.hash)));
-  jump.addEventListener("change", () => { location.hash = jump.value; });
+  jump.addEventListener("change", () => { location.hash = address.asked(jump.value.slice(1)); });
   let marked = null, waiting = false;
   function follow() {
     waiting = false;
@@ -138,7 +196,7 @@ addEventListener("load", () => {
   }));
 })();
 
-// A button beside each command copies it; it comes with the part of the page that has the command.
+// A button beside each command copies it; it comes with the part of the page that has the command. One copies the address.
 (() => {
   everywhere((part) => part.querySelectorAll("dd > code").forEach((code) => {
     if (!code.textContent.startsWith("proofroll ")) return;
@@ -147,15 +205,17 @@ addEventListener("load", () => {
     code.after(" ", button);
   }));
   document.addEventListener("click", async ({ target }) => {
-    if (!target.matches?.("button.copy")) return;
-    const code = target.parentElement.querySelector("code");
+    const button = target.closest?.("button.copy");
+    if (!button) return;
+    const code = button.parentElement.querySelector("code"), words = (button.dataset.words ??= button.textContent);
     try {
-      await navigator.clipboard.writeText(code.textContent);
-      target.textContent = "copied";
+      await navigator.clipboard.writeText(code ? code.textContent : location.href);
+      button.textContent = "copied";
     } catch {
-      getSelection().selectAllChildren(code);  // a browser that forbids it has the command selected
-      target.textContent = "selected";
+      // A browser that forbids it has the command selected, and the address in its bar.
+      if (code) getSelection().selectAllChildren(code);
+      button.textContent = code ? "selected" : "copy it from the address bar";
     }
-    setTimeout(() => { target.textContent = "copy"; }, 2000);
+    setTimeout(() => { button.textContent = words; }, 2000);
   });
 })();

@@ -1,26 +1,30 @@
-// Error against cost: a panel for each engine, the others in grey. Drawn when it comes into view; the quantity is
-// chosen beside it, engines, tolerance and whether forces count on the first screen.
+// Error against speed: a curve for each setting, that of each engine's cheapest choice strong, names at the fast ends.
+// Drawn when it comes into view; the quantity is chosen beside it, engines, tolerance and whether forces count on the
+// first screen.
 (() => {
-  const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"], SYMBOLS = {{ outlines|list|tojson }};
+  const SYMBOLS = {{ outlines|list|tojson }};
   const LARGEST = 1, LEAST = 1e-17;  // errors beyond the quantity's size tell nothing more, and are left out
-  const PANEL = 215, TICKS = 38, ENTRY = 19, HEAD = 22;  // heights of a panel and of what is around it [CSS px]
+  const MARGIN = { l: 52, r: 12, t: 8, b: 40 }, LINE = 14, LETTER = 6.4;  // of the plot; a name's height and a letter's width [CSS px]
+  const WIDE = 700;  // width from which there is room for the names of all formulations [CSS px]
   const drawn = new Map();  // part of the page -> its plotly element
   const slider = document.getElementById("tolerance");
   const { paint } = plots, literal = picture.literal;
   const short = (value) => (value >= 1e300 ? "∞" : String(Number(value.toPrecision(2))));
   const decade = () => Number(slider?.value ?? {{ first_decade }});
   const title = (engine) => parts.data.titles[engine] ?? engine;
+  const tall = (width) => (width < 520 ? 360 : 430);
   let parts;
 
   // Points with a value of the quantity, without hidden engines.
   function curves(study, quantity) {
     const off = new Set([...document.querySelectorAll("[name=engine]:not(:checked)")].map((box) => box.value));
-    const found = study.curves.filter(({ engine }) => !off.has(engine)).map((curve, number) => ({
-      ...curve, number,
+    const found = study.curves.filter(({ engine }) => !off.has(engine)).map((curve) => ({
+      ...curve,
       points: curve.points.filter(([, cost, , , errors]) => cost > 0 && errors[quantity] !== null && errors[quantity] <= LARGEST)
         .map(([step, cost, clean, verdict, errors, held]) => ({ step, cost, clean, verdict, error: errors[quantity], held: held[quantity], y: Math.max(errors[quantity], LEAST) })),
     }));
-    return found.filter(({ points }) => points.length);
+    // Of a setting the steps of which none is cheaper and as accurate.
+    return found.map((curve) => ({ ...curve, points: front(curve.points) })).filter(({ points }) => points.length);
   }
   function front(points) {
     const best = [];
@@ -34,62 +38,63 @@
       `<br>cost ${clean ? "" : "≈ "}${short(cost)} s/s<br>${verdict ? `verdict: ${literal(verdict)}` : "a step of its ladder"}<extra></extra>`;
   }
 
-  // Heights of the rows of panels. Each has its settings below, where they lie over no point: as many lines as its longest list.
-  function sized(entries, width) {
-    const columns = Math.max(1, Math.min(entries.length, Math.floor(width / 330))), rows = Math.ceil(entries.length / columns) || 1;
-    const blocks = [...Array(rows).keys()].map((row) => PANEL + TICKS + ENTRY * Math.max(...entries.slice(row * columns, (row + 1) * columns), 0) + (row < rows - 1 && HEAD));
-    return { columns, blocks, total: blocks.reduce((sum, block) => sum + block, 0) };
+  // Names at the fast ends of curves: those that would cover another go down.
+  function labels(curves, at, width) {
+    const boxes = [];
+    return curves.map((curve) => ({ curve, end: curve.points.reduce((best, point) => (point.cost < best.cost ? point : best)) })).sort((a, b) => b.end.y - a.end.y).map(({ curve, end }) => {
+      const text = `${title(curve.engine)} ${curve.name.replaceAll("_", " ")}`, long = LETTER * text.length + 6, [x, y] = at(end);
+      const left = x + 8 + long > width ? x - 8 - long : x + 8;
+      let top = y, hit;
+      while ((hit = boxes.find((box) => left < box.left + box.long && box.left < left + long && Math.abs(top - box.top) < LINE))) top = hit.top + LINE;
+      boxes.push({ left, top, long });
+      return {
+        x: Math.log10(1 / end.cost), y: Math.log10(end.y), xanchor: left > x ? "left" : "right", yanchor: "middle", xshift: left > x ? 8 : -8, yshift: y - top,
+        text: curve.strong ? `<b>${literal(text)}</b>` : literal(text), showarrow: false, font: { size: 12, color: paint(curve.strong ? "--ink" : "--muted") },
+      };
+    });
   }
   function content(study, quantity, width) {
-    const all = curves(study, quantity), engines = [...new Set(study.curves.map(({ engine }) => engine))];
+    const all = curves(study, quantity), engines = [...new Set(study.curves.map(({ engine }) => engine))], height = tall(width);
     const coloured = [...new Set([...parts.data.engines, ...engines])];  // each has one colour on the page
-    const shown = engines.filter((engine) => all.some((curve) => curve.engine === engine));
-    const { columns, blocks, total } = sized(shown.map((engine) => all.filter((curve) => curve.engine === engine).length), width);
-    const points = all.flatMap(({ points }) => points), costs = points.map(({ cost }) => cost);
-    const span = [Math.log10(Math.min(...costs)) - 0.3, Math.log10(Math.max(...costs)) + 0.3];
-    const least = Math.min(...points.map(({ y }) => y), 10 ** -decade());
-    const best = front(all.filter(({ own }) => !own).flatMap(({ points }) => points));
-    const choice = best.find(({ held }) => held <= 10 ** -decade());
+    const points = all.flatMap(({ points }) => points), speeds = points.map(({ cost }) => 1 / cost), held = 10 ** -decade();
+    const span = [Math.log10(Math.min(...speeds)) - 0.2, Math.log10(Math.max(...speeds)) + 0.3];
+    const errors = [Math.log10(Math.min(...points.map(({ y }) => y), held)) - 0.4, 0.35];
+    const best = front(all.filter(({ own }) => !own).flatMap(({ points }) => points)), choice = best.find((point) => point.held <= held);
+    const cost = ({ points }) => Math.min(...points.filter((point) => point.held <= held).map((point) => point.cost));
+    for (const engine of engines) {
+      const [cheapest] = all.filter((curve) => curve.engine === engine && !curve.own && cost(curve) < Infinity).sort((a, b) => cost(a) - cost(b));
+      if (cheapest) cheapest.strong = true;
+    }
+    const at = ({ cost: spent, y }) => [
+      MARGIN.l + ((width - MARGIN.l - MARGIN.r) * (Math.log10(1 / spent) - span[0])) / (span[1] - span[0]),
+      MARGIN.t + ((height - MARGIN.t - MARGIN.b) * (errors[1] - Math.log10(y))) / (errors[1] - errors[0]),
+    ];
+    const named = new Map();  // the fastest of each formulation
+    for (const curve of all) {
+      const key = `${curve.engine} ${curve.formulation}`, fast = ({ points }) => Math.min(...points.map((point) => point.cost));
+      if (!named.has(key) || curve.strong || (!named.get(key).strong && fast(curve) < fast(named.get(key)))) named.set(key, curve);
+    }
+    const axis = { type: "log", gridcolor: paint("--rule"), linecolor: paint("--rule"), zeroline: false, ticks: "", exponentformat: "power" };
+    const line = { xref: "paper", x0: 0, x1: 1, y0: held };
     const layout = {
-      height: total + HEAD + 8, width, margin: { l: 52, r: 8, t: HEAD, b: 8 }, hovermode: "closest", showlegend: true,
-      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",
-      font: { family: paint("--sans"), size: 11, color: paint("--ink") }, annotations: [], shapes: [],
+      height, width, margin: MARGIN, hovermode: "closest", showlegend: false, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom", font: { family: paint("--sans"), size: 11, color: paint("--ink") },
+      xaxis: { ...axis, range: span, title: { text: "× real time, faster →", standoff: 4 }, ...(span[1] - span[0] > 1.5 && { dtick: 1 }) },
+      yaxis: { ...axis, range: errors, nticks: 8, title: { text: "error", standoff: 4 } },
+      annotations: labels([...named.values()].filter(({ strong }) => strong || width >= WIDE), at, width),
+      shapes: [{ ...line, type: "rect", y1: 10 ** errors[0], fillcolor: paint("--agrees-bg"), line: { width: 0 }, layer: "below", opacity: 0.55 }, { ...line, type: "line", y1: held, line: { color: paint("--agrees"), width: 1.5 } }],
       hoverlabel: { bgcolor: paint("--paper"), bordercolor: paint("--muted"), font: { color: paint("--ink") }, align: "left" },
     };
-    const traces = [];
-    shown.forEach((engine, at) => {
-      const tail = at ? String(at + 1) : "", column = at % columns, row = Math.floor(at / columns);
-      const gap = 0.12 / columns, wide = (1 - gap * (columns - 1)) / columns;
-      const x = [column * (wide + gap), column * (wide + gap) + wide], top = 1 - blocks.slice(0, row).reduce((sum, block) => sum + block, 0) / total, y = [top - PANEL / total, top];
-      const axis = { type: "log", gridcolor: paint("--rule"), linecolor: paint("--rule"), zeroline: false, ticks: "", exponentformat: "power" };
-      layout[`xaxis${tail}`] = { ...axis, domain: x, anchor: `y${tail}`, range: span, ...(at && { matches: "x" }), title: { text: "cost [s/s]", standoff: 4 }, ...(span[1] - span[0] > 1.5 && { dtick: Math.ceil((span[1] - span[0]) / 6) }) };
-      layout[`yaxis${tail}`] = { ...axis, domain: y, anchor: `x${tail}`, range: [Math.log10(least) - 0.4, 0.35], ...(at && { matches: "y" }), nticks: 8, ...(!column && { title: { text: "error", standoff: 4 } }) };
-      layout[`legend${tail}`] = { x: x[0], y: y[0] - TICKS / total, xanchor: "left", yanchor: "top", bgcolor: "rgba(0,0,0,0)", font: { size: 11 }, tracegroupgap: 0 };
-      layout.annotations.push({ text: `<b>${literal(title(engine))}</b>`, showarrow: false, xref: "paper", yref: "paper", x: x[0], y: y[1], xanchor: "left", yanchor: "bottom" });
-      layout.shapes.push({ type: "line", xref: `x${tail} domain`, yref: `y${tail}`, x0: 0, x1: 1, y0: 10 ** -decade(), y1: 10 ** -decade(), line: { color: paint("--muted"), width: 1, dash: "dash" } });
-      const here = { type: "scatter", xaxis: `x${tail}`, yaxis: `y${tail}`, legend: `legend${tail}` };
-      const others = all.filter((curve) => curve.engine !== engine).flatMap(({ points }) => [...points, { cost: null, y: null }]);
-      traces.push({ ...here, mode: "lines+markers", x: others.map(({ cost }) => cost), y: others.map((point) => point.y), line: { color: paint("--muted"), width: 0.8 }, marker: { color: paint("--muted"), size: 3 }, opacity: 0.55, hoverinfo: "skip", showlegend: false });
-      if (best.length) traces.push({
-        ...here, mode: "lines", x: [...best.map(({ cost }) => cost), 10 ** span[1]], y: [...best, best[best.length - 1]].map(({ held }) => Math.max(held, LEAST)),
-        line: { color: paint("--truth"), width: 5, shape: "hv" }, hoverinfo: "skip", showlegend: false,
-      });
-      const formulations = [...new Set(all.filter((curve) => curve.engine === engine).map(({ formulation }) => formulation))];
-      const color = paint(`--e${coloured.indexOf(engine) % 8}`);
-      all.filter((curve) => curve.engine === engine).forEach((curve, place) => {
-        const symbol = SYMBOLS[place % SYMBOLS.length];
-        traces.push({
-          ...here, name: literal(curve.name), mode: "lines+markers", x: curve.points.map(({ cost }) => cost), y: curve.points.map((point) => point.y),
-          line: { color, width: 1.5, dash: DASHES[formulations.indexOf(curve.formulation) % DASHES.length] },
-          marker: { color, size: 6, symbol: curve.points.map(({ clean }) => (clean ? symbol : `${symbol}-open`)) },
-          hovertemplate: curve.points.map((point) => told(curve, point)),
-        });
-        if (curve.points.includes(choice)) traces.push({
-          ...here, mode: "markers", x: [choice.cost], y: [choice.y], hoverinfo: "skip", showlegend: false, name: "choice",
-          marker: { symbol: "circle-open", size: 16, color: paint("--ink"), line: { width: 2 } },
-        });
-      });
+    const traces = all.map((curve, place) => {
+      const color = curve.own ? paint("--witness") : paint(`--e${coloured.indexOf(curve.engine) % 8}`), symbol = SYMBOLS[place % SYMBOLS.length];
+      return {
+        type: "scatter", name: literal(curve.name), mode: "lines+markers", x: curve.points.map((point) => 1 / point.cost), y: curve.points.map((point) => point.y),
+        line: { color, width: curve.strong ? 2.6 : 1.2, dash: curve.own ? "dot" : "solid" }, opacity: curve.strong ? 1 : 0.55,
+        marker: { color, size: curve.strong ? 6 : 4, symbol: curve.points.map(({ clean }) => (clean ? symbol : `${symbol}-open`)) },
+        hovertemplate: curve.points.map((point) => told(curve, point)),
+      };
     });
+    if (choice) traces.push({ type: "scatter", mode: "markers", x: [1 / choice.cost], y: [choice.y], hoverinfo: "skip", name: "choice", marker: { symbol: "circle-open", size: 16, color: paint("--ink"), line: { width: 2 } } });
     return { traces, layout };
   }
 
@@ -115,7 +120,7 @@
   everywhere((part) => part.querySelectorAll(".precision").forEach((each) => {
     // The picture has its height before it is drawn, so that nothing moves then.
     const canvas = each.querySelector(".canvas");
-    canvas.style.height = `${sized(canvas.dataset.entries.split(" ").map(Number), canvas.clientWidth || each.closest("main").clientWidth).total + HEAD + 8}px`;
+    canvas.style.height = `${tall(canvas.clientWidth || each.closest("main").clientWidth)}px`;
     near.observe(each);
   }));
   document.addEventListener("change", (event) => { if (drawn.has(event.target.closest(".precision"))) show(event.target.closest(".precision")); });

@@ -300,13 +300,13 @@
     kind = kinds[shown.kind];
     time = 0;
     rows();
-    strip.show(shown, (run, moment) => {
+    const worst = strip.show(shown, (run, moment) => {
       time = moment;
       return there(run) ? kind.compare(run, true).off : null;
     });
     time = 0;
     if (view) { build(); reset(); }
-    go(0);
+    go(worst);
   }
 
   function listen() {

@@ -1,5 +1,6 @@
 // The strip of errors below the picture: how far each ghost is from the truth over the whole time, on a logarithmic
-// scale, with a line at the time shown. `show` draws a case, `now` follows its time; a click tells the time it is at.
+// scale, with a line at the time shown. `show` draws a case and gives the time of the largest error that can be seen,
+// `now` follows its time; a click tells the time it is at.
 const errorStrip = (figure, chosen) => {
   const COUNT = 240;  // points of a curve
   const [plot, cursor, high, low] = ["plot", "now", "high", "low"].map((name) => figure.querySelector(`[data-errors="${name}"]`));
@@ -31,6 +32,8 @@ const errorStrip = (figure, chosen) => {
     path.setAttribute("d", grid);
     plot.replaceChildren(path, ...lines.map(({ line }) => line));
     plot.setAttribute("aria-label", `Distance of each ghost from the truth over time, logarithmic, at most ${length(largest)}`);
+    const visible = curves.filter((_, i) => runs[i].shown), worst = Math.max(...visible.flat().map((mm) => mm ?? 0));
+    return worst > shown.least ? (until * visible.find((curve) => curve.includes(worst)).indexOf(worst)) / COUNT : 0;
   }
 
   function now(time) {

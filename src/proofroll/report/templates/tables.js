@@ -9,7 +9,7 @@
     });
     return library;
   }
-  const sorts = (table) => !table.matches("#choice, #uses") && table.querySelector("tbody tr:not(.group, .note)");
+  const sorts = (table) => !table.matches("#choice, #uses, #answer-one *") && table.querySelector("tbody tr:not(.group)");
 
   // A map and a spread rank nothing: they keep the order of their file.
   const ranks = (table) => !table.matches(".heat, .spread");
@@ -17,11 +17,9 @@
   // Rows of engines one after the other, each with its engine: a table that sorts has neither groups nor joined cells.
   function flatten(table) {
     const body = table.tBodies[0];
-    const notes = new Map();  // row -> the row below it that tells more, which goes where it goes
     let named = "";
     for (const part of [...table.tBodies]) {
       for (const row of [...part.rows]) {
-        if (row.classList.contains("note")) { notes.set(body.lastElementChild, row); row.remove(); continue; }
         if (row.classList.contains("group")) { named = row.textContent.replace("#", "").trim(); row.remove(); continue; }
         if (part.dataset.engine) {
           row.dataset.engine = part.dataset.engine;
@@ -39,38 +37,34 @@
     }
     delete body.dataset.engine;
     body.classList.remove("off");
-    return notes;
   }
   // Sort key of a cell: its verdict, or its first number; infinite values come last.
   function rank(cell, numeric) {
     const verdict = cell.querySelector(":scope > .v");
     if (verdict) return order.indexOf(verdict.classList[1]);
-    const text = cell.textContent;
+    const text = (cell.matches(".bar") ? cell.querySelector(".vh") : cell)?.textContent ?? "";
     if (!numeric) return text.trim();
     const found = text.replace("−", "-").match(/-?\d[\d.]*(?:e[-+]?\d+)?/i);
     return found ? Number(found[0]) : text.includes("∞") ? 1e300 : 1e301;
   }
   function keyTable(rows, heads) {
     for (const row of rows) {
-      heads.forEach((head, at) => { row.cells[at].dataset.order = rank(row.cells[at], head.classList.contains("n") || row.cells[at].classList.contains("step")); });
+      heads.forEach((head, at) => { row.cells[at].dataset.order = rank(row.cells[at], head.matches(".n, .bar") || row.cells[at].classList.contains("step")); });
     }
   }
   function said(cell) {
     const copy = cell.cloneNode(true);
     copy.querySelectorAll("[aria-hidden], .dt-column-order").forEach((part) => part.remove());
     copy.querySelectorAll("br, small, b").forEach((part) => part.before(" "));
-    return `${cell.dataset.axis ?? ""} ${copy.textContent} ${cell.dataset.note ?? ""}`.replace(/\s+/g, " ").trim();
+    return `${cell.dataset.axis ?? ""} ${copy.textContent}`.replace(/\s+/g, " ").trim();
   }
   async function enliven(table) {
     const { default: DataTable } = await load();
     const region = table.closest(".scroll");
     const label = region.getAttribute("aria-label");
-    const notes = flatten(table);
+    flatten(table);
     const heads = [...[...table.tHead.rows].at(-1).cells], rows = [...table.tBodies[0].rows];
     if (ranks(table)) keyTable(rows, heads);
-    // What a note says is found by the filter and written to the file with the verdict above it.
-    notes.forEach((note, row) => { row.querySelector(".word").dataset.note = note.textContent.trim(); });
-    if (notes.size) rows.forEach((row) => { const cell = row.querySelector(".word"); cell.dataset.search = said(cell).replace(/[&<>]/g, (sign) => `&#${sign.charCodeAt(0)};`); });  // the library reads it as markup
     const made = new DataTable(table, {
       paging: false, info: false, autoWidth: false, ordering: ranks(table), order: [], orderDescReverse: false,
       language: { search: "Filter", zeroRecords: "no row has this" },
@@ -82,7 +76,6 @@
         bottomStart: null, bottomEnd: null,
       },
     });
-    notes.forEach((note, row) => made.row(row).child(note).show());
     const tools = made.table().container().querySelector(".dt-layout-row:not(.dt-layout-table)");
     tools.classList.add("tools");
     tools.querySelector("input")?.setAttribute("aria-label", `Filter: ${label}`);

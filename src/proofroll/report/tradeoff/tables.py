@@ -9,6 +9,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.comparison import Tolerance
+from proofroll.core.engine_abilities import by_hand
 from proofroll.core.number_format import error, number
 from proofroll.report.labels import engine_words, listed, name_of, omitted_lines, step
 from proofroll.report.page.choice_cell import speed
@@ -20,7 +21,6 @@ from proofroll.studies.tradeoff.recommend import holding
 from proofroll.studies.tradeoff.requirements import Requirements
 
 if TYPE_CHECKING:
-    from proofroll.report.tradeoff.part import Advice
     from proofroll.studies.study_store import Measured
     from proofroll.studies.tradeoff.recommend import Choice, Recommendation
     from proofroll.studies.tradeoff.records import Corner, MeasuredPoint, TradeoffStudy
@@ -72,16 +72,18 @@ def effort(study: TradeoffStudy) -> str:
     return f"{text}Every choice holds {range_words}; it was not checked over ranges of the parameters."
 
 
-def advised(advice: Sequence[Advice]) -> dict[str, tuple[str, list[Advice]]]:
-    """Advice by quantity, with the names of the recommended settings."""
-    groups: dict[str, list[Advice]] = {}
-    for item in advice:
-        groups.setdefault(item.answer.quantity, []).append(item)
-    named = {
-        quantity: dict.fromkeys(name_of(item.answer.choice.point) for item in items if item.answer.choice)
-        for quantity, items in groups.items()
-    }
-    return {key: (", then ".join(named[key]) or "nothing holds it", items) for key, items in groups.items()}
+def cheapest_held(study: TradeoffStudy) -> tuple[list[MeasuredPoint], int]:
+    """Cheapest point of each engine's setting that holds ``FIRST_TOLERANCE``, the cheapest first; the others' number.
+
+    Equations that are solved for the scene by hand are left out.
+    """
+    scale = study.quantities[study.quantity].scale if study.quantity in study.quantities else None
+    points = [point for point in study.points if not by_hand(point.level)]
+    timed = sorted((x for x in points if x.seconds_per_second), key=lambda x: x.seconds_per_second or 0.0, reverse=True)
+    held = [x for x in timed if scale is not None and x.envelope_of(study.quantity) <= FIRST_TOLERANCE * scale]
+    cheapest = [*{point.curve: point for point in held}.values()]
+    cheapest.sort(key=lambda point: point.seconds_per_second or 0.0)
+    return cheapest, len({point.curve for point in points}) - len(cheapest)
 
 
 def _ranges(study: TradeoffStudy) -> str:

@@ -32,6 +32,19 @@ def test_the_cheapest_engine_of_each_kind_is_told_and_a_witness_never_is() -> No
     assert "2e-3 of the path" in ReaderQuestion(2e-3, False).words
 
 
+def test_the_most_accurate_and_the_worst_default_are_told_of_engines_alone() -> None:
+    """Least error without luck of all settings and steps, largest of defaults at their own step; witnesses are none."""
+    rough = line(engine="beta", row=3, error=0.2, cost=0.5)
+    found = answer(choice_matrix([*ARM, rough, OWN], STUDIES, NAMES), 1e-3, False).scenes[0]
+    assert found.most_accurate == (pytest.approx(2e-7, rel=1e-3), "Alpha joints, tuned")
+    assert found.worst_default == (pytest.approx(0.2), "beta joints, default")
+    alone = answer(choice_matrix([*ARM, rough, OWN], STUDIES, NAMES), 1e-3, False, {"alpha"}).scenes[0]
+    assert alone.worst_default == (pytest.approx(5e-4), "Alpha joints, default"), "not at a finer step"
+    both = answer(choice_matrix([*ARM, rough], STUDIES, NAMES), 1e-3, True).scenes[0]
+    assert both.most_accurate == (pytest.approx(1e-6, rel=1e-3), "Alpha joints, tuned"), "beta reports no forces"
+    assert answer(choice_matrix([OWN], STUDIES), 1e-3, False).scenes[0].most_accurate is None
+
+
 def test_a_tie_is_told_of_rough_costs_alone() -> None:
     """Costs known to a factor of two that are nearer than that tie; clean ones do not."""
     dear = choice_matrix([line(error=1e-9, cost=0.2), replace(BETA, cost=23.0)], STUDIES)
