@@ -18,10 +18,12 @@ from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
 TRUTH = "truth"
+RELATION = "relation "  # beginning of the surprise of a truth that breaks a relation
 _PARTED = 0.1  # part of the largest difference from which on a run has parted from the truth
 _LARGE = 0.03  # part of its scale by which an observable without a shown limit may be off
 _EVENTFUL = 100.0  # by which the limit of small steps of a run with events may be farther off
 _FALLEN = 0.8  # largest ratio of the errors at the shortest and the longest step that counts as falling
+_EFFORTS = frozenset({"N", "J", "W"})  # words of units of what is no motion
 _FEW = 2  # samples that count as the start of a run
 # Status of a run -> kind of surprise and its size [decades]: the worst first in a table of kinds.
 _OF_STATUS = {
@@ -42,7 +44,7 @@ class SurpriseKind:
     Attributes:
         formulation: engine and formulation, ``mujoco joints``; or ``truth``.
         surprise: its sign, in a few words.
-        quantity: first word of the observable that shows it, or of the message without numbers.
+        quantity: ``motion``, or first word of another observable that shows it; or of the message without numbers.
         phase: of the run when it shows: ``start``, the last event before, or ``underway``; empty: before the run.
     """
 
@@ -50,6 +52,11 @@ class SurpriseKind:
     surprise: str
     quantity: str = ""
     phase: str = ""
+
+    @property
+    def relation(self) -> str:
+        """Name of the relation that the truth breaks; empty: the surprise is another one."""
+        return self.surprise.removeprefix(RELATION) if self.surprise.startswith(RELATION) else ""
 
     def __str__(self) -> str:
         """Text for a table, and key of what is known from earlier hunts."""
@@ -109,9 +116,9 @@ def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
     wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _falls(run, item))]
     if wrong:
         worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item)))
-        surprise = "another limit" if worst.limit is LimitResult.ANOTHER else "no limit"
-        quantity, phase = worst.observable.partition(".")[0], _phase(run, worst.observable, reference)
-        kind = SurpriseKind(formulation, surprise, quantity, phase)
+        moves = not _EFFORTS & set(reference.scene.observables[worst.observable].unit.split())
+        quantity = "motion" if moves else worst.observable.partition(".")[0]
+        kind = SurpriseKind(formulation, "wrong limit", quantity, _phase(run, worst.observable, reference))
         causes = "".join(f"; {cause.sentence}" for cause in run.diagnosis)
         yield Surprise(kind, _size(worst), f"{worst.observable}: {worst.reason}{causes}")
 

@@ -18,7 +18,7 @@ from proofroll.studies.fuzz.surprises import Surprise, SurpriseKind
 
 Install = Callable[[Mapping[str, str]], None]
 _HANGS = Surprise(SurpriseKind("tiny chart", "hangs"), 8.0, "no answer in 20 s")
-_OFF = Surprise(SurpriseKind("tiny chart", "another limit", "force", "start"), 2.0, "force.pin is off by 1 N")
+_OFF = Surprise(SurpriseKind("tiny chart", "wrong limit", "force", "start"), 2.0, "force.pin is off by 1 N")
 _EVALUATED = [
     EvaluatedScene(truth=Status.DONE, seconds=10),
     EvaluatedScene(truth=Status.DONE, surprises=(_OFF,), seconds=10),
@@ -48,11 +48,11 @@ def evaluated(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 @pytest.mark.usefixtures("evaluated")
 def test_a_hunt_counts_kinds_and_keeps_their_scenes(tmp_path: Path) -> None:
     """Each kind has its number of scenes and its first seed; only scenes that show a kind first are kept."""
-    result = hunt("truth", tmp_path / "out", minutes=1, seed=40)
+    result = hunt("truth", tmp_path / "out", shrink=0, minutes=1, seed=40)
     assert (result.drawn, result.run, result.invalid, result.unfit, result.without_truth) == (6, 4, (43,), 1, 1)
     assert [(item.kind, item.count, item.seed, item.new) for item in result.kinds] == [
         ("tiny chart; hangs", 1, 45, True),
-        ("tiny chart; another limit; force; start", 2, 41, True),
+        ("tiny chart; wrong limit; force; start", 2, 41, True),
     ]
     assert sorted(path.parent.name for path in tmp_path.glob("out/*/scene.toml")) == ["41", "43", "45"]
 
@@ -62,28 +62,28 @@ def test_a_folder_that_was_there_is_left_alone(tmp_path: Path) -> None:
     """A hunt deletes nothing in the folder that it writes to, where a person's folders may have numbers for names."""
     (tmp_path / "40").mkdir()
     (tmp_path / "40" / "notes.txt").write_text("mine")
-    hunt("truth", tmp_path, minutes=1, seed=40)
+    hunt("truth", tmp_path, shrink=0, minutes=1, seed=40)
     assert (tmp_path / "40" / "notes.txt").read_text() == "mine"
 
 
 def test_a_kind_is_new_once(evaluated: list[Any], tmp_path: Path) -> None:
     """A later hunt in the same folder knows the kinds of the earlier one, and ranks new ones before them."""
-    hunt("truth", tmp_path, minutes=0.5)
+    hunt("truth", tmp_path, shrink=0, minutes=0.5)
     evaluated += [EvaluatedScene(truth=Status.DONE, surprises=(_OFF, _HANGS), seconds=60)]
-    result = hunt("truth", tmp_path, minutes=1, seed=5)
+    result = hunt("truth", tmp_path, shrink=0, minutes=1, seed=5)
     assert [(item.kind.split("; ")[1], item.new) for item in result.kinds] == [
         ("hangs", True),
-        ("another limit", False),
+        ("wrong limit", False),
     ]
 
 
 def test_an_interrupted_hunt_keeps_what_it_found(evaluated: list[Any], tmp_path: Path) -> None:
     """Ctrl-C ends a hunt with the kinds so far, which the next hunt knows."""
     evaluated[2] = KeyboardInterrupt()
-    result = hunt("truth", tmp_path, minutes=1)
+    result = hunt("truth", tmp_path, shrink=0, minutes=1)
     assert result.interrupted
     assert [item.seed for item in result.kinds] == [1]
-    assert list(json.loads((tmp_path / "kinds.json").read_text())) == ["tiny chart; another limit; force; start"]
+    assert list(json.loads((tmp_path / "kinds.json").read_text())) == ["tiny chart; wrong limit; force; start"]
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_broken_memory_is_named(tmp_path: Path) -> None:
     """A broken file of known kinds is named with its remedy."""
     (tmp_path / "kinds.json").write_text("[1]")
     with pytest.raises(InputError, match=r"kinds\.json.*remove it"):
-        hunt("truth", tmp_path, minutes=1)
+        hunt("truth", tmp_path, shrink=0, minutes=1)
 
 
 @pytest.mark.usefixtures("evaluated")
@@ -116,7 +116,7 @@ def test_the_exit_code_tells_new_kinds(tmp_path: Path, command_line: Callable[..
     code, out, _ = command_line(*words, "0.3", "--json")
     shown = json.loads(out)
     assert code == 1
-    assert [item["kind"] for item in shown["kinds"]] == ["tiny chart; another limit; force; start"]
+    assert [item["kind"] for item in shown["kinds"]] == ["tiny chart; wrong limit; force; start"]
     assert shown["kinds"][0]["largest"]["message"] == _OFF.message
     code, out, _ = command_line(*words, "0.01")
     assert code == 0
