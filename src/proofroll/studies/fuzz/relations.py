@@ -116,7 +116,7 @@ def _worst(
         true = variable.to_numpy()[: len(curve)]
         difference = np.abs(curve - true)
         bar = _bar(reference.dataset, name) + _bar(other, name)
-        allowed = _BARS * bar + _ROUND_OFF * max(float(np.abs(true).max()), reference.scale(name) or 0.0)
+        allowed = _BARS * bar + _ROUND_OFF * max(float(np.abs(true).max()), reference.sizes.get(name, 0.0))
         if not difference.max() <= allowed:
             index = np.unravel_index(np.argmax(difference), difference.shape)[0]
             time, unit = reference.dataset["time"].to_numpy()[index], variable.attrs.get("units", "")
