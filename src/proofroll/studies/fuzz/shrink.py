@@ -21,7 +21,7 @@ from proofroll.running.store import write_text
 from proofroll.studies.failure import CRASHED, GAVE_UP, LOST_PHASE, Yardstick, run_outcome
 from proofroll.studies.fuzz.evaluation import EvaluatedScene, evaluate_scene, outcome_of
 from proofroll.studies.fuzz.relations import relations_of, write_scene
-from proofroll.studies.fuzz.surprises import TRUTH, Surprise
+from proofroll.studies.fuzz.surprises import HANGS, TRUTH, Surprise
 
 _DECADE = 1.0  # by which the size of a surprise may change
 _TIMES = 3.0  # limit of a try, relative to the first run of the scene
@@ -185,8 +185,9 @@ class Shrinker:
         return "", None
 
     def _pass_on(self, tables: Mapping[str, Any], evaluated: EvaluatedScene) -> None:
+        """Passes other surprises on, without hangs: a try has less time than a run."""
         for item in evaluated.surprises:
-            if item.kind != self._surprise.kind:
+            if item.kind != self._surprise.kind and item.kind.surprise != HANGS:
                 self._other(tables, item)
 
     def _program(self, folder: Path) -> str:

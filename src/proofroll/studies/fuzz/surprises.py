@@ -18,17 +18,19 @@ from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
 TRUTH = "truth"
+HANGS = "hangs"
 RELATION = "relation "  # beginning of the surprise of a truth that breaks a relation
 _PARTED = 0.1  # part of the largest difference from which on a run has parted from the truth
 _LARGE = 0.03  # part of its scale by which an observable without a shown limit may be off
 _EVENTFUL = 100.0  # by which the limit of small steps of a run with events may be farther off
 _FALLEN = 0.8  # largest ratio of the errors at the shortest and the longest step that counts as falling
 _EFFORTS = frozenset({"N", "J", "W"})  # words of units of what is no motion
+_SAME = 0.01  # relative difference of errors that are alike at all steps
 _FEW = 2  # samples that count as the start of a run
 # Status of a run -> kind of surprise and its size [decades]: the worst first in a table of kinds.
 _OF_STATUS = {
     Status.CRASHED: ("crashes", 9.0),
-    Status.TIMEOUT: ("hangs", 8.0),
+    Status.TIMEOUT: (HANGS, 8.0),
     Status.WRONG_MODEL: ("wrong model", 5.0),
     Status.DIVERGED: ("stops", 5.0),
     Status.ANOTHER_SCENE: ("another scene", 1.0),
@@ -113,7 +115,7 @@ def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
     if reference.ill_posed:
         return
     judged = [item for item in run.judgements if item.verdict not in {Verdict.NOT_JUDGED, Verdict.ILL_POSED}]
-    wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _falls(run, item))]
+    wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _errors(run, item))]
     if wrong:
         worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item)))
         moves = not _EFFORTS & set(reference.scene.observables[worst.observable].unit.split())
@@ -123,26 +125,31 @@ def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
         yield Surprise(kind, _size(worst), f"{worst.observable}: {worst.reason}{causes}")
 
 
-def _falls(run: Run, judgement: Judgement) -> bool:
-    """True if the error of an observable falls from the longest step, or loosest tolerance, to the other end."""
+def _errors(run: Run, judgement: Judgement) -> list[float]:
+    """Errors of an observable, from the shortest step, or tightest tolerance, to the other end."""
     assert run.facts is not None  # it has run
     if run.facts.resolution is None:
-        return False
+        return [judgement.error]
     errors = {rung.value: rung.errors.get(judgement.observable, math.inf) for rung in run.rungs}
     errors[float(run.facts.settings[run.facts.resolution])] = judgement.error
-    return errors[min(errors)] < _FALLEN * errors[max(errors)]
+    return [errors[step] for step in sorted(errors)]
 
 
-def _is_wrong(judgement: Judgement, eventful: bool, falls: bool) -> bool:
+def _is_wrong(judgement: Judgement, eventful: bool, errors: list[float]) -> bool:
     """True if small steps lead to another motion than the true one, or nowhere.
 
-    An event that falls between two steps leaves errors whose order three steps do not show, so that more is allowed.
+    An event that falls between two steps leaves errors whose order three steps do not show, so that more is allowed;
+    but not where all three have the same error.
     """
+    steady = len(errors) > 1 and max(errors) - min(errors) <= _SAME * max(errors)
     if judgement.limit is LimitResult.ANOTHER and judgement.limit_error is not None:
-        allowed = judgement.tolerance * (_EVENTFUL if eventful else 1.0)
+        allowed = judgement.tolerance * (_EVENTFUL if eventful and not steady else 1.0)
         return not judgement.limit_error - (judgement.limit_doubt or 0.0) <= allowed
+    if judgement.limit is not LimitResult.NOT_SHOWN:
+        return False
+    falls = len(errors) > 1 and errors[0] < _FALLEN * errors[-1]
     large = not judgement.error <= max(_LARGE * judgement.scale, judgement.tolerance)
-    return judgement.limit is LimitResult.NOT_SHOWN and large and not falls
+    return (large and not falls) or (steady and judgement.error > judgement.tolerance)
 
 
 def _size(judgement: Judgement) -> float:
@@ -161,8 +168,9 @@ def _failed(formulation: str, result: Result) -> Surprise:
 
 def _words(message: str) -> str:
     """Beginning of a message without numbers and names of parts, so that it is alike in scenes alike."""
-    words = re.sub(r"\b[a-z]{3}\d+\b", "…", message)
-    return " ".join(_NUMBER.sub("#", words).split()[:12])
+    words = _NUMBER.sub("#", re.sub(r"\b[a-z]{2,3}\d+\b", "…", message))
+    words = re.sub(r"#(, #)+", "#", words).replace("angular acceleration", "acceleration")  # of which is furthest off
+    return " ".join(words.split()[:12])
 
 
 def formulation_of(run: Run) -> str:
