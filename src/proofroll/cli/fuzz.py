@@ -77,7 +77,8 @@ def _parts(result: Hunt) -> Iterator[Table | str]:
     for heading in ("", "kind", "scenes", "seed", "tables"):
         table.add_column(heading, justify="right" if heading in {"scenes", "seed", "tables"} else "left")
     for item in result.kinds:
-        sign, tables = "new" if item.new else "", str(item.smallest.tables) if item.smallest else ""
+        sign = "new" if item.new else "finding" if item.finding else ""
+        tables = str(item.smallest.tables) if item.smallest else ""
         table.add_row(sign, Text(item.kind), str(item.count), str(item.seed), tables)
     yield table
     for item in result.kinds:
@@ -89,8 +90,10 @@ def _parts(result: Hunt) -> Iterator[Table | str]:
 
 
 def _places(item: FoundKind) -> Iterator[str]:
-    """Lines with the files of a kind."""
+    """Lines with the finding and the files of a kind."""
     smallest = item.smallest
+    if item.finding:
+        yield f"known: finding {item.finding}"
     if smallest is None:
         yield f"{item.folder}/scene.toml"
         return

@@ -75,8 +75,8 @@ class Relation:
         back: trajectory of the changed scene, and tables of the other one -> values by name, as the other one has them.
     """
 
-    change: Callable[[dict[str, Any], Mapping[str, Any]], object]
-    back: Callable[[Mapping[str, Any], Mapping[str, Any]], Mapping[str, Any]]
+    change: Callable[[dict[str, Any], Mapping[Any, Any]], object]
+    back: Callable[[Mapping[Any, Any], Mapping[str, Any]], Mapping[str, Any]]
 
 
 @dataclass(frozen=True)

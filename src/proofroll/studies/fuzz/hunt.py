@@ -8,6 +8,8 @@ import tempfile
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +23,11 @@ from proofroll.running.idle_workers import Workers
 from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store, write_text
+from proofroll.studies.findings import load_findings
 from proofroll.studies.fuzz.evaluation import EvaluatedScene, evaluate_scene
 from proofroll.studies.fuzz.relations import relations_of, write_scene
 from proofroll.studies.fuzz.shrink import Shrinker, SmallestScene
-from proofroll.studies.fuzz.surprises import TRUTH, Surprise
+from proofroll.studies.fuzz.surprises import REFUSES, TRUTH, Surprise
 
 _KNOWN = "kinds.json"
 _LIMIT = 20.0  # wall time of one run [s]
@@ -38,7 +41,8 @@ class FoundKind:
     Attributes:
         kind: its text.
         count: number of scenes that show it.
-        new: False if an earlier hunt in the same folder has found it.
+        new: False if an earlier hunt in the same folder has found it, or a finding about the engine has it.
+        finding: name of that finding; empty: there is none.
         largest: its largest surprise.
         seed: of the first scene that shows it, or from which a shrink came upon it.
         folder: of that scene.
@@ -54,6 +58,7 @@ class FoundKind:
     folder: str
     first: Surprise
     smallest: SmallestScene | None = None
+    finding: str = ""
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,7 @@ class Hunt:
         unfit: number of scenes that no formulation of the engine can represent; they were not run.
         without_truth: number of scenes whose truth has no result.
         seconds: processor time [s].
-        kinds: the new ones first, then the largest.
+        kinds: the new ones first, those of findings last, then the largest.
         interrupted: True if the hunt was ended by a signal.
     """
 
@@ -201,6 +206,7 @@ class _Hunting:
     def step(self, runner: Runner, budget: float) -> None:
         """Shrinks the largest new kind, or runs the next scene while shrinks have used half of the time."""
         waiting = [item for item in self.result.kinds if item.new and item.kind not in self.shrunk]
+        waiting = [item for item in waiting if item.first.kind.surprise != REFUSES]  # whose message tells the cause
         if budget and waiting and self.shrinking <= self.result.seconds / 2:
             self._shrink(waiting[0], runner, budget)
         else:
@@ -258,16 +264,20 @@ def _with_kinds(
         kind = kinds.get(text) or FoundKind(
             kind=text,
             count=0,
-            new=text not in known_kinds,
+            new=text not in known_kinds and not finding_of(text),
             largest=surprise,
             seed=seed,
             folder=str(folder),
             first=surprise,
+            finding=finding_of(text),
         )
         largest = max(kind.largest, surprise, key=lambda item: item.size)
         kinds[text] = replace(kind, count=kind.count + 1, largest=largest)
     return replace(
-        result, kinds=tuple(sorted(kinds.values(), key=lambda item: (not item.new, -item.largest.size, item.seed)))
+        result,
+        kinds=tuple(
+            sorted(kinds.values(), key=lambda item: (not item.new, item.finding, -item.largest.size, item.seed))
+        ),
     )
 
 
@@ -283,6 +293,12 @@ def _with_scene(
         without_truth=result.without_truth + (evaluated.truth not in {None, Status.DONE}),
         seconds=result.seconds + evaluated.seconds,
     )
+
+
+@cache
+def finding_of(kind: str) -> str:
+    """Name of the finding about an engine that shows as a kind of surprise; empty: there is none."""
+    return next((item.name for item in load_findings() if any(fnmatchcase(kind, text) for text in item.kinds)), "")
 
 
 def _known(folder: Path) -> dict[str, str]:

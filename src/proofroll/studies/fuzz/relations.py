@@ -44,7 +44,7 @@ def _other_samples(tables: dict[str, Any], _: object) -> None:
     tables["every"] /= 2
 
 
-def _each_second(truth: Mapping[str, Any], _: object) -> dict[str, Any]:
+def _each_second(truth: Mapping[Any, Any], _: object) -> dict[str, Any]:
     names = [name for name in truth if name.startswith(("p_", "v_", "q.", "v."))]
     return {name: truth[name].to_numpy()[::2] for name in names}
 

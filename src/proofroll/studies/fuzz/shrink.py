@@ -215,7 +215,7 @@ class Shrinker:
             engine=facts.name,
             version=facts.version,
             settings=facts.settings,
-            resolution=facts.resolution,
+            resolution=str(facts.resolution),
             until=run.case.until,
             every=run.case.every,
             where="a random scene, shrunk",

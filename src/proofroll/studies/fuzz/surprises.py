@@ -11,6 +11,7 @@ import numpy as np
 
 from proofroll.core.arrays import magnitudes
 from proofroll.core.errors import ProofrollError
+from proofroll.core.observable import Observable, Role
 from proofroll.core.verdict import Judgement, LimitResult, Verdict
 from proofroll.running.case import Result, Status
 from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
@@ -18,13 +19,14 @@ from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
 TRUTH = "truth"
-HANGS = "hangs"
+HANGS, REFUSES = "hangs", "refuses"
 RELATION = "relation "  # beginning of the surprise of a truth that breaks a relation
 _PARTED = 0.1  # part of the largest difference from which on a run has parted from the truth
 _LARGE = 0.03  # part of its scale by which an observable without a shown limit may be off
 _EVENTFUL = 100.0  # by which the limit of small steps of a run with events may be farther off
 _FALLEN = 0.8  # largest ratio of the errors at the shortest and the longest step that counts as falling
 _EFFORTS = frozenset({"N", "J", "W"})  # words of units of what is no motion
+_EVENTS, _OF_EVENTS = "events", 1.0  # quantity, and size where their number is not the true one [decades]
 _SAME = 0.01  # relative difference of errors that are alike at all steps
 _FEW = 2  # samples that count as the start of a run
 # Status of a run -> kind of surprise and its size [decades]: the worst first in a table of kinds.
@@ -34,7 +36,7 @@ _OF_STATUS = {
     Status.WRONG_MODEL: ("wrong model", 5.0),
     Status.DIVERGED: ("stops", 5.0),
     Status.ANOTHER_SCENE: ("another scene", 1.0),
-    Status.REFUSED: ("refuses", 0.0),
+    Status.REFUSED: (REFUSES, 0.0),
 }
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
@@ -46,7 +48,7 @@ class SurpriseKind:
     Attributes:
         formulation: engine and formulation, ``mujoco joints``; or ``truth``.
         surprise: its sign, in a few words.
-        quantity: ``motion``, or first word of another observable that shows it; or of the message without numbers.
+        quantity: ``motion``, ``events``, or first word of another observable; or beginning of the message.
         phase: of the run when it shows: ``start``, the last event before, or ``underway``; empty: before the run.
     """
 
@@ -117,12 +119,18 @@ def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
     judged = [item for item in run.judgements if item.verdict not in {Verdict.NOT_JUDGED, Verdict.ILL_POSED}]
     wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _errors(run, item))]
     if wrong:
-        worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item)))
-        moves = not _EFFORTS & set(reference.scene.observables[worst.observable].unit.split())
-        quantity = "motion" if moves else worst.observable.partition(".")[0]
+        worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item, events=False)))
+        quantity = _quantity(reference.scene.observables[worst.observable], worst.observable)
         kind = SurpriseKind(formulation, "wrong limit", quantity, _phase(run, worst.observable, reference))
         causes = "".join(f"; {cause.sentence}" for cause in run.diagnosis)
-        yield Surprise(kind, _size(worst), f"{worst.observable}: {worst.reason}{causes}")
+        yield Surprise(kind, _size(worst, quantity == _EVENTS), f"{worst.observable}: {worst.reason}{causes}")
+
+
+def _quantity(observable: Observable, label: str) -> str:
+    """Word for a quantity: ``events``, ``motion``, or the first word of what has a unit of force or energy."""
+    if observable.role is Role.EVENT:
+        return _EVENTS
+    return label.partition(".")[0] if _EFFORTS & set(observable.unit.split()) else "motion"
 
 
 def _errors(run: Run, judgement: Judgement) -> list[float]:
@@ -152,11 +160,11 @@ def _is_wrong(judgement: Judgement, eventful: bool, errors: list[float]) -> bool
     return (large and not falls) or (steady and judgement.error > judgement.tolerance)
 
 
-def _size(judgement: Judgement) -> float:
+def _size(judgement: Judgement, events: bool) -> float:
     """Decades by which an error exceeds its tolerance; the error of the limit of small steps, if there is one."""
     error = judgement.limit_error if judgement.limit is LimitResult.ANOTHER else judgement.error
     if error is None or not math.isfinite(error):
-        return max(size for _, size in _OF_STATUS.values())
+        return _OF_EVENTS if events else max(size for _, size in _OF_STATUS.values())
     return math.log10(max(error / judgement.tolerance, 1e-9))
 
 

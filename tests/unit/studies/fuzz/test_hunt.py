@@ -35,10 +35,9 @@ _EVALUATED = [
 def evaluated(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Scenes of a hunt for the truth, whose results are these in turn; an exception is raised."""
     scenes: list[Any] = [*_EVALUATED]
-    left = iter(scenes)
 
     def evaluate(*_: object) -> EvaluatedScene:
-        scene = next(left)
+        scene = scenes.pop(0)
         if isinstance(scene, BaseException):
             raise scene
         return scene
@@ -76,6 +75,18 @@ def test_a_kind_is_new_once(evaluated: list[Any], tmp_path: Path) -> None:
     assert [(item.kind.split("; ")[1], item.new) for item in result.kinds] == [
         ("hangs", True),
         ("wrong limit", False),
+    ]
+
+
+def test_the_kind_of_a_finding_is_known_and_last(evaluated: list[Any], tmp_path: Path) -> None:
+    """A kind that a finding about an engine names is not new, has the finding's name, and stands last."""
+    kind = SurpriseKind("mujoco geoms", "wrong limit", "motion", "after impact")
+    evaluated.insert(0, EvaluatedScene(truth=Status.DONE, surprises=(Surprise(kind, 7.0, "it rebounds"),), seconds=1))
+    result = hunt("truth", tmp_path, shrink=0, minutes=1)
+    assert [(item.new, item.finding) for item in result.kinds] == [
+        (True, ""),
+        (True, ""),
+        (False, "mujoco_critically_damped_rebound"),
     ]
 
 

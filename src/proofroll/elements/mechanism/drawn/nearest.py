@@ -12,7 +12,7 @@ import numpy as np
 from proofroll.core.drawing import Change
 from proofroll.elements.mechanism.drawn.smaller import named, rows_of
 from proofroll.elements.mechanism.drawn.turning import Turn
-from proofroll.elements.mechanism.scene.joint_kinds import LOOP_FACTS, ONE_COORDINATE, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, LOOP_FACTS, ONE_COORDINATE, JointKind
 from proofroll.elements.mechanism.scene.rotations import from_rpy
 
 _QUARTER = math.pi / 2
@@ -27,9 +27,10 @@ def nearest(tables: Mapping[str, Any]) -> Iterator[tuple[str, Change]]:
         if np.any(joint.get("v0", 0.0)):
             yield "", partial(_times, name=joint["name"], key="v0", factor=-1.0)
     for axis, turns in (("x", (_QUARTER, 0.0, 0.0)), ("y", (0.0, _QUARTER, 0.0))):
-        yield f"turned by 90° about {axis}", lambda content, turns=turns: Turn(from_rpy(turns), np.zeros(3))(content)
+        yield f"turned by 90° about {axis}", Turn(from_rpy(turns), np.zeros(3))
     for loop in tables.get("loops", ()):
-        for kind in LOOP_FACTS.keys() - {loop["kind"], JointKind.FREE}:
+        kinds = {*LOOP_FACTS} - {loop["kind"], JointKind.FREE, DISTANCE}
+        for kind in sorted(kinds) if loop["kind"] != DISTANCE else ():  # whose ends are apart
             yield "", partial(_set, name=loop["name"], key="kind", value=str(kind))
     yield from _frictions(tables)
     yield from _other_places(tables)
@@ -38,7 +39,7 @@ def nearest(tables: Mapping[str, Any]) -> Iterator[tuple[str, Change]]:
             for key, value in row.items():
                 if key not in _NO_NUMBERS and _is_number(value):
                     yield "", partial(_times, name=row["name"], key=key, factor=factor)
-        yield "", lambda content, factor=factor: _scale(content["gravity"], "magnitude", factor)
+        yield "", partial(_times_gravity, factor=factor)
 
 
 def _frictions(tables: Mapping[str, Any]) -> Iterator[tuple[str, Change]]:
@@ -74,6 +75,10 @@ def _is_number(value: Any) -> bool:
 
 def _times(tables: dict[str, Any], name: str, key: str, factor: float) -> None:
     _scale(named(tables, name), key, factor)
+
+
+def _times_gravity(tables: dict[str, Any], factor: float) -> None:
+    _scale(tables["gravity"], "magnitude", factor)
 
 
 def _scale(row: dict[str, Any], key: str, factor: float) -> None:

@@ -28,13 +28,13 @@ def _turn(tables: dict[str, Any], _: object) -> None:
     Turn(_R, _size(tables) * np.array(_SHIFT))(tables)
 
 
-def _turned_back(truth: Mapping[str, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
+def _turned_back(truth: Mapping[Any, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
     shift = _size(tables) * np.array(_SHIFT)
     places, speeds = truth["p_WB"].to_numpy(), truth["v_WB"].to_numpy()
     return _coordinates(truth) | {"p_WB": (places - shift) @ _R, "v_WB": speeds @ _R}
 
 
-def _coordinates(truth: Mapping[str, Any]) -> dict[str, Any]:
+def _coordinates(truth: Mapping[Any, Any]) -> dict[str, Any]:
     """Coordinates of joints, which have no frame."""
     return {name: truth[name].to_numpy() for name in truth if name.startswith(("q.", "v."))}
 
@@ -55,7 +55,7 @@ def _rename(tables: dict[str, Any], _: object) -> None:
         tables["control"]["actuators"] = [names[name] for name in tables["control"]["actuators"]]
 
 
-def _renamed_back(truth: Mapping[str, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
+def _renamed_back(truth: Mapping[Any, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
     former = {new: name for name, new in _names(tables).items()}
     values = {name: truth[name].to_numpy() for name in ("p_WB", "v_WB")}
     for name, value in _coordinates(truth).items():
@@ -70,12 +70,12 @@ def _reorder(tables: dict[str, Any], _: object) -> None:
             tables[name] = content[::-1]
 
 
-def _reordered_back(truth: Mapping[str, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
+def _reordered_back(truth: Mapping[Any, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
     order = [truth["body"].to_numpy().tolist().index(row["name"]) for row in tables["bodies"]]
     return _coordinates(truth) | {name: truth[name].to_numpy()[:, order] for name in ("p_WB", "v_WB")}
 
 
-def _reverse(tables: dict[str, Any], truth: Mapping[str, Any]) -> None:
+def _reverse(tables: dict[str, Any], truth: Mapping[Any, Any]) -> None:
     """Starts at the end with opposite speeds. Raises LookupError if the scene is not conservative."""
     lossy = any(_LOSSES & row.keys() for row in rows_of(tables)) or any(table in tables for table in _LOSSY)
     joints = tables["joints"]
@@ -90,7 +90,7 @@ def _reverse(tables: dict[str, Any], truth: Mapping[str, Any]) -> None:
                 row["v0"] = -float(truth[f"v.{row['name']}"][-1])
 
 
-def _reversed_back(truth: Mapping[str, Any], _: object) -> dict[str, Any]:
+def _reversed_back(truth: Mapping[Any, Any], _: object) -> dict[str, Any]:
     signs = {"q": 1.0, "p": 1.0, "v": -1.0}
     values = _coordinates(truth) | {name: truth[name].to_numpy() for name in ("p_WB", "v_WB")}
     return {name: signs[name[0]] * value[::-1] for name, value in values.items()}
