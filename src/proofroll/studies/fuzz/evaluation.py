@@ -67,7 +67,7 @@ def evaluate_scene(
         engine: ``name`` or ``name[key=value,…]``; ``truth``: the truth alone.
         runner: of the cases.
         limit: wall time of one run [s].
-        relations: that the truth is held against, by name.
+        relations: name -> scene against which the truth is held.
         diagnosing: False leaves out causes of differences, which cost another truth.
 
     Raises:

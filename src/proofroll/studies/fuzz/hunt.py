@@ -165,7 +165,13 @@ def hunt(
     if seed < 0:
         raise InputError("--seed", seed, "give a whole number from 0 on")
     workers = workers or Workers()
-    hunting = _Hunting(engine, folder, families_for(engine, families, workers), _known(folder), Hunt(engine, seed))
+    hunting = _Hunting(
+        engine=engine,
+        folder=folder,
+        families=families_for(engine, families, workers),
+        known_kinds=_known(folder),
+        result=Hunt(engine, seed),
+    )
     with tempfile.TemporaryDirectory() as temporary:
         hunting.temporary = Path(temporary)
         runner = Runner(Store(hunting.temporary / "cases"), jobs=jobs, workers=workers)
@@ -186,7 +192,7 @@ class _Hunting:
 
     Attributes:
         engine, folder: as of :func:`hunt`.
-        families: that are drawn.
+        families: drawn ones, by name.
         known_kinds: kind -> folder, of earlier hunts.
         result: so far.
         temporary: folder for the scene that is run.

@@ -59,7 +59,7 @@ class Shrinker:
     """Shrinks scenes with one surprise.
 
     Args:
-        surprise: that a smaller scene has to show: its kind, and its size within a decade.
+        surprise: its kind is kept, and its size within a decade.
         engine: as the user wrote it.
         family: of the scene.
         temporary: folder for tries.
@@ -261,7 +261,7 @@ def _rows(tables: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
 
 
 def _difference(tables: Mapping[str, Any], other: Mapping[str, Any]) -> str:
-    """What another scene has instead of this one, e.g. ``joints.joi1.v0 = 3 instead of -3``."""
+    """Clause on the difference of another scene, e.g. ``joints.joi1.v0 = 3 instead of -3``."""
     former = dict(_rows(tables))
     clauses = []
     for name, row in _rows(other):

@@ -25,7 +25,7 @@ _PARTED = 0.1  # part of the largest difference from which on a run has parted f
 _LARGE = 0.03  # part of its scale by which an observable without a shown limit may be off
 _EVENTFUL = 100.0  # by which the limit of small steps of a run with events may be farther off
 _FALLEN = 0.8  # largest ratio of the errors at the shortest and the longest step that counts as falling
-_EFFORTS = frozenset({"N", "J", "W"})  # words of units of what is no motion
+_OF_MOTION = frozenset({"m", "rad", "m/s", "rad/s", "1"})  # units of quantities of motion
 _EVENTS, _OF_EVENTS = "events", 1.0  # quantity, and size where their number is not the true one [decades]
 _SAME = 0.01  # relative difference of errors that are alike at all steps
 _FEW = 2  # samples that count as the start of a run
@@ -127,10 +127,10 @@ def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
 
 
 def _quantity(observable: Observable, label: str) -> str:
-    """Word for a quantity: ``events``, ``motion``, or the first word of what has a unit of force or energy."""
+    """Word for a quantity: ``events``, ``motion``, or the first word of another one."""
     if observable.role is Role.EVENT:
         return _EVENTS
-    return label.partition(".")[0] if _EFFORTS & set(observable.unit.split()) else "motion"
+    return "motion" if observable.unit in _OF_MOTION else label.partition(".")[0]
 
 
 def _errors(run: Run, judgement: Judgement) -> list[float]:

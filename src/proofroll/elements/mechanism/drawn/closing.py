@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.elements.mechanism.drawn.poses import Poses, floats
+from proofroll.elements.mechanism.drawn.poses import PosesAtStart, floats
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_rpy, to_rpy
 
@@ -21,10 +21,10 @@ def close(tables: dict[str, Any], former: Mapping[str, Any]) -> None:
         tables: content of a scene file, which changes.
         former: content before its lengths changed.
     """
-    poses = Poses.of(tables)
+    poses = PosesAtStart.of(tables)
     for row in tables.get("loops", ()):
         _close_loop(row, poses)
-    before, pairs = Poses.of(former), {row["name"]: row for row in former.get("pairs", ())}
+    before, pairs = PosesAtStart.of(former), {row["name"]: row for row in former.get("pairs", ())}
     for row in tables.get("pairs", ()):
         distance, _ = _gap(former, before, pairs[row["name"]])
         _move_upper(tables, row, distance)
@@ -45,7 +45,7 @@ def extent(geometry: Mapping[str, Any], direction: Array) -> float:
     return float(geometry["length"] / 2 * along + radius * across)
 
 
-def _close_loop(row: dict[str, Any], poses: Poses) -> None:
+def _close_loop(row: dict[str, Any], poses: PosesAtStart) -> None:
     kind, (a, b) = row["kind"], (row["body_a"], row["body_b"])
     point = poses.place(a) + poses.rotation(a) @ np.array(row.get("position_a", _O))
     if kind == DISTANCE:
@@ -64,7 +64,7 @@ def _close_loop(row: dict[str, Any], poses: Poses) -> None:
 
 def _move_upper(tables: dict[str, Any], pair: Mapping[str, Any], distance: float) -> None:
     """Moves the free body of the first geometry of a pair along the normal to a distance [m]."""
-    poses = Poses.of(tables)
+    poses = PosesAtStart.of(tables)
     gap, normal = _gap(tables, poses, pair)
     upper, _ = _both(tables, pair)
     joint = next(row for row in tables["joints"] if row["child"] == upper["body"])
@@ -77,7 +77,7 @@ def _both(tables: Mapping[str, Any], pair: Mapping[str, Any]) -> list[Mapping[st
     return [rows[name] for name in pair["geometries"]]
 
 
-def _gap(tables: Mapping[str, Any], poses: Poses, pair: Mapping[str, Any]) -> tuple[float, Array]:
+def _gap(tables: Mapping[str, Any], poses: PosesAtStart, pair: Mapping[str, Any]) -> tuple[float, Array]:
     """Distance of the two geometries of a pair [m], and the normal out of the second one."""
     upper, lower = _both(tables, pair)
     R, centre = poses.rotation(upper["body"]), poses.place(upper["body"])

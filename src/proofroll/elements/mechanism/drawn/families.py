@@ -21,6 +21,15 @@ _DRAWN = {
     "contact": (CONTACT_FEATURES, contact, {Capability.CONTACT}),
 }
 FAMILIES: Mapping[str, SceneFamily] = {
-    name: SceneFamily(features, draw, frozenset(Capability), frozenset(needs), smaller, close, nearest, RELATIONS)
+    name: SceneFamily(
+        features=features,
+        draw=draw,
+        capabilities=frozenset(Capability),
+        needs=frozenset(needs),
+        smaller=smaller,
+        close=close,
+        nearest=nearest,
+        relations=RELATIONS,
+    )
     for name, (features, draw, needs) in _DRAWN.items()
 }

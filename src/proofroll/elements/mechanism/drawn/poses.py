@@ -20,7 +20,7 @@ def floats(values: Any) -> list[float]:
     return [float(value) for value in values]
 
 
-class Poses:
+class PosesAtStart:
     """Rotations and places of bodies against the world, exact for kinds of joints whose coordinates need no convention.
 
     These are revolute, prismatic, cylindrical, spherical, free and fixed joints; others count as if they stood at zero.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from proofroll.core.drawing import Choices, three_digits
-from proofroll.elements.mechanism.drawn.poses import Poses, floats
+from proofroll.elements.mechanism.drawn.poses import PosesAtStart, floats
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, WITH_AXIS, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_rpy, to_quaternion
 
@@ -18,7 +18,7 @@ _AXES = ([0, 0, 1], [0, 1, 0], [1, 0, 0], [0.6, 0, 0.8], [1, 2, -1])
 SCREW, GIMBAL = "screw", "gimbal"
 
 
-class Sketch(Poses):
+class Sketch(PosesAtStart):
     """A mechanism that is being drawn.
 
     Attributes:

@@ -27,7 +27,7 @@ _NUMBER = re.compile(r"\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+")
 
 
 def smaller(tables: Mapping[str, Any]) -> Iterator[Change]:
-    """Changes of a scene file, each of which makes the scene simpler."""
+    """Changes of a scene file that each make the scene simpler."""
     bodies = [row["name"] for row in tables["bodies"]]
     yield from (_shorter, _shorter)
     for body in reversed(bodies):

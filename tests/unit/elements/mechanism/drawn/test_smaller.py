@@ -13,7 +13,7 @@ import pytest
 from proofroll.core.drawing import Change, drawn_scene
 from proofroll.core.errors import ProofrollError
 from proofroll.elements.mechanism.drawn.families import FAMILIES
-from proofroll.elements.mechanism.drawn.poses import Poses
+from proofroll.elements.mechanism.drawn.poses import PosesAtStart
 from proofroll.elements.mechanism.drawn.smaller import remove, rounded
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.fuzz.relations import write_scene
@@ -100,7 +100,7 @@ def test_a_turned_scene_is_valid_and_turns_all_bodies_alike(family: str, tmp_pat
         turned = deepcopy(tables)
         FAMILIES[family].relations["turned"].change(turned, {})
         assert is_valid(tmp_path, turned)
-        first, second = Poses.of(tables), Poses.of(turned)
+        first, second = PosesAtStart.of(tables), PosesAtStart.of(turned)
         turns = [second.rotation(row["name"]) @ first.rotation(row["name"]).T for row in tables["bodies"]]
         shifts = [
             second.place(row["name"]) - R @ first.place(row["name"])
