@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from proofroll.cli.fuzz import fuzz
 from proofroll.cli.report import report
 from proofroll.core.engine import Sample
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring
@@ -222,10 +223,12 @@ def test_the_nightly_workflow_parses_and_runs_what_there_is() -> None:
     scripts = [step["run"] for step in job["steps"] if "run" in step]
     for script in scripts:
         subprocess.run(["bash", "-n", "-c", script], check=True)
-    (names,) = re.findall(r"proofroll report ([a-z_ ]+) --out", scripts[-1])
+    comparing, fuzzing = scripts[-2:]
+    (names,) = re.findall(r"proofroll report ([a-z_ ]+) --out", comparing)
     assert set(names.split()) <= {*comparison_names(), *(Path(name).name for name in further_comparison_names())}
-    options = {f"--{name.replace('_', '-')}" for name in inspect.signature(report).parameters}
-    assert set(re.findall(r"--(?:against|out)", scripts[-1])) <= options
+    for command, script in ((report, comparing), (fuzz, fuzzing)):
+        options = {f"--{name.replace('_', '-')}" for name in inspect.signature(command).parameters}
+        assert set(re.findall(r"--[a-z]+", script)) <= options
     assert "://" not in (ROOT / "docs" / "nightly.yml").read_text(encoding="utf-8")
 
 

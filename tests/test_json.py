@@ -43,6 +43,7 @@ from proofroll.robots.files.robot_file import LintRemark
 from proofroll.running.timing import Interval
 from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.fuzz.hunt import FoundKind, Hunt
+from proofroll.studies.fuzz.shrink import SmallestScene
 from proofroll.studies.fuzz.surprises import Surprise, SurpriseKind
 from proofroll.studies.ladder.models import Ran
 from proofroll.studies.stability.axes import Axis
@@ -179,7 +180,7 @@ TRADEOFF = (
         ("tradeoff.md", "JSON", (*TRADEOFF, Recommendation, Answer, CheckedOver)),
         ("json.md", "`ladder --json`", LADDER),
         ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
-        ("json.md", "The other commands", (Drilled, Mutated, Hunt, FoundKind, Surprise, SurpriseKind)),
+        ("json.md", "The other commands", (Drilled, Mutated, Hunt, FoundKind, SmallestScene, Surprise, SurpriseKind)),
     ],
     ids=["robots", "against", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
 )

@@ -13,7 +13,7 @@ from proofroll.cli import options
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from proofroll.studies.fuzz.hunt import Hunt
+    from proofroll.studies.fuzz.hunt import FoundKind, Hunt
 
 _LONGEST = 300  # characters of a message in the table
 
@@ -31,6 +31,9 @@ def fuzz(
     out: Annotated[Path, typer.Option(help="Folder for scenes with a surprise; earlier hunts in it are known.")] = Path(
         "out/fuzz"
     ),
+    shrink: Annotated[
+        float, typer.Option(help="Processor time to shrink each new kind [s]; 0: none is. In all half of the time.")
+    ] = 45.0,
     jobs: options.Jobs = None,
     as_json: options.Json = False,
 ) -> None:
@@ -47,6 +50,7 @@ def fuzz(
             minutes=minutes,
             seed=seed,
             families=tuple(family or ()),
+            shrink=shrink,
             jobs=jobs,
             progress=lambda current: advance(f"{len(current.kinds)} kinds of surprises, {current.new} new; scenes"),
         )
@@ -70,13 +74,31 @@ def _parts(result: Hunt) -> Iterator[Table | str]:
         yield "No surprise."
         return
     table = Table(box=None, pad_edge=False)
-    for heading in ("", "kind", "scenes", "seed", "scene"):
-        table.add_column(heading, justify="right" if heading in {"scenes", "seed"} else "left")
+    for heading in ("", "kind", "scenes", "seed", "tables"):
+        table.add_column(heading, justify="right" if heading in {"scenes", "seed", "tables"} else "left")
     for item in result.kinds:
-        sign = "new" if item.new else ""
-        table.add_row(sign, Text(item.kind), str(item.count), str(item.seed), Text(f"{item.folder}/scene.toml"))
+        sign = "new" if item.new else "finding" if item.finding else ""
+        tables = str(item.smallest.tables) if item.smallest else ""
+        table.add_row(sign, Text(item.kind), str(item.count), str(item.seed), tables)
     yield table
     for item in result.kinds:
         yield ""
         yield Text(f"{item.kind}: {item.largest.message[:_LONGEST]}")  # type: ignore[misc]  # a renderable, too
-    yield f"Show one again: proofroll compare {result.kinds[0].folder}"
+        yield from (f"  {line}" for line in _places(item))
+    first = result.kinds[0]
+    yield f"\nShow one again: proofroll compare {first.smallest.folder if first.smallest else first.folder}"
+
+
+def _places(item: FoundKind) -> Iterator[str]:
+    """Lines with the finding and the files of a kind."""
+    smallest = item.smallest
+    if item.finding:
+        yield f"known: finding {item.finding}"
+    if smallest is None:
+        yield f"{item.folder}/scene.toml"
+        return
+    yield f"{smallest.folder}/scene.toml"
+    if smallest.program:
+        yield smallest.program
+    if smallest.nearest:
+        yield f"{smallest.nearest}: {smallest.folder}/nearest/scene.toml"

@@ -27,6 +27,8 @@ from proofroll.conformance.subject import (
 # Outcome of a check in a separate process; these processes, one for each formulation and preset of an engine.
 _PASSED, _SKIPPED, _FAILED = "passed", "skipped", "failed"
 _processes: dict[str, ProcessPoolExecutor] = {}
+checked: dict[str, bool] = {}
+"""Name of each engine whose checks were run in this process -> True if none has failed."""
 
 
 # Checks that run once per engine.
@@ -95,11 +97,14 @@ class Check:
             AssertionError: the check failed; the text says why and how to run it alone.
             SkipTest: the check does not apply, or the failure is known.
         """
+        name = str(getattr(self.engine, "name", ""))
+        checked.setdefault(name, True)
         try:
             self.run()
         except SkipTest:
             raise
         except Exception as error:
+            checked[name] &= bool(self.known)
             if self.known:
                 raise SkipTest(f"known: {self.known}") from error
             raise AssertionError(f"{failure_text(error)}\n\nTo reproduce:\n{self.reproducer}") from error

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 T = TypeVar("T")
+# Changes the content of a scene file; raises LookupError where it does not apply.
+Change = Callable[[dict[str, Any]], object]
 
 
 class Choices:
@@ -64,6 +66,20 @@ class DrawnScene:
 
 
 @dataclass(frozen=True)
+class Relation:
+    """A scene that has to move as another one does.
+
+    Attributes:
+        change: makes it of the other one, whose trajectory is its second argument; raises LookupError where there is
+            no such scene.
+        back: trajectory of the changed scene, and tables of the other one -> values by name, as the other one has them.
+    """
+
+    change: Callable[[dict[str, Any], Mapping[Any, Any]], object]
+    back: Callable[[Mapping[Any, Any], Mapping[str, Any]], Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
 class SceneFamily:
     """Scenes of one structure.
 
@@ -72,12 +88,20 @@ class SceneFamily:
         draw: tables of a scene with some features, from choices.
         capabilities: names of all capabilities of its kind of element; a feature of such a name needs it.
         needs: capabilities; every scene needs at least one.
+        smaller: changes that each make a scene simpler, the boldest first.
+        close: makes lengths that follow from others fit again; its second argument is the scene before a change.
+        nearest: changes of one thing in a scene, each with its words; no words: what differs tells it.
+        relations: name -> a scene that has to move alike, see :class:`Relation`.
     """
 
     features: Mapping[str, float]
     draw: Callable[[Choices, Sequence[str]], Mapping[str, Any]]
     capabilities: frozenset[str] = frozenset()
     needs: frozenset[str] = frozenset()
+    smaller: Callable[[Mapping[str, Any]], Iterable[Change]] = lambda _: ()
+    close: Callable[[dict[str, Any], Mapping[str, Any]], object] = lambda *_: None
+    nearest: Callable[[Mapping[str, Any]], Iterable[tuple[str, Change]]] = lambda _: ()
+    relations: Mapping[str, Relation] = field(default_factory=dict)
 
     def within(self, provided: Collection[str]) -> SceneFamily:
         """The family without features that need a capability beside those that are provided."""

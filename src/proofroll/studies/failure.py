@@ -115,7 +115,7 @@ class Yardstick:
         errors = np.zeros(dataset.sizes["time"])
         comparable = self.truth is not None and BETWEEN in dataset and BETWEEN in self.truth
         pairs = run_values.off_grid(self._reference, self.name, dataset) if comparable else None
-        if pairs is not None:
+        if pairs is not None and len(pairs[0]):
             times, values, true = pairs
             wrong = np.abs(np.where(np.isfinite(true), values - true, 0.0)) / self.scale
             ends = np.minimum(np.searchsorted(dataset["time"].to_numpy(), times), len(errors) - 1)

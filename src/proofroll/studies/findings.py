@@ -45,6 +45,7 @@ class EngineFinding:
         issue: address of the public thread about it; may be empty.
         text: words of the documentation, observed behaviour, consequence, remedy.
         program: source; exit code 10 if it shows.
+        kinds: patterns of the kinds of surprises that random scenes show of it, with ``*`` for any text.
     """
 
     name: str
@@ -56,6 +57,7 @@ class EngineFinding:
     issue: str
     text: str
     program: str
+    kinds: tuple[str, ...] = ()
 
 
 class FindingState(StrEnum):
@@ -118,8 +120,11 @@ def read_finding(path: Path) -> EngineFinding:
     for name in names:
         if not isinstance(front.get(name), str):
             raise InputError(f"{path}: {name}", front.get(name), "give a text; it may be empty")
-    texts = {name: front[name] for name in names}
-    return EngineFinding(name=path.stem, **texts, text=_PROGRAM.sub("", parts[2]).strip(), program=programs[0])
+    texts, kinds = {name: front[name] for name in names}, front.get("kinds", [])
+    if not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):
+        raise InputError(f"{path}: kinds", kinds, "give a list of texts, with * for any text")
+    text = _PROGRAM.sub("", parts[2]).strip()
+    return EngineFinding(name=path.stem, **texts, text=text, program=programs[0], kinds=tuple(kinds))
 
 
 def run_findings(

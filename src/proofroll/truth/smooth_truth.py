@@ -217,7 +217,7 @@ def _of_form(tree: JointCoordinates, form: ClosedForm, times: Array) -> KeptRout
 
 def _works(mechanism: Mechanism, steps: KeptRoute | None, times: Array) -> tuple[Array, float]:
     """Work of drives at times [s], (times, drives), and what is not resolved of it [J]; NaN without steps."""
-    if steps is None:
+    if steps is None or not any(step.end > step.start for step in steps.steps):
         return np.full((len(times), len(working(mechanism))), np.nan), np.inf
     works, unresolved = works_along(mechanism, steps, times)
     return works, float(unresolved.max(initial=0.0))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from placed_balls import run_of
 
+from proofroll.core.dataset import BETWEEN
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
@@ -171,3 +172,12 @@ def test_a_path_of_several_components() -> None:
     assert yardstick.scale == float(np.max(np.ptp(true[scene.deciding].to_numpy(), axis=0)))
     assert (outcome.failure, outcome.time) == (LOST_PHASE, times[3])
     assert outcome.error == pytest.approx(1.5)
+
+
+def test_no_sample_off_the_grid_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run and a truth without a common time off the grid are held against each other on it alone."""
+    nothing = np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
+    monkeypatch.setattr("proofroll.studies.judging.run_values.off_grid", lambda *_: nothing)
+    dataset = run().assign({BETWEEN: 0.0})
+    measured = Yardstick.of(SCENE, true().assign({BETWEEN: 0.0}))
+    assert measured.off_grid(dataset).tolist() == [0.0] * len(TIMES)

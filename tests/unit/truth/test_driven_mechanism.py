@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.signal import Formula, Table
@@ -226,3 +226,16 @@ def test_servos_with_limits_agree_with_another_solver(seed: int) -> None:
     assert [event.time for event in found.events] == pytest.approx(times, abs=1e-8)
     assert found.record.q[1, 0] == pytest.approx(place, abs=1e-8)
     assert found.bars["q"][-1] < 1e-10
+
+
+def test_a_drive_that_leads_to_a_dead_centre_before_the_first_sample_ends_there() -> None:
+    """A rod between two slides, one driven, is stretched at 0.2 s: the truth ends there, without the drive's work."""
+    bodies = tuple(Body(name, 1.0, inertia=ONES) for name in "ab")
+    joints = (
+        Joint("driven", "prismatic", "world", "a", axis=(1, 0, 0), motion=Formula("0.8 + t")),  # type: ignore[arg-type]
+        Joint("led", "prismatic", "world", "b", q0=(0.6,), dependent=True),  # type: ignore[arg-type]
+    )
+    rod = Loop("rod", "distance", "a", "b", length=1.0)  # type: ignore[arg-type]
+    found = truth_of(Mechanism(bodies, joints, (rod,)), np.array([0.0, 1.0]))
+    assert "singular" in found.ended or "singular" in found.reason
+    assert np.isnan(found.works).all()

@@ -36,8 +36,8 @@ _PARTS = (1, 8, 64)  # parts of the time, the first of which is tried
 _LEAST = 2  # samples of a truth with which a motion is judged: at the first one nothing has moved yet
 
 
-def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
-    """Judges the results of a plan's cases."""
+def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagnosing: bool = True) -> Outcome:
+    """Judges the results of a plan's cases; ``diagnosing``: False leaves out causes of differences."""
     comparison = planned.comparison
     stored = {case.key: runner.store.stored(case) for case in planned.cases}
     points = {
@@ -94,7 +94,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             shared=reference.shared(run.facts.shares),
             rungs=_rungs(run, results, errors),
         )
-        if judged_run.verdict == Verdict.DIFFERS:
+        if diagnosing and judged_run.verdict == Verdict.DIFFERS:
             true, main = reference.dataset, trajectories[1.0]
             causes = diagnose_scene(reference.scene, result.certificate, main, true, run.facts.step, judgements)
             judged_run = replace(judged_run, diagnosis=causes)

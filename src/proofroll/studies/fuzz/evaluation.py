@@ -5,24 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
 
 from proofroll.core.comparison import Band, Comparison, Row
-from proofroll.core.errors import InputError
+from proofroll.core.drawing import Relation
+from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
-from proofroll.files.toml_text import toml_text
 from proofroll.running.case import EngineFacts, Status
 from proofroll.running.engine_questions import resolve, resolve_with_truth
 from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
-from proofroll.running.store import write_text
 from proofroll.studies.cases import case_of
 from proofroll.studies.comparison.compare import evaluate
 from proofroll.studies.comparison.default_comparison import able, bounds
+from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import Plan, plan, point_name
+from proofroll.studies.fuzz.relations import breaches
 from proofroll.studies.fuzz.surprises import TRUTH, Surprise, surprises
 
 _TIGHT = 1e-4  # part of its scale by which the limit of small steps of an observable may be off
@@ -50,13 +51,15 @@ class EvaluatedScene:
     seconds: float = 0.0
 
 
-def write_scene(folder: Path, tables: Mapping[str, Any]) -> None:
-    """Writes the ``scene.toml`` of a random scene into a folder of its own."""
-    folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "scene.toml", toml_text(tables))
-
-
-def evaluate_scene(folder: Path, engine: str, runner: Runner, limit: float) -> EvaluatedScene:
+def evaluate_scene(
+    folder: Path,
+    engine: str,
+    runner: Runner,
+    limit: float,
+    relations: Mapping[str, Relation] = MappingProxyType({}),
+    *,
+    diagnosing: bool = True,
+) -> EvaluatedScene:
     """Runs the scene in a folder in every able formulation of an engine at three steps, and in the truth.
 
     Args:
@@ -64,29 +67,54 @@ def evaluate_scene(folder: Path, engine: str, runner: Runner, limit: float) -> E
         engine: ``name`` or ``name[key=value,…]``; ``truth``: the truth alone.
         runner: of the cases.
         limit: wall time of one run [s].
+        relations: name -> scene against which the truth is held.
+        diagnosing: False leaves out causes of differences, which cost another truth.
 
     Raises:
         InputError: there is no such engine or setting.
     """
     begin = processor_seconds()
     try:
-        scene, file = load_scene(str(folder)), read_scene_file(str(folder))
-    except InputError as error:
+        outcome = outcome_of(folder, engine, runner, limit, diagnosing=diagnosing)
+    except _Invalid as error:
         return EvaluatedScene(invalid=str(error), seconds=processor_seconds() - begin)
+    if outcome is None:
+        return EvaluatedScene(fits=False, seconds=processor_seconds() - begin)
+    (point,) = outcome.points.values()
+    shown = surprises(outcome)
+    for name, relation in relations.items():
+        shown += breaches(folder, point, name, relation, runner)
+    return EvaluatedScene(
+        truth=point.result.status,
+        surprises=tuple(sorted(shown, key=lambda item: -item.size)),
+        seconds=processor_seconds() - begin,
+    )
+
+
+class _Invalid(Exception):  # noqa: N818 -- a fact about a scene
+    """The reader refuses a scene."""
+
+
+def outcome_of(folder: Path, engine: str, runner: Runner, limit: float, *, diagnosing: bool = False) -> Outcome | None:
+    """Outcome of the comparison of a random scene, see :func:`evaluate_scene`; None: no formulation can represent it.
+
+    Without a truth the engine is not run.
+    """
+    try:
+        scene, file = load_scene(str(folder)), read_scene_file(str(folder))
+    except ProofrollError as error:
+        raise _Invalid(str(error)) from None
     rows = _rows(engine, scene, file, runner)
     if not rows and engine != TRUTH:
-        return EvaluatedScene(fits=False, seconds=processor_seconds() - begin)
+        return None
     comparison = _comparison(folder, scene, file, rows, limit)
     planned = plan(comparison, workers=runner.workers) if rows else _truth_alone(comparison, scene, file, runner)
     results = runner.run(planned.stages[0])
     (truth,) = results.values()
-    if truth.status is Status.DONE:
-        results |= runner.run(planned.cases)
-        outcome = evaluate(planned, results, runner)
-    else:
-        outcome = evaluate(replace(planned, runs=[]), results, runner)
-    shown = tuple(surprises(outcome))
-    return EvaluatedScene(truth=truth.status, surprises=shown, seconds=processor_seconds() - begin)
+    if truth.status is not Status.DONE:
+        return evaluate(replace(planned, runs=[]), results, runner)
+    results |= runner.run(planned.cases)
+    return evaluate(planned, results, runner, diagnosing=diagnosing)
 
 
 def _truth_alone(comparison: Comparison, scene: Scene, file: SceneFile, runner: Runner) -> Plan:

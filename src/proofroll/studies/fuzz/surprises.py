@@ -11,6 +11,7 @@ import numpy as np
 
 from proofroll.core.arrays import magnitudes
 from proofroll.core.errors import ProofrollError
+from proofroll.core.observable import Observable, Role
 from proofroll.core.verdict import Judgement, LimitResult, Verdict
 from proofroll.running.case import Result, Status
 from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
@@ -18,19 +19,24 @@ from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
 TRUTH = "truth"
+HANGS, REFUSES = "hangs", "refuses"
+RELATION = "relation "  # beginning of the surprise of a truth that breaks a relation
 _PARTED = 0.1  # part of the largest difference from which on a run has parted from the truth
 _LARGE = 0.03  # part of its scale by which an observable without a shown limit may be off
 _EVENTFUL = 100.0  # by which the limit of small steps of a run with events may be farther off
 _FALLEN = 0.8  # largest ratio of the errors at the shortest and the longest step that counts as falling
+_OF_MOTION = frozenset({"m", "rad", "m/s", "rad/s", "1"})  # units of quantities of motion
+_EVENTS, _OF_EVENTS = "events", 1.0  # quantity, and size where their number is not the true one [decades]
+_SAME = 0.01  # relative difference of errors that are alike at all steps
 _FEW = 2  # samples that count as the start of a run
 # Status of a run -> kind of surprise and its size [decades]: the worst first in a table of kinds.
 _OF_STATUS = {
     Status.CRASHED: ("crashes", 9.0),
-    Status.TIMEOUT: ("hangs", 8.0),
+    Status.TIMEOUT: (HANGS, 8.0),
     Status.WRONG_MODEL: ("wrong model", 5.0),
     Status.DIVERGED: ("stops", 5.0),
     Status.ANOTHER_SCENE: ("another scene", 1.0),
-    Status.REFUSED: ("refuses", 0.0),
+    Status.REFUSED: (REFUSES, 0.0),
 }
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
@@ -42,7 +48,7 @@ class SurpriseKind:
     Attributes:
         formulation: engine and formulation, ``mujoco joints``; or ``truth``.
         surprise: its sign, in a few words.
-        quantity: first word of the observable that shows it, or of the message without numbers.
+        quantity: ``motion``, ``events``, or first word of another observable; or beginning of the message.
         phase: of the run when it shows: ``start``, the last event before, or ``underway``; empty: before the run.
     """
 
@@ -50,6 +56,11 @@ class SurpriseKind:
     surprise: str
     quantity: str = ""
     phase: str = ""
+
+    @property
+    def relation(self) -> str:
+        """Name of the relation that the truth breaks; empty: the surprise is another one."""
+        return self.surprise.removeprefix(RELATION) if self.surprise.startswith(RELATION) else ""
 
     def __str__(self) -> str:
         """Text for a table, and key of what is known from earlier hunts."""
@@ -106,43 +117,54 @@ def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
     if reference.ill_posed:
         return
     judged = [item for item in run.judgements if item.verdict not in {Verdict.NOT_JUDGED, Verdict.ILL_POSED}]
-    wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _falls(run, item))]
+    wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _errors(run, item))]
     if wrong:
-        worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item)))
-        surprise = "another limit" if worst.limit is LimitResult.ANOTHER else "no limit"
-        quantity, phase = worst.observable.partition(".")[0], _phase(run, worst.observable, reference)
-        kind = SurpriseKind(formulation, surprise, quantity, phase)
+        worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item, events=False)))
+        quantity = _quantity(reference.scene.observables[worst.observable], worst.observable)
+        kind = SurpriseKind(formulation, "wrong limit", quantity, _phase(run, worst.observable, reference))
         causes = "".join(f"; {cause.sentence}" for cause in run.diagnosis)
-        yield Surprise(kind, _size(worst), f"{worst.observable}: {worst.reason}{causes}")
+        yield Surprise(kind, _size(worst, quantity == _EVENTS), f"{worst.observable}: {worst.reason}{causes}")
 
 
-def _falls(run: Run, judgement: Judgement) -> bool:
-    """True if the error of an observable falls from the longest step, or loosest tolerance, to the other end."""
+def _quantity(observable: Observable, label: str) -> str:
+    """Word for a quantity: ``events``, ``motion``, or the first word of another one."""
+    if observable.role is Role.EVENT:
+        return _EVENTS
+    return "motion" if observable.unit in _OF_MOTION else label.partition(".")[0]
+
+
+def _errors(run: Run, judgement: Judgement) -> list[float]:
+    """Errors of an observable, from the shortest step, or tightest tolerance, to the other end."""
     assert run.facts is not None  # it has run
     if run.facts.resolution is None:
-        return False
+        return [judgement.error]
     errors = {rung.value: rung.errors.get(judgement.observable, math.inf) for rung in run.rungs}
     errors[float(run.facts.settings[run.facts.resolution])] = judgement.error
-    return errors[min(errors)] < _FALLEN * errors[max(errors)]
+    return [errors[step] for step in sorted(errors)]
 
 
-def _is_wrong(judgement: Judgement, eventful: bool, falls: bool) -> bool:
+def _is_wrong(judgement: Judgement, eventful: bool, errors: list[float]) -> bool:
     """True if small steps lead to another motion than the true one, or nowhere.
 
-    An event that falls between two steps leaves errors whose order three steps do not show, so that more is allowed.
+    An event that falls between two steps leaves errors whose order three steps do not show, so that more is allowed;
+    but not where all three have the same error.
     """
+    steady = len(errors) > 1 and max(errors) - min(errors) <= _SAME * max(errors)
     if judgement.limit is LimitResult.ANOTHER and judgement.limit_error is not None:
-        allowed = judgement.tolerance * (_EVENTFUL if eventful else 1.0)
+        allowed = judgement.tolerance * (_EVENTFUL if eventful and not steady else 1.0)
         return not judgement.limit_error - (judgement.limit_doubt or 0.0) <= allowed
+    if judgement.limit is not LimitResult.NOT_SHOWN:
+        return False
+    falls = len(errors) > 1 and errors[0] < _FALLEN * errors[-1]
     large = not judgement.error <= max(_LARGE * judgement.scale, judgement.tolerance)
-    return judgement.limit is LimitResult.NOT_SHOWN and large and not falls
+    return (large and not falls) or (steady and judgement.error > judgement.tolerance)
 
 
-def _size(judgement: Judgement) -> float:
+def _size(judgement: Judgement, events: bool) -> float:
     """Decades by which an error exceeds its tolerance; the error of the limit of small steps, if there is one."""
     error = judgement.limit_error if judgement.limit is LimitResult.ANOTHER else judgement.error
     if error is None or not math.isfinite(error):
-        return max(size for _, size in _OF_STATUS.values())
+        return _OF_EVENTS if events else max(size for _, size in _OF_STATUS.values())
     return math.log10(max(error / judgement.tolerance, 1e-9))
 
 
@@ -154,8 +176,9 @@ def _failed(formulation: str, result: Result) -> Surprise:
 
 def _words(message: str) -> str:
     """Beginning of a message without numbers and names of parts, so that it is alike in scenes alike."""
-    words = re.sub(r"\b[a-z]{3}\d+\b", "…", message)
-    return " ".join(_NUMBER.sub("#", words).split()[:12])
+    words = _NUMBER.sub("#", re.sub(r"\b[a-z]{2,3}\d+\b", "…", message))
+    words = re.sub(r"#(, #)+", "#", words).replace("angular acceleration", "acceleration")  # of which is furthest off
+    return " ".join(words.split()[:12])
 
 
 def formulation_of(run: Run) -> str:

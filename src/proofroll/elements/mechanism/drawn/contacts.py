@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.drawing import Choices
-from proofroll.elements.mechanism.drawn.sketch import WORLD, Sketch, floats
+from proofroll.elements.mechanism.drawn.closing import extent
+from proofroll.elements.mechanism.drawn.poses import WORLD, floats
+from proofroll.elements.mechanism.drawn.sketch import Sketch
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability as Capability
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, about, to_quaternion
@@ -94,24 +96,16 @@ def _wall(sketch: Sketch, shape: str, floor: Array, origin: Array) -> tuple[Arra
     return frame, origin + _WALLS[shape] * radius * frame[:, 2]
 
 
-def _outline(shape: str, size: float) -> tuple[dict[str, Any], Any]:
-    """Keys of a geometry of about this size, and its extent from its centre along a direction of its body."""
-    if shape == "sphere":
-        return {"radius": size}, lambda _: size
-    if shape == "ellipsoid":
-        axes = np.array([1.0, 0.8, 0.6]) * size
-        return {"axes": floats(axes)}, lambda direction: float(np.linalg.norm(axes * direction))
-    if shape == "box":
-        edges = np.array([2.4, 1.6, 1.2]) * size
-        return {"size": floats(edges)}, lambda direction: float(np.abs(direction) @ edges / 2)
-    if shape == "capsule":
-        keys = {"radius": size / 2, "length": 2 * size, "axis": [1, 0, 0]}
-        return keys, lambda direction: size / 2 + size * abs(float(direction[0]))
-    half = 0.6 * size
-    return {
-        "radius": size,
-        "length": 2 * half,
-    }, lambda direction: half * abs(float(direction[2])) + size * float(np.linalg.norm(direction[:2]))
+def _outline(shape: str, size: float) -> dict[str, Any]:
+    """Keys of a geometry of about this size."""
+    keys: Mapping[str, dict[str, Any]] = {
+        "sphere": {"radius": size},
+        "ellipsoid": {"axes": [size, 0.8 * size, 0.6 * size]},
+        "box": {"size": [2.4 * size, 1.6 * size, 1.2 * size]},
+        "capsule": {"radius": size / 2, "length": 2 * size, "axis": [1, 0, 0]},
+        "cylinder": {"radius": size, "length": 1.2 * size},
+    }
+    return {"kind": shape, **keys[shape]}
 
 
 def _place(
@@ -139,8 +133,8 @@ def _place(
     choices, normal = sketch.choices, frame[:, 2]
     falls = FALL in features
     attitude = sketch.turned() if falls or shape == "sphere" else frame @ about(2, choices.number(-3, 3))
-    keys, extent = _outline(shape, size)
-    height = extent(attitude.T @ normal)
+    keys = _outline(shape, size)
+    height = extent(keys, attitude.T @ normal)
     centre = point + normal * (height + (choices.number(0.05, 0.2, sketch.length) if falls else 0.0))
     body = sketch.add_body(com=[0.0, 0.0, 0.0])
     if UNEQUAL not in features:
@@ -159,7 +153,7 @@ def _place(
     free = {"kind": str(JointKind.FREE), "parent": WORLD, "child": body["name"]}
     sketch.add("joints", **free, q0=floats(start), v0=floats(rates))
     previous = sketch.tables["geometries"][-1]["name"]
-    geometry = sketch.add("geometries", body=body["name"], kind=shape, **keys)
+    geometry = sketch.add("geometries", body=body["name"], **keys)
     sketch.add("pairs", geometries=[geometry["name"], previous], **pair)
     top: Array = centre + normal * height
     return top

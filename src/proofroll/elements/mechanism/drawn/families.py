@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from proofroll.core.drawing import SceneFamily
+from proofroll.elements.mechanism.drawn.closing import close
 from proofroll.elements.mechanism.drawn.contacts import CONTACT_FEATURES, contact
+from proofroll.elements.mechanism.drawn.nearest import nearest
+from proofroll.elements.mechanism.drawn.relations import RELATIONS
+from proofroll.elements.mechanism.drawn.smaller import smaller
 from proofroll.elements.mechanism.drawn.trees import BAR_FEATURES, LOOP_FEATURES, TREE_FEATURES, bar, loop, tree
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability as Capability
@@ -17,6 +21,15 @@ _DRAWN = {
     "contact": (CONTACT_FEATURES, contact, {Capability.CONTACT}),
 }
 FAMILIES: Mapping[str, SceneFamily] = {
-    name: SceneFamily(features, draw, frozenset(Capability), frozenset(needs))
+    name: SceneFamily(
+        features=features,
+        draw=draw,
+        capabilities=frozenset(Capability),
+        needs=frozenset(needs),
+        smaller=smaller,
+        close=close,
+        nearest=nearest,
+        relations=RELATIONS,
+    )
     for name, (features, draw, needs) in _DRAWN.items()
 }

@@ -6,7 +6,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from proofroll.core.drawing import three_digits
-from proofroll.elements.mechanism.drawn.sketch import SCREW, WORLD, Sketch, floats
+from proofroll.elements.mechanism.drawn.poses import WORLD, floats
+from proofroll.elements.mechanism.drawn.sketch import SCREW, Sketch
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability as Capability
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import from_rpy, to_rpy

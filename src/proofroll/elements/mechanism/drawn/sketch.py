@@ -6,32 +6,19 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from proofroll.core.drawing import Choices, three_digits
-from proofroll.elements.mechanism.scene.joint_kinds import (
-    ONE_COORDINATE,
-    SLIDING,
-    WITH_AXIS,
-    WITH_QUATERNION,
-    JointKind,
-)
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_quaternion, from_rpy, to_quaternion
+from proofroll.elements.mechanism.drawn.poses import PosesAtStart, floats
+from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, WITH_AXIS, WITH_QUATERNION, JointKind
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_rpy, to_quaternion
 
 _STEPS = 250  # of the natural time √(L/g)
 _EVERY = 20  # steps between samples
 _SELDOM = 0.15  # probability of another decade of lengths, masses, speeds or of one body's mass
 _AXES = ([0, 0, 1], [0, 1, 0], [1, 0, 0], [0.6, 0, 0.8], [1, 2, -1])
-WORLD = "world"
 SCREW, GIMBAL = "screw", "gimbal"
 
 
-def floats(values: Any) -> list[float]:
-    """A vector as a list of Python's own numbers."""
-    return [float(value) for value in values]
-
-
-class Sketch:
+class Sketch(PosesAtStart):
     """A mechanism that is being drawn.
 
     Attributes:
@@ -44,6 +31,7 @@ class Sketch:
     """
 
     def __init__(self, choices: Choices) -> None:
+        super().__init__()
         self.choices = choices
         self.length = choices.decade(-2, 2) if choices.happens(_SELDOM) else 1.0
         self.mass = choices.decade(-3, 3) if choices.happens(_SELDOM) else 1.0
@@ -52,7 +40,6 @@ class Sketch:
         self.moment = self.mass * self.gravity * self.length
         self.speed = choices.pick((10.0, 30.0)) if choices.happens(_SELDOM) else 1.0
         self.tables: dict[str, list[dict[str, Any]]] = {}
-        self._poses: dict[str, tuple[Array, Array]] = {WORLD: (np.eye(3), np.zeros(3))}
         self._direction = self.turned()[:, 2]
 
     def turned(self) -> Array:
@@ -102,7 +89,7 @@ class Sketch:
             row["q0"], row["v0"] = start
         row |= keys
         joint = self.add("joints", **{key: value for key, value in row.items() if value is not None})
-        self._poses[child] = self._pose(joint)
+        self.hang(joint)
         return joint
 
     def _start(self, kind: str) -> tuple[Any, Any] | None:
@@ -127,44 +114,6 @@ class Sketch:
         if not rates:
             return None
         return ([*places, *angles], rates) if len(rates) > 1 else ([*places, *angles][0], rates[0])
-
-    def _pose(self, joint: dict[str, Any]) -> tuple[Array, Array]:
-        """Rotation and place of a joint's child in the world; exact for kinds whose coordinates need no convention."""
-        R, place = self._poses[joint["parent"]]
-        place = place + R @ np.array(joint["position"], dtype=float)
-        R = R @ from_rpy(joint["orientation"])
-        kind, coordinates = joint["kind"], joint.get("q0")
-        if coordinates is not None and kind in {JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.CYLINDRICAL}:
-            frame = frame_of_axis(joint["axis"])
-            slide, angle = coordinates if kind == JointKind.CYLINDRICAL else (coordinates, coordinates)
-            if kind in SLIDING:
-                place = place + R @ frame[:, 2] * slide
-            if kind != JointKind.PRISMATIC:
-                turn = np.array(
-                    [[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]]
-                )
-                R = R @ frame @ turn @ frame.T
-        elif coordinates is not None and kind in WITH_QUATERNION:
-            place = place + R @ np.array(coordinates[:-4] or [0.0, 0.0, 0.0])
-            R = R @ from_quaternion(coordinates[-4:])
-        return R, place - R @ np.array(joint.get("child_position", [0, 0, 0]), dtype=float)
-
-    def in_body(self, body: str, point: Array) -> list[float]:
-        """Place in a body's frame of a point of the world at the start."""
-        R, place = self._poses[body]
-        return floats(R.T @ (point - place))
-
-    def along(self, body: str, direction: Array) -> list[float]:
-        """Direction in a body's frame of a direction of the world at the start."""
-        return floats(self._poses[body][0].T @ direction)
-
-    def rotation(self, body: str) -> Array:
-        """Rotation of a body against the world at the start."""
-        return self._poses[body][0]
-
-    def place(self, body: str) -> Array:
-        """Place of a body's frame in the world at the start."""
-        return self._poses[body][1]
 
     @property
     def bodies(self) -> list[str]:

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.drawing import Choices
+from proofroll.core.drawing import Choices, three_digits
 from proofroll.elements.mechanism.drawn.laws import WEIGHTS, add_laws, controller
-from proofroll.elements.mechanism.drawn.sketch import GIMBAL, WORLD, Sketch, floats
+from proofroll.elements.mechanism.drawn.poses import WORLD, floats
+from proofroll.elements.mechanism.drawn.sketch import GIMBAL, Sketch
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability as Capability
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, FACTS, LOOP_FACTS, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_rpy, to_rpy
@@ -132,7 +133,7 @@ def bar(choices: Choices, features: Sequence[str]) -> dict[str, Any]:
     turn = math.atan2(*(knee - end)[::-1])
     for name, size in (("crank", crank), ("rod", rod), ("output", rocker)):
         mass = sketch.add_body(name=name, com=[size / 2, 0, 0])["mass"]
-        sketch.tables["bodies"][-1]["inertia"] = [mass * size**2 / 100, mass * size**2 / 12, mass * size**2 / 11]
+        sketch.tables["bodies"][-1]["inertia"] = [three_digits(part * mass * size**2) for part in (0.05, 0.08, 0.09)]
     hinge: dict[str, Any] = {"child_position": None, "axis": [0, 0, 1], "v0": None, "position": [0, 0, 0]}
     revolute = JointKind.REVOLUTE
     rate = choices.number(1, 5, 1 / sketch.time)

@@ -20,6 +20,7 @@ from proofroll.elements.mechanism.scene.spring_law import SpringLaw
 
 ForceKind = Literal["force", "moment"]
 Axes = Literal["world", "body"]
+_ROUND_OFF = 1e-12  # relative to the places of its points: a shorter distance has no direction
 _LOAD: Mapping[str, Any] = {"unit": {"force": "N", "moment": "N m"}, "signal": True}
 
 
@@ -91,6 +92,10 @@ class Loop:
         checks.read(self, where, checks.number, "length", at_least=0)
         if (self.kind == DISTANCE) != (self.length > 0):
             advice = "a distance loop needs one" if self.kind == DISTANCE else f"a {self.kind} loop has none; remove it"
+            raise InputError(f"{where}.length", self.length, advice)
+        size = max(map(abs, (*self.position_a, *self.position_b)))
+        if 0 < self.length <= _ROUND_OFF * size:
+            advice = "its points are one within rounding; take a spherical loop"
             raise InputError(f"{where}.length", self.length, advice)
 
     @cached_property

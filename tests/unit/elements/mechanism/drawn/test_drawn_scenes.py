@@ -15,7 +15,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.drawn.families import FAMILIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.fuzz.evaluation import write_scene
+from proofroll.studies.fuzz.relations import write_scene
 from proofroll.vocabulary.document import CHAPTERS
 
 SEEDS = range(10)

@@ -1,0 +1,35 @@
+"""Thirty random scenes, the same every time, against the relations of the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from proofroll.core.drawing import drawn_scene
+from proofroll.elements.mechanism.drawn.families import FAMILIES
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+from proofroll.studies.fuzz.evaluation import evaluate_scene
+from proofroll.studies.fuzz.relations import relations_of, write_scene
+
+# Seed -> beginning of the kind that its truth has with reason.
+_ENDS = {12: "truth; ends; the truth ends at t = # s: friction or stops of"}
+
+
+@pytest.mark.drill
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("seed", range(30))
+def test_a_random_scene_has_a_truth_that_keeps_a_relation(seed: int, tmp_path: Path) -> None:
+    """The truth goes to the end, or says why not, and a scene that has to move alike does."""
+    drawn = drawn_scene(FAMILIES, seed)
+    relations = relations_of(FAMILIES[drawn.family])
+    name = sorted(relations)[seed // len(FAMILIES) % len(relations)]
+    write_scene(tmp_path / "scene", drawn.tables)
+    runner = Runner(Store(tmp_path / "cases"), jobs=1)
+    evaluated = evaluate_scene(tmp_path / "scene", "truth", runner, 120, {name: relations[name]})
+    assert evaluated.invalid == ""
+    kinds = [str(item.kind) for item in evaluated.surprises]
+    assert kinds == ([_ENDS[seed]] if seed in _ENDS else [])
