@@ -41,7 +41,7 @@ def broken(tmp_path: Path) -> dict[str, str]:
     [
         (["--version"], "proofroll "),
         (["--help"], "stability"),
-        (["run", "sphere_in_cylinder", "--engine", "reduced", "--until", "0.1"], "omega1"),
+        (["run", "sphere_in_cylinder", "--engine", "reduced", "--until", "0.1"], "ball.x"),
         (["check", "sphere_in_cylinder"], "is sound"),
         pytest.param(["check", "stick_slip"], "is sound", marks=pytest.mark.drill),
     ],

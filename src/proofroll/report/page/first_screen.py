@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 STATES: Mapping[str, tuple[str, str, str]] = {
     "agrees": ("✓", "holds", "The error is within the tolerance, and smaller steps do not contradict it."),
     "partly": ("◐", "holds some scenes", "The tolerance is held in some scenes of this kind, not in all."),
-    "converges": ("≈", "finer steps needed", "Beyond the tolerance at the steps that were run; smaller come closer."),
+    "converges": ("↘", "finer steps needed", "Beyond the tolerance at the steps that were run; smaller come closer."),
     "differs": ("✗", "differs", "Small steps lead elsewhere, or nowhere that could be shown."),
     "refused": ("⊘", "refused", "The engine was asked, declined the scene and says why."),
     "unjudged": ("?", "not judged", "It ran; the requested quantities are not judged there."),
