@@ -147,7 +147,7 @@ def test_tradeoff_of_two_elements(command_line: Proofroll, springs: Path) -> Non
     two.mkdir()
     mass = '[[masses]]\nname = "n"\nmass = 1.0\nstiffness = 80.0\nx0 = 0.1\n'
     (two / "scene.toml").write_text(SCENE + mass)
-    given = ("--engine", "sprung", "--until", "0.5", "--quantity", "x.m", "--quantity", "x.n")
+    given = ("--engine", "sprung", "--until", "0.5", "--quantity", "x.m", "--quantity", "x.n", "--all")
     code, out, err = command_line("tradeoff", str(two), *given)
     assert code == 0, err
     assert "x.m [m]" in out

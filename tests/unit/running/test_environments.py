@@ -56,7 +56,8 @@ def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: 
     assert python_at("aged@1.0") == made.python
     assert {"aged==1.0", "proofroll==0.1.0"} <= set(made.packages)
     code, out, err = proofroll("run", "sphere_in_cylinder", "--engine", "aged@1.0", "--until", "0.01")
-    assert (code, "aged@1.0 (formulation=midpoint" in out) == (0, True), err
+    assert code == 0, err
+    assert "aged@1.0 midpoint" in out, out
     code, _, err = proofroll("engines", "add", "aged", "--requirement", "aged==1.0")
     assert (code, "it is there already" in err) == (2, True)
     made.python.unlink()
