@@ -46,7 +46,9 @@ def test_the_command_counts_them_too(fine: dict[str, float], proofroll: object) 
     assert "uncertain" not in json.loads(out)
     code, out, _ = proofroll("run", "pendulum", "--engine", "mujoco[dt=0.5]", "--every", "1")  # type: ignore[operator]
     assert code == 0
-    assert "turns show in samples that are 0.05 s apart or less, and these are 0.5 s apart: q.pivot" in " ".join(out.split())
+    assert "turns show in samples that are 0.05 s apart or less, and these are 0.5 s apart: q.pivot" in " ".join(
+        out.split()
+    )
 
 
 def test_whole_steps_between_samples() -> None:
