@@ -27,7 +27,7 @@ def of(cell: ChoiceCell, tolerance: float, date: str) -> ModelLines:
     """Lines for a cell that holds a tolerance: the engine's own, a command, and a test; ``date``: of the report."""
     run = cell.run
     assert run is not None  # it holds
-    own, note = _own(run.spec)
+    lines, note = _own(run.spec)
     changed = [word for word in run.place.split(", ") if word and "…" not in word]  # no command has a range
     words = ["proofroll", "compare", run.scene, "--engine", run.spec, "--until", f"{run.until:g}", *_sampled(run)]
     scene = f'load_scene("{run.scene}", {", ".join(changed)})' if changed else f'"{run.scene}"'
@@ -40,7 +40,7 @@ def of(cell: ChoiceCell, tolerance: float, date: str) -> ModelLines:
         "    )",
     ]
     return ModelLines(
-        ({"In your model": "\n".join(own)} if own else {})
+        ({"In your model": "\n".join(lines)} if lines else {})
         | {
             "Check it": shlex.join([*words, *(part for word in changed for part in ("--set", word))]),
             "Keep it, pytest": "\n".join(test),

@@ -76,8 +76,8 @@ def joined(parts: list[Replay]) -> Replay | None:
         return None
     cases, numbers = [case for part in parts for case in part.cases], [item for part in parts for item in part.packed]
     worst = max(parts, key=lambda part: part.largest)
-    before = sum(len(part.cases) for part in parts[: parts.index(worst)])
-    return replace(worst, start=before + worst.start, cases=cases, packed=numbers)
+    offset = sum(len(part.cases) for part in parts[: parts.index(worst)])
+    return replace(worst, start=offset + worst.start, cases=cases, packed=numbers)
 
 
 def frame_times(until: float, fastest: float) -> FloatArray:

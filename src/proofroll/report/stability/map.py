@@ -65,11 +65,11 @@ def heat_map(study: StabilityStudy) -> HeatMap:
     ]
     axes = [axis for axis in mapped if axis.values]
     columns = [(axis.name, value) for axis in axes for value in axis.values]
-    at = {(point.curve, point.axis, point.value): point for point in shown}
+    points = {(point.curve, point.axis, point.value): point for point in shown}
     groups: dict[str, list[tuple[str, list[BoundaryPoint | None]]]] = {}
     for curve, point in {point.curve: point for point in shown}.items():
         name = name_of(point).removeprefix(engine_title(point.engine)).strip(", ") or curve
-        groups.setdefault(point.engine, []).append((name, [at.get((curve, *column)) for column in columns]))
+        groups.setdefault(point.engine, []).append((name, [points.get((curve, *column)) for column in columns]))
     return HeatMap(axes, groups, {engine: _sentence(rows) for engine, rows in groups.items()})
 
 

@@ -97,15 +97,15 @@ def breaches(folder: Path, point: ComparedPoint, name: str, relation: Relation, 
     if result.status is not Status.DONE:
         yield breach("no result", _LARGE, result.message)
         return
-    other = Reference.of(scene, runner.store.stored(case).dataset)
-    if other.ended:
-        yield breach("ends", _LARGE, other.ended)
-    elif not other.ill_posed:
-        yield from _worst(reference, other.dataset, relation.back(other.dataset, tables), breach)
+    partner = Reference.of(scene, runner.store.stored(case).dataset)
+    if partner.ended:
+        yield breach("ends", _LARGE, partner.ended)
+    elif not partner.ill_posed:
+        yield from _worst(reference, partner.dataset, relation.back(partner.dataset, tables), breach)
 
 
 def _worst(
-    reference: Reference, other: xr.Dataset, values: Mapping[str, Any], breach: Callable[[str, float, str], Surprise]
+    reference: Reference, partner: xr.Dataset, values: Mapping[str, Any], breach: Callable[[str, float, str], Surprise]
 ) -> Iterator[Surprise]:
     """Breach of the variable that differs by the most error bars, if it differs by too many."""
     found: list[tuple[float, str, str]] = []
@@ -115,7 +115,7 @@ def _worst(
         variable = reference.dataset[name]
         true = variable.to_numpy()[: len(curve)]
         difference = np.abs(curve - true)
-        bar = _bar(reference.dataset, name) + _bar(other, name)
+        bar = _bar(reference.dataset, name) + _bar(partner, name)
         allowed = _BARS * bar + _ROUND_OFF * max(float(np.abs(true).max()), reference.sizes.get(name, 0.0))
         if not difference.max() <= allowed:
             index = np.unravel_index(np.argmax(difference), difference.shape)[0]

@@ -166,8 +166,8 @@ class Shrinker:
 
     def _shows(self, evaluated: EvaluatedScene) -> bool:
         """True if a scene shows the surprise."""
-        wanted = self._surprise
-        return any(item.kind == wanted.kind and abs(item.size - wanted.size) <= _DECADE for item in evaluated.surprises)
+        target = self._surprise
+        return any(item.kind == target.kind and abs(item.size - target.size) <= _DECADE for item in evaluated.surprises)
 
     def _nearest(self, smallest: Mapping[str, Any]) -> tuple[str, Mapping[str, Any] | None]:
         """Clause on the nearest scene without any surprise, and its tables; None: none was found in time."""
@@ -266,9 +266,9 @@ def _difference(tables: Mapping[str, Any], other: Mapping[str, Any]) -> str:
     clauses = []
     for name, row in _rows(other):
         for key, value in row.items():
-            before = former.get(name, {}).get(key)
-            if value != before:
-                instead = f" instead of {_shown(before)}" if before is not None else ""
+            former_value = former.get(name, {}).get(key)
+            if value != former_value:
+                instead = f" instead of {_shown(former_value)}" if former_value is not None else ""
                 clauses.append(f"{name}{'.' if name else ''}{key} = {_shown(value)}{instead}")
     return " and ".join(clauses)
 

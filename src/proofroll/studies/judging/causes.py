@@ -14,26 +14,21 @@ from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, mista
 from proofroll.core.number_format import number, spaced
 
 _DEGREE = np.pi / 180
-# Unit -> factors by which numbers in another unit or sign differ, each with a clause.
-_SIGN = (-1.0, "the opposite of the truth: its sign?")
+# Unit -> factors by which numbers in another unit or sign differ, each with a clause and the unit of a length or angle
+# that its columns then have, if `--map` can say so.
+_SIGN = (-1.0, "the opposite of the truth: its sign?", "")
 _ANGLES = (
-    (1 / _DEGREE, "57.3 times the truth: degrees?"),
-    (_DEGREE, "the truth over 57.3: radians, read as degrees?"),
+    (1 / _DEGREE, "57.3 times the truth: degrees?", "deg"),
+    (_DEGREE, "the truth over 57.3: radians, read as degrees?", ""),
     _SIGN,
 )
 _LENGTHS = (
-    (1e3, "a thousand times the truth: millimetres?"),
-    (1e2, "a hundred times the truth: centimetres?"),
-    (1e-3, "a thousandth of the truth: metres, read as millimetres?"),
+    (1e3, "a thousand times the truth: millimetres?", "mm"),
+    (1e2, "a hundred times the truth: centimetres?", "cm"),
+    (1e-3, "a thousandth of the truth: metres, read as millimetres?", ""),
     _SIGN,
 )
 _FACTORS = {"rad": _ANGLES, "rad/s": _ANGLES, "m": _LENGTHS, "m/s": _LENGTHS}
-# Beginning of a clause -> unit of the truth -> unit that the columns have.
-_UNITS = {
-    "57.3 times": {"rad": "deg", "rad/s": "deg/s"},
-    "a thousand times": {"m": "mm", "m/s": "mm/s"},
-    "a hundred times": {"m": "cm", "m/s": "cm/s"},
-}
 _FEW = 5  # samples from which a fitted number proves something
 # Part of a difference that a record at other times may leave: a pendulum whose push was left out leaves a fiftieth.
 _AT_ANOTHER_TIME = 1e-2
@@ -110,17 +105,19 @@ def mapping(cause: str, units: Mapping[str, str], columns: Mapping[str, str]) ->
     """
     columns_of = {text.partition("[")[0]: column for column, text in columns.items()}
     name, _, says = cause.partition(" is ")
-    for start, of_unit in _UNITS.items():
-        if says.startswith(start) and units.get(name) in of_unit:
-            return [f"{columns_of.get(name, name)}={name}[{of_unit[units[name]]}]"]
+    unit = units.get(name, "")
+    for _, words, length_or_angle in _FACTORS.get(unit, ()):
+        if length_or_angle and says.startswith(words):
+            per_time = "/s" if unit.endswith("/s") else ""
+            return [f"{columns_of.get(name, name)}={name}[{length_or_angle}{per_time}]"]
     pair, swapped, _ = cause.partition(" are each the other")
     a, _, b = pair.partition(" and ")
     return [f"{columns_of.get(a, a)}={b}", f"{columns_of.get(b, b)}={a}"] if swapped else []
 
 
 def _scaled(item: GivenVariable) -> Iterator[tuple[str, FloatArray]]:
-    for factor, says in _FACTORS.get(item.unit, (_SIGN,)):
-        yield says, factor * item.true
+    for factor, words, _ in _FACTORS.get(item.unit, (_SIGN,)):
+        yield words, factor * item.true
 
 
 def _combined(name: str, variables: Mapping[str, GivenVariable]) -> Iterator[tuple[str, FloatArray]]:

@@ -2,7 +2,7 @@
 
 Tables and held values are lines from one break to the next: their coefficients are parameters, too.
 Operations with plain numbers as of formulas (0, 1, 2, a half and their negatives) keep them, as those of a scene may be
-any: a scene with operand numbers has the same expression.
+any: a scene with other numbers has the same expression.
 """
 
 from __future__ import annotations

@@ -282,8 +282,9 @@ class CompiledMode:
             if rise is not None:
                 if rise[1] in self._kinks and not self._slips:
                     place = step.start + _BEFORE * (rise[0] - step.start)
-                    steps += self._steps(pars, steps.pop().first, float(step.inside(np.array([place]))[-1, 0]))
-                    rise = steps[-1].end, rise[1]
+                    shorter = [*self._steps(pars, step.first, float(step.inside(np.array([place]))[-1, 0]))]
+                    if shorter:  # none where the stretch begins there
+                        steps[-1:], rise = shorter, (shorter[-1].end, rise[1])
                 break
         last = steps[-1].last if rise is None else steps[-1].inside(np.array([rise[0]]))[:, 0]
         end, guard = (until, None) if rise is None else (float(last[-1]), rise[1])

@@ -24,9 +24,9 @@ def close(tables: dict[str, Any], former: Mapping[str, Any]) -> None:
     poses = PosesAtStart.of(tables)
     for row in tables.get("loops", ()):
         _close_loop(row, poses)
-    before, pairs = PosesAtStart.of(former), {row["name"]: row for row in former.get("pairs", ())}
+    former_poses, pairs = PosesAtStart.of(former), {row["name"]: row for row in former.get("pairs", ())}
     for row in tables.get("pairs", ()):
-        distance, _ = _gap(former, before, pairs[row["name"]])
+        distance, _ = _gap(former, former_poses, pairs[row["name"]])
         _move_upper(tables, row, distance)
 
 
@@ -40,9 +40,9 @@ def extent(geometry: Mapping[str, Any], direction: Array) -> float:
     if kind == "box":
         return float(np.abs(direction) @ np.array(geometry["size"])) / 2
     axis = np.array(geometry.get("axis", _Z))
-    along = abs(float(axis @ direction)) / float(np.linalg.norm(axis))
-    across = 1.0 if kind == "capsule" else float(np.sqrt(max(0.0, 1 - along**2)))
-    return float(geometry["length"] / 2 * along + radius * across)
+    cosine = abs(float(axis @ direction)) / float(np.linalg.norm(axis))
+    across = 1.0 if kind == "capsule" else float(np.sqrt(max(0.0, 1 - cosine**2)))
+    return float(geometry["length"] / 2 * cosine + radius * across)
 
 
 def _close_loop(row: dict[str, Any], poses: PosesAtStart) -> None:
