@@ -20,6 +20,7 @@ from proofroll.core.diagnosis import Cause
 from proofroll.files.json_data import MERGED
 from proofroll.papers.blajer_2006.slip.onset import EngineOnset, OnsetStudy
 from proofroll.papers.blajer_2006.truth.onset import Onset
+from proofroll.report.changes import Against, RunChange
 from proofroll.report.comparison.records import (
     ReportedComparison,
     ReportedRow,
@@ -67,6 +68,7 @@ from proofroll.studies.tradeoff.records import (
     TradeoffStudy,
     TruthCost,
 )
+from proofroll.studies.versions.two_runs import TwoRuns
 from proofroll_drill.mutants.drilling import Mutated
 from proofroll_drill.row import Drilled
 
@@ -180,7 +182,11 @@ TRADEOFF = (
         ("tradeoff.md", "JSON", (*TRADEOFF, Recommendation, Answer, CheckedOver)),
         ("json.md", "`ladder --json`", LADDER),
         ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
-        ("json.md", "The other commands", (Drilled, Mutated, Hunt, FoundKind, SmallestScene, Surprise, SurpriseKind)),
+        (
+            "json.md",
+            "The other commands",
+            (Against, RunChange, TwoRuns, Drilled, Mutated, Hunt, FoundKind, SmallestScene, Surprise, SurpriseKind),
+        ),
     ],
     ids=["robots", "against", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
 )

@@ -19,6 +19,7 @@ import proofroll
 from proofroll.cli.cite import cite
 from proofroll.cli.command_groups import GroupedCommands, origin
 from proofroll.cli.comparing import compare
+from proofroll.cli.diff import diff
 from proofroll.cli.engines import engines
 from proofroll.cli.export import export
 from proofroll.cli.findings import findings
@@ -47,7 +48,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _ALIKE = 0.7  # least likeness, of 1, of an option that a wrong one may mean
-_STUDIES = (compare, report, tradeoff, recommend, ladder, stability, fuzz, versions)
+_STUDIES = (compare, report, tradeoff, recommend, ladder, stability, fuzz, diff, versions)
 for _command in (scenes, run, judge, plot, replay, export, findings, cite, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")

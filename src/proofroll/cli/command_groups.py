@@ -8,7 +8,7 @@ from typer.core import TyperGroup
 
 # Title -> commands in their order. Commands of other packages that are not named here come last.
 GROUPS = {
-    "Ask": ("scenes", "run", "plot", "replay", "compare", "recommend", "report"),
+    "Ask": ("scenes", "run", "plot", "replay", "compare", "recommend", "report", "diff"),
     "Bring your own scene, engine or trajectory": ("new", "vocabulary", "check", "judge", "export"),
     "Study": ("tradeoff", "stability", "ladder", "fuzz", "balance"),
     "Blajer's article (2006)": ("onset", "regimes", "figures"),

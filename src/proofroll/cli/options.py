@@ -60,6 +60,7 @@ def runs_like(incomplete: str) -> list[str]:
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")]
 Out = Annotated[Path, typer.Option("--out", help="Folder for results; stored results are reused.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Run every case again, whatever is stored.")]
+Comment = Annotated[Path | None, typer.Option("--comment", help="Write the changes to this file in Markdown.")]
 Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Workers at once; by default one per core.")]
 Scheduler = Annotated[
     str | None,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     from proofroll.core.comparison import Comparison
+    from proofroll.report.changes import EarlierReport
     from proofroll.report.page.growing import Report
     from proofroll.report.page.records import ReportContent
     from proofroll.report.parts import Part
@@ -51,6 +52,7 @@ def report(
         Path | None,
         typer.Option(help="An earlier report.json: tells what changed; exit 1 if a verdict, an error or a cost did."),
     ] = None,
+    comment: options.Comment = None,
     as_json: options.Json = False,
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
@@ -67,7 +69,6 @@ def report(
 
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
-    from proofroll.report.changes import EarlierReport
     from proofroll.report.page.growing import begun
     from proofroll.report.page.html import templates
     from proofroll.report.parts import all_parts, parts_of
@@ -78,7 +79,7 @@ def report(
     from proofroll.studies.comparison.by_name import comparison_named
 
     begin = _processor_seconds()
-    earlier = EarlierReport.read(against) if against else None
+    earlier = _earlier(against, comment)
     workers, assigned = Workers(), options.assignments(settings)
     if budget and scheduler:
         raise InputError("--budget", budget, "runs on a cluster have none; drop --scheduler")
@@ -115,8 +116,29 @@ def report(
         made.write(out)
         rest = (lambda: budget - _processor_seconds() + begin) if budget else None
         unmade = _make_all(made, parts, missing, runner, out, rest)
+        _comment(comment, made.content)
         options.show(made.content, as_json, lambda: report_lines(made.content, out), widest=WIDTH)
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes), unmade))
+
+
+def _comment(comment: Path | None, content: ReportContent) -> None:
+    """Writes the changes since an earlier report in Markdown, if that is asked for."""
+    if comment is not None and content.against is not None:
+        from proofroll.running.store import write_text
+
+        write_text(comment, content.against.markdown)
+
+
+def _earlier(against: Path | None, comment: Path | None) -> EarlierReport | None:
+    """Earlier report, or None. Raises InputError for a comment without one, or one that cannot be written."""
+    from proofroll.core.errors import InputError
+    from proofroll.report.changes import EarlierReport
+
+    if comment is not None:
+        if against is None:
+            raise InputError("--comment", comment, "it is for changes since an earlier report: give --against, too")
+        options.require_writable(comment, "--comment")
+    return EarlierReport.read(against) if against else None
 
 
 def _processor_seconds() -> float:

@@ -29,6 +29,8 @@ _DIGITS = (2, 4, 8, 17)
 _KINDS = {
     "verdict": "verdicts", "value": "errors", "cost": "costs", "gone": "runs that are gone", "new": "new runs",
 }  # fmt: skip
+# Most rows of the table in a comment.
+_MOST_ROWS = 40
 # Least number of costs that show how much slower the machine was.
 _ENOUGH = 5
 
@@ -57,6 +59,7 @@ class Against:
     Attributes:
         old: path of the earlier report.
         date: date of the earlier report.
+        machines: both machines.
         versions: packages whose version changed: name -> both versions.
         costs: True if costs were compared, for both reports are of one machine.
         drift: median ratio of all costs: the machine's change, by which old costs are multiplied first.
@@ -67,6 +70,7 @@ class Against:
 
     old: str
     date: str
+    machines: tuple[str, str]
     versions: dict[str, tuple[str, str]]
     costs: bool
     drift: float
@@ -86,12 +90,54 @@ class Against:
         counts = ", ".join(f"{kinds.count(kind)} {text}" for kind, text in _KINDS.items() if kind in kinds)
         costs = f"; costs are {number(self.drift)} of the old ones throughout; this factor is left out"
         if not self.costs:
-            costs = "; costs are of another machine and not compared"
+            ratio = f", {number(self.drift)} of the old ones in the middle" if self.drift != 1.0 else ""
+            costs = f"; costs are of another machine{ratio}, and not compared one by one"
         elif 1 / _COST < self.drift < _COST:
             costs = ""
         if self.costs and self.factor > _COST:
             costs += f"; costs scatter, so that only those count that differ by a factor of {number(self.factor)}"
         return f"Of {counted(self.compared, 'runs')} in both reports, changed: {counts or 'nothing'}{costs}."
+
+    @property
+    def lines(self) -> list[str]:
+        """Both reports, the sentence, what they were made with, and a line for all runs with the same change."""
+        made_with = [f"{name} {old} → {new}" for name, (old, new) in self.versions.items()]
+        lines = [f"Against {self.old} of {self.date[:10]}. {self.sentence}"]
+        lines += [f"Other versions: {', '.join(made_with)}."] if made_with else []
+        return lines + [f"!! {'; '.join(runs)}: {change}{_several(runs)}" for change, runs in self._runs.items()]
+
+    @property
+    def markdown(self) -> str:
+        """The changes as a comment on a change of code, in Markdown: the sentence, versions, and a table."""
+        made_with = ", ".join(f"{name} {old} → {new}" for name, (old, new) in self.versions.items())
+        text = [f"**proofroll**, against the report of {self.date[:10]}: {self.sentence}"]
+        text += [f"Other versions: {made_with}."] if made_with else []
+        rows = list(self._runs.items())
+        table = [f"| {_cell(change)} | {_cell(runs[0])}{_several(runs)} |" for change, runs in rows[:_MOST_ROWS]]
+        if rows:
+            text.append("\n".join(["| change | run |", "| --- | --- |", *table]))
+        if len(rows) > _MOST_ROWS:
+            text.append(f"… and {counted(len(rows) - _MOST_ROWS, 'changes')} more.")
+        return "\n\n".join(text) + "\n"
+
+    @property
+    def _runs(self) -> dict[str, list[str]]:
+        """Change in words -> the runs that have it."""
+        runs: dict[str, list[str]] = defaultdict(list)
+        for item in self.changes:
+            place = f" at {item.place}" if item.place else ""
+            runs["; ".join(item.says) or item.kind].append(f"{item.study}: {item.run}{place}")
+        return runs
+
+
+def _several(runs: list[str]) -> str:
+    """Number of runs in brackets, if there are several."""
+    return f" ({len(runs)} runs)" if len(runs) > 1 else ""
+
+
+def _cell(text: str) -> str:
+    """Text as a cell of a table in Markdown."""
+    return text.replace("|", "\\|").replace("\n", " ")
 
 
 @dataclass(frozen=True)
@@ -107,11 +153,12 @@ class EarlierReport:
 
     @classmethod
     def read(cls, path: Path, option: str = "--against") -> EarlierReport:
-        """Earlier report from its ``report.json``, the value of the command's ``option``.
+        """Earlier report from its ``report.json`` or the folder with it, the value of the command's ``option``.
 
         Raises:
             InputError: the report cannot be read, or has no long table.
         """
+        path = path / "report.json" if path.is_dir() else path
         try:
             content: dict[str, Any] = json.loads(ordinary_content(path))
             table, made = content["table"], content["environment"]
@@ -124,6 +171,10 @@ class EarlierReport:
             raise InputError(option, path, why) from None
         except (KeyError, RecursionError, TypeError, ValueError):
             raise InputError(option, path, "is no report.json with a long table; proofroll report writes one") from None
+
+    def against(self, old: EarlierReport) -> Against:
+        """Changes from an earlier report to this one."""
+        return against(old, self.lines, self.machine, self.versions)
 
 
 def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versions: dict[str, str]) -> Against:
@@ -151,6 +202,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
     return Against(
         old=str(old.path),
         date=old.date,
+        machines=(old.machine, machine),
         versions=others,
         costs=costs,
         drift=drift,

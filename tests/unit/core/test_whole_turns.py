@@ -14,7 +14,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate_built
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.judging.run_values import observables_of
-from proofroll.studies.versions.difference import _apart
+from proofroll.studies.versions.difference import numbers_apart
 
 UNTIL = 2.0
 
@@ -104,7 +104,7 @@ def test_turns_that_nobody_knows_are_no_difference() -> None:
     mine, theirs = (found["q.pivot"].to_numpy() for found in (run, other))
     turned = on_turns_of(mine, theirs, "q.pivot", (run, other))
     assert turned == pytest.approx(mine + 1e-3, abs=1e-9)
-    assert _apart(scene, run, other, {}).difference == pytest.approx(1e-3)
+    assert numbers_apart(scene, run, other, {})[0].difference == pytest.approx(1e-3)
     near = simulate_built(build(scene, "projection"), scene, until=0.1, every=0.05)
     assert on_turns_of(near["q.pivot"].to_numpy(), near["q.pivot"].to_numpy() + 7, "q.pivot", (near, near))[0] > 9  # type: ignore[index]
     wound = run.assign({"energy_error": run["energy_error"].assign_attrs({UNCERTAIN: "a spring"})})

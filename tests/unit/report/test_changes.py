@@ -16,7 +16,6 @@ from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
 from proofroll.report.changes import Against, EarlierReport, against
 from proofroll.report.long_table import LongTable, TableLine
-from proofroll.report.terminal.tables import change_lines
 
 LINE = table_lines.line(limit="", cost_low=9e-3, cost_high=0.011)
 COST = {"cost": 0.01, "cost_low": 9.8e-3, "cost_high": 0.0102}
@@ -152,9 +151,29 @@ def test_runs_that_changed_alike_share_a_line() -> None:
     new = [replace(line, verdict="another-scene") for line in LINES[:2]] + changed(2, error=2e-3)[2:]
     old = [*LINES, *(replace(line, study="chain") for line in LINES[:2])]
     found = held([*new, *(replace(line, study="chain") for line in new[:2])], old=old)
-    head, versions, both, other = change_lines(found)
+    head, versions, both, other = found.lines
     assert head.startswith("Against old.json of 2026-01-01. Of 3 runs in both reports, changed: 2 verdicts, 1 errors")
     assert versions == "Other versions: alpha 1 → 2."
     runs = "arm: alpha joints default dt 1e-3 s; chain: alpha joints default dt 1e-3 s"
     assert both == f"!! {runs}: x agrees → another-scene; z agrees → another-scene (2 runs)"
     assert other == "!! arm: beta joints default dt 1e-3 s: error of x 2e-9 → 2e-3 m"
+
+
+def test_a_comment_has_each_change_once() -> None:
+    """Markdown of the changes has the sentence, versions and a row for each change; a bar in a message ends no cell."""
+    crashed = held(changed(2, status="crashed", message="a|b"))
+    head, versions, table = crashed.markdown.strip().split("\n\n")
+    assert head == f"**proofroll**, against the report of 2026-01-01: {crashed.sentence}"
+    assert versions == "Other versions: alpha 1 → 2."
+    assert table.splitlines()[2:] == ["| done → crashed: a\\|b | arm: beta joints default dt 1e-3 s |"]
+    same = held(LINES).markdown
+    assert "|" not in same
+
+
+def test_costs_of_another_machine_are_told_in_one_ratio() -> None:
+    """Costs of two machines are not compared one by one, and their common ratio is told."""
+    lines = [replace(line, row=row, quantity="x") for row, line in enumerate([LINE] * 6)]
+    slower = [replace(line, cost=3 * (line.cost or 0.0)) for line in lines]
+    far = held(slower, "there", old=lines)
+    assert (far.costs, far.machines, far.changes) == (False, ("here", "there"), [])
+    assert "costs are of another machine, 3 of the old ones in the middle" in far.sentence

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from proofroll.report.changes import Against
     from proofroll.report.comparison.records import ReportedComparison
     from proofroll.report.page.records import ReportContent
 
@@ -53,7 +52,7 @@ def report_lines(content: ReportContent, out: Path) -> Iterator[str]:
     yield f"{counts}{sentence}"
     yield from (*others, "", *comparison_lines(content.comparisons), "")
     yield from part_lines(content)
-    yield from change_lines(content.against)
+    yield from content.against.lines if content.against else ()
     yield from filter(None, [content.beyond_budget, content.omission_sentences])
     expected = rows and all(item.as_expected for item in content.comparisons)
     yield f"{'All as expected. ' if expected else ''}{out / 'report.html'} · report.json · report.csv"
@@ -85,23 +84,6 @@ def part_lines(content: ReportContent) -> list[str]:
     """One line for each further study of a report."""
     pairs = [(kind, entry) for kind in part_kinds() for entry in content.entries[kind.key] if entry.study is not None]
     return [f"{entry.name}: {kind.line(entry)}." for kind, entry in pairs]
-
-
-def change_lines(changes: Against | None) -> list[str]:
-    """Changes since an earlier report, a line for all runs with the same change; empty without an earlier report."""
-    if changes is None:
-        return []
-    head = f"Against {changes.old} of {changes.date[:10]}. {changes.sentence}"
-    versions = [f"{name} {old} → {new}" for name, (old, new) in changes.versions.items()]
-    lines = [f"Other versions: {', '.join(versions)}."] if versions else []
-    runs: dict[str, list[str]] = {}
-    for item in changes.changes:
-        place = f" at {item.place}" if item.place else ""
-        runs.setdefault("; ".join(item.says) or item.kind, []).append(f"{item.study}: {item.run}{place}")
-    for change, where_seen in runs.items():
-        several = f" ({len(where_seen)} runs)" if len(where_seen) > 1 else ""
-        lines.append(f"!! {'; '.join(where_seen)}: {change}{several}")
-    return [head, *lines]
 
 
 def first_lines(content: ReportContent) -> list[str]:

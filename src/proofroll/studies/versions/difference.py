@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -169,19 +170,30 @@ def _given_by_one(outcome: Outcome, old_run: Run, new_run: Run) -> list[str]:
 
 
 def _numbers(outcome: Outcome, old: Run, new: Run) -> NumbersApart | None:
-    """Difference of the trajectories; None if one is missing."""
+    """Largest difference of the trajectories; None if one is missing."""
     if old.trajectory is None or new.trajectory is None:
         return None
     point = outcome.points[point_name(old.parameters)]
-    old_data, new_data = old.trajectory.dataset, new.trajectory.dataset
-    return _apart(point.scene, old_data, new_data, point.reference.sizes if point.reference else {})
+    sizes = point.reference.sizes if point.reference else {}
+    differences = numbers_apart(point.scene, old.trajectory.dataset, new.trajectory.dataset, sizes)
+    return differences[0] if differences else NumbersApart()
 
 
-def _apart(scene: Scene, data: xr.Dataset, new_data: xr.Dataset, sizes: Mapping[str, float]) -> NumbersApart:
-    largest = NumbersApart()
-    values, others = observe(scene, data), observe(scene, new_data)
+def numbers_apart(
+    scene: Scene, data: xr.Dataset, new_data: xr.Dataset, sizes: Mapping[str, float]
+) -> list[NumbersApart]:
+    """Differences of two runs with samples at the same times, for each observable that differs, the largest first.
+
+    Args:
+        scene: of both runs.
+        data: earlier run.
+        new_data: later run.
+        sizes: observable -> its size, to which its difference is relative; by default its largest value.
+    """
+    differences = []
+    values, rivals = observe(scene, data), observe(scene, new_data)
     for name, mine in values.items():
-        item, theirs = scene.observables[name], others.get(name)
+        item, theirs = scene.observables[name], rivals.get(name)
         if theirs is None or item.role not in {Role.MOTION, Role.REACTION} or mine.ndim != theirs.ndim:
             continue
         theirs = on_turns_of(mine, theirs, name, (data, new_data))
@@ -192,7 +204,8 @@ def _apart(scene: Scene, data: xr.Dataset, new_data: xr.Dataset, sizes: Mapping[
             continue
         difference = float(np.nanmax(np.abs(mine[:count] - theirs[:count]), initial=0.0))
         relative = difference / (sizes.get(name) or float(np.nanmax(np.abs(mine), initial=0.0)) or 1.0)
-        if not relative < largest.relative:  # NaN counts as a difference
-            kind = NumberKind.CHANGED if relative > ROUND_OFF else NumberKind.ROUND_OFF
-            largest = NumbersApart(quantity=name, unit=item.unit, difference=difference, relative=relative, kind=kind)
-    return largest
+        kind = NumberKind.ROUND_OFF if relative <= ROUND_OFF else NumberKind.CHANGED  # NaN counts as a difference
+        differences.append(
+            NumbersApart(quantity=name, unit=item.unit, difference=difference, relative=relative, kind=kind)
+        )
+    return sorted(differences, key=lambda apart: -apart.relative if apart.relative >= 0 else -math.inf)
