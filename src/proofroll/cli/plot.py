@@ -16,7 +16,7 @@ def plot(
         Path | None, typer.Option(help="File to write, by its ending: html, svg, png or pdf; RUN.html by default.")
     ] = None,
 ) -> None:
-    """Draw all variables of a run over time, with their units."""
+    """Draw a run: as a page in motion beside the truth, or all variables over time as a picture."""
     from proofroll.report.run.plot import draw_run, read_run, require_ending
 
     target = trajectory.parent / f"{trajectory.stem}.html" if out is None else out

@@ -44,7 +44,7 @@ def run(
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = RUN_TIME_LIMIT,
     ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Draw the run to this file, by its ending: html, svg, png or pdf.")
+        Path | None, typer.Option(help="Draw the run to this file: html in motion beside the truth, or svg, png, pdf.")
     ] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Show all forces and moments, too.")] = False,
     everything: Annotated[
@@ -164,6 +164,7 @@ def _require_files(out: Path | None, events: Path | None, plot: Path | None) -> 
         raise InputError("--events", events, f"end the name of the file in {CSV}")
     if plot is not None:
         require_ending(plot, "--plot")
+        options.require_pages()
 
 
 def _written(
@@ -184,7 +185,8 @@ def _written(
     if (plot or out) is not None:
         import_xarray()
     if plot is not None:
-        draw_run(read(stored), plot)
+        with options.spinner("the plot, beside the truth"):
+            draw_run(read(stored).assign_attrs(attributes), plot)
         content = replace(content, plot=str(plot))
     if out is not None:
         write(read(stored).assign_attrs(attributes), out)

@@ -12,7 +12,7 @@ import xarray as xr
 from mixed_scene import BALL_AND_PENDULUM
 
 from proofroll.files.trajectory_file import read, write
-from proofroll.report.run.plot import curves
+from proofroll.report.run.curves import names_of_curves
 
 Proofroll = Callable[..., tuple[int, str, str]]
 RUN = ["--until", "0.1", "--every", "0.05"]
@@ -35,18 +35,40 @@ def test_every_curve_with_its_unit(
     assert (code, err) == (0, "")
     assert "The trajectory is in" in out
     assert "The plot is in" in out
-    found = curves(read(run))
-    assert names <= set(found)
+    assert names <= set(names_of_curves(read(run)))
 
-    assert proofroll("plot", str(run))[0] == 0
-    page = run.with_suffix(".html").read_text(encoding="utf-8").replace("\\u002f", "/")  # as plotly writes it
-    units = read(run)
-    for name in found:
-        assert f"{name} [{units[name].attrs['units']}]" in page
-    assert "<script src=" not in page  # plotly is inside
-    assert '<meta http-equiv="Content-Security-Policy" content="default-src \'none\';' in page
     assert picture.read_bytes().startswith(begins)
     assert ending == ".png" or b"<svg" in picture.read_bytes()
+
+
+def curves_of(page: Path) -> list[str]:
+    """Titles of the panels of a page."""
+    html = page.read_text(encoding="utf-8").partition('id="curves"')[2]
+    return [re.sub("<[^>]*>", "", title) for title in re.findall("<figcaption>(.*?)</figcaption>", html)]
+
+
+def test_a_page_has_the_curves_that_are_furthest_off(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A page has the motion and four curves beside the truth's, one of each unit first, in less than 1.5 MB."""
+    run, page = tmp_path / "run.nc", tmp_path / "run.html"
+    words = ["pendulum", "--engine", "mujoco[dt=2e-2]", "--until", "1", "--every", "0.1"]
+    assert proofroll("run", *words, "--out", str(run), "--plot", str(page))[0] == 0
+    titles = curves_of(page)
+    assert len(titles) == 4
+    assert len({re.findall(r"\[(.*?)\]", title)[0] for title in titles}) == 4
+    assert all(re.search(r": at most [\d.e-]+ .* off, at [\d.]+ s$", title) for title in titles)
+    html = page.read_text(encoding="utf-8")
+    assert html.count('class="true"') == 4
+    assert 'data-part="cases"' in html
+    assert "<script src=" not in html  # nothing is loaded
+    assert '<meta http-equiv="Content-Security-Policy" content="default-src \'none\';' in html
+    assert page.stat().st_size < 1.5e6
+    dataset = read(run)
+    del dataset.attrs["scene"]
+    write(dataset, tmp_path / "alone.nc")
+    assert proofroll("plot", str(tmp_path / "alone.nc"))[0] == 0
+    alone = (tmp_path / "alone.html").read_text(encoding="utf-8")
+    assert "The run alone: it does not say which scene it is of" in alone
+    assert {title.partition(" [")[0] for title in curves_of(tmp_path / "alone.html")} == set(names_of_curves(dataset))
 
 
 def test_json_says_what_was_written(proofroll: Proofroll, tmp_path: Path) -> None:
@@ -169,4 +191,4 @@ def test_what_has_no_value_is_not_drawn() -> None:
         },
         {"time": times},
     )
-    assert curves(made) == ["z"]
+    assert names_of_curves(made) == ["z"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.dataset import ended_early, part, until_end
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.multi_element import each_alone
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
@@ -20,6 +20,7 @@ from proofroll.report.labels import settings_text
 from proofroll.report.replay.library import three
 from proofroll.report.replay.records import Ghost, Replay, ReplayCase, Replayed, ReplayKind
 from proofroll.report.replay.replay import case_content, distance
+from proofroll.report.run.curves import curves_alone, curves_beside_truth
 from proofroll.studies.comparison.planning import point_name
 
 if TYPE_CHECKING:
@@ -28,8 +29,26 @@ if TYPE_CHECKING:
 _WRITES = "proofroll run … --out writes one"
 
 
+def run_page(path: Path, run: xr.Dataset) -> str:
+    """HTML page of a run as :func:`replay_page`; where that has no truth or drawing, of its curves alone, with why."""
+    from proofroll.report.page.html import templates
+    from proofroll.report.pages import rendered
+
+    try:
+        return replay_page(path, run)
+    except ProofrollError as problem:
+        why = problem.advice if isinstance(problem, InputError) else str(problem)
+        title = ", ".join(filter(None, (str(run.attrs.get(key, "")) for key in ("scene", "engine"))))
+        caption = f"The run alone: {why}."
+        return rendered(
+            templates(), "run_replay.html", title=title or path.stem, curves=curves_alone(run), caption=caption
+        )
+
+
 def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) -> str:
     """HTML page that replays a run: the truth of its scene, solid, and the run, translucent; without a truth alone.
+
+    Below are the four curves that are furthest off, with the truth's; without a truth all curves of the run.
 
     In a scene of several elements, each is a case of its own, for no force couples them. Behind the end of a truth
     that ends early neither it nor the run is drawn; the caption says when and why it ends.
@@ -79,7 +98,8 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     return rendered(
         templates(),
         "run_replay.html",
-        scene=scene,
+        title=scene.title,
+        curves=curves_beside_truth(scene, run, true) or curves_alone(run),
         replay=Replay(three(), 0, cases, packed),
         caption=" ".join(dict.fromkeys(captions)),
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],

@@ -122,6 +122,7 @@
     ui.time.setAttribute("aria-valuetext", `${time.toFixed(shown.until < 0.1 ? 5 : 3)} seconds`);
     kind.write();
     strip.now(time);
+    for (const line of document.querySelectorAll("[data-now]")) line.style.left = `${(100 * time) / shown.until}%`;
     for (const run of shown.runs.slice(1)) {
       const here = there(run), { off, texts, sign } = kind.compare(run, here);
       const told = [here ? distance(1000 * off, shown.least) : "gone", ...texts.map((text) => (here ? text : "–"))];
