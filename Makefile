@@ -62,7 +62,7 @@ readme: install
 docs: install
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs $(OUT)/docs
 
-# The pictures and verdicts of docs/gallery.md, from real runs: of scenes that are lacking there, or have changed.
+# The pages of docs/gallery, from real runs: of scenes that are lacking there, or have changed.
 gallery: install
 	$(BIN)/python docs/gallery.py
 

@@ -1,7 +1,7 @@
-"""Writes docs/gallery.md: every scene with picture, claim, truth and verdicts, from real runs: ``make gallery``.
+"""Writes docs/gallery: every scene with picture, claim, truth and verdicts, from real runs: ``make gallery``.
 
-Sections of the scenes that are named are made; without names those that are lacking, and those whose comparison, scene,
-settings or pinned libraries have changed.
+Each scene has a page; docs/gallery.md shows their pictures by kind. Pages of the scenes that are named are made;
+without names those that are lacking, and those whose comparison, scene, settings or pinned libraries have changed.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import dataclasses
 import json
 import re
 import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from made_from import facts, stamp
@@ -26,7 +27,7 @@ from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.comparison.summary import outcome_content
-from proofroll.report.labels import engine_words
+from proofroll.report.labels import engine_title, engine_words
 from proofroll.report.page.choice_cell import cell_of
 from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.page.html import templates
@@ -55,12 +56,23 @@ all points of the parameters; what the words mean: [read a verdict](read_a_verdi
 
 ```{include} gallery/matrix.inc
 ```
+
+```{toctree}
+:hidden:
+:glob:
+
+gallery/*
+```
+
+Under each picture are the engines that hold the motion to 1e-4 of the path.
 """
+# Heading of scenes without a comparison.
+UNCOMPARED = "without a comparison"
 # Part of the path that the matrix asks for.
 TOLERANCE = 1e-4
-# Line of a section with the hash of all that decides it.
+# Line of a page with the hash of all that decides it.
 MADE = "<!-- made from {} -->\n"
-# Line of a section that the matrix is made from: what each formulation is at that tolerance, by group of scenes.
+# Line of a page that the matrix is made from: what each formulation is at that tolerance, by group of scenes.
 KEPT = re.compile(r"^<!-- at 1e-4: (.*) -->$", flags=re.MULTILINE)
 
 
@@ -90,7 +102,7 @@ def picture(scene: str) -> str:
     if not text:
         return ""
     (PICTURES / f"{scene}.svg").write_text(text, encoding="utf-8")
-    return f"```{{image}} gallery/{scene}.svg\n:alt: {scene}, {label}\n```\n"
+    return f"```{{image}} {scene}.svg\n:alt: {scene}, {label}\n```\n"
 
 
 def drawn_scene(scene: str, name: str) -> tuple[str, str]:
@@ -132,20 +144,43 @@ def standings(outcome: Outcome) -> str:
     return f"<!-- at 1e-4: {json.dumps({column.group: found})} -->\n"
 
 
-def write_matrix(text: str) -> None:
-    """Writes the matrix of the gallery's sections, which the first page of the documentation shows, too."""
+def standings_by_group(page: str) -> dict[str, dict[str, str]]:
+    """Group of a scene -> what each formulation is at the tolerance of the matrix, from its page."""
+    kept = KEPT.search(page)
+    return json.loads(kept[1]) if kept else {}
+
+
+def write_matrix(pages: Iterable[str]) -> None:
+    """Writes the matrix of the gallery's pages, which the first page of the documentation shows, too."""
     groups: dict[str, dict[str, list[str]]] = {}
-    for kept in KEPT.findall(text):
-        for group, rows in json.loads(kept).items():
+    for page in pages:
+        for group, rows in standings_by_group(page).items():
             for row, state in rows.items():
                 groups.setdefault(group, {}).setdefault(row, []).append(state)
     (PICTURES / "matrix.inc").write_text(choice_table(groups), encoding="utf-8")
 
 
+def grid(pages: Mapping[str, str]) -> str:
+    """Pictures of the scenes by kind, each with the engines that hold it, as links to their pages."""
+    groups: dict[str, list[str]] = {}
+    for scene, page in pages.items():
+        group, rows = next(iter(standings_by_group(page).items()), (UNCOMPARED, {}))
+        engines = {row.partition(" ")[0] for row, state in rows.items() if state == Verdict.AGREES}
+        holding = ", ".join(
+            engine_title(name) for name in dict.fromkeys(row.partition(" ")[0] for row in rows) if name in engines
+        )
+        image = f"[![{scene}](gallery/{scene}.svg)](gallery/{scene}.md)\n\n" if f"{scene}.svg" in page else ""
+        words = f"✓ {holding}" if holding else "held by none" if rows else ""
+        card = f":::{{container}} scene\n{image}[{scene}](gallery/{scene}.md)  \n{words}\n:::\n"
+        groups.setdefault(group, []).append(card)
+    parts = [f"## {group}\n\n::::{{container}} scenes\n{''.join(cards)}::::\n" for group, cards in groups.items()]
+    return "\n".join(parts)
+
+
 def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
-    """One scene."""
+    """Page of one scene."""
     file = read_scene_file(scene)
-    parts = [f"## {scene}\n\n{file.title}. *{file.source}.*\n", picture(scene)]
+    parts = [f"# {scene}\n\n{file.title}. *{file.source}.*\n", picture(scene)]
     if comparison is None:
         parts.append("No comparison of it comes with proofroll.\n")
         return "\n".join(parts)
@@ -161,15 +196,15 @@ def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
     return "\n".join(part for part in parts if part)
 
 
-def sections(text: str) -> dict[str, str]:
-    """Sections of the gallery by scene."""
-    return {part.partition("\n")[0]: f"## {part}".rstrip() + "\n" for part in text.split("\n## ")[1:]}
+def pages() -> dict[str, str]:
+    """Pages of the gallery by scene."""
+    return {page.stem: page.read_text(encoding="utf-8") for page in sorted(PICTURES.glob("*.md"))}
 
 
 def stale(
     kept: dict[str, str], known: dict[str, tuple[str, Comparison]], workers: Workers | None = None
 ) -> dict[str, str]:
-    """Scenes whose section is lacking or made from something else, each with the line that a new section ends with."""
+    """Scenes whose page is lacking or made from something else, each with the line that a new page ends with."""
     made = {}
     for scene in scene_names():
         name = known[scene][0] if scene in known else ""
@@ -178,20 +213,20 @@ def stale(
 
 
 def main(names: list[str]) -> None:
-    """Writes all sections; those that are asked for, or out of date, are made anew."""
+    """Writes all pages; those that are asked for, or out of date, are made anew."""
     PICTURES.mkdir(exist_ok=True)
     runner = Runner(Store(DOCS.parent / "out" / "cases"))
-    target, known = DOCS / "gallery.md", comparisons()
-    kept = sections(target.read_text(encoding="utf-8") if target.exists() else "")
+    known, kept = comparisons(), pages()
     fresh = {scene: text for scene, text in kept.items() if scene not in names}
     for scene, made in stale(fresh, known, runner.workers).items():
         if names and scene not in names:
             continue
         kept[scene] = section(scene, known.get(scene, ("", None))[1], runner) + made
-        text = "\n".join([HEAD, *(kept[name] for name in scene_names() if name in kept)])
-        target.write_text(text, encoding="utf-8")
-        write_matrix(text)
+        (PICTURES / f"{scene}.md").write_text(kept[scene], encoding="utf-8")
         sys.stderr.write(f"{scene}\n")
+    ordered = {name: kept[name] for name in scene_names() if name in kept}
+    write_matrix(ordered.values())
+    (DOCS / "gallery.md").write_text(f"{HEAD}\n{grid(ordered)}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -121,8 +121,8 @@ def test_a_page_can_be_followed(
 
 def test_every_page_is_in_the_contents() -> None:
     """No page is left out of the table of contents, and none is named there that is not."""
-    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
-    trees = re.findall(r"```\{toctree\}\n(.*?)```", index, flags=re.DOTALL)
+    contents = "\n".join((ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8") for page in ("index", "gallery"))
+    trees = re.findall(r"```\{toctree\}\n(.*?)```", contents, flags=re.DOTALL)
     named = [line for tree in trees for line in tree.splitlines() if line and not line.startswith(":")]
     docs = ROOT / "docs"
     written = {path.relative_to(docs).with_suffix("").as_posix() for path in docs.rglob("*.md")}
@@ -146,7 +146,7 @@ def test_the_workflow_runs_the_two_commands() -> None:
 
 
 def test_the_gallery_makes_what_is_lacking_or_changed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Without names a scene is made again only when what decides its section has changed; with names that one."""
+    """Without names a scene is made again only when what decides its page has changed; with names that one."""
     monkeypatch.syspath_prepend(str(ROOT / "docs"))
     gallery = importlib.import_module("gallery")
     made, stamps = [], {"a": "1", "b": "1"}
@@ -159,7 +159,7 @@ def test_the_gallery_makes_what_is_lacking_or_changed(monkeypatch: pytest.Monkey
 
     def section(scene: str, *_: object) -> str:
         made.append(scene)
-        return f"## {scene}\n\nIts text.\n"
+        return f"# {scene}\n\nIts text.\n"
 
     monkeypatch.setattr(gallery, "section", section)
     (tmp_path / "docs").mkdir()
@@ -174,12 +174,12 @@ def test_the_gallery_makes_what_is_lacking_or_changed(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.drill
-def test_no_section_of_the_gallery_is_stale(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each section was made from today's comparison, scene, settings and pinned libraries; a changed one is noticed."""
+def test_no_page_of_the_gallery_is_stale(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each page was made from today's comparison, scene, settings and pinned libraries; a changed one is noticed."""
     monkeypatch.syspath_prepend(str(ROOT / "docs"))
     gallery = importlib.import_module("gallery")
     known = gallery.comparisons()
-    kept = gallery.sections((ROOT / "docs" / "gallery.md").read_text(encoding="utf-8"))
+    kept = gallery.pages()
     assert kept.keys() == set(gallery.scene_names())
     with_one_changed = kept | {"four_bar": kept["four_bar"].replace("made from ", "made from 0")}
     stale = gallery.stale(with_one_changed, known, Workers())
@@ -188,16 +188,17 @@ def test_no_section_of_the_gallery_is_stale(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Both pages include the matrix, which is that of the records in the gallery's own sections."""
+    """Both pages include the matrix, which is that of the records in the gallery's own pages, and the grid has all."""
     monkeypatch.syspath_prepend(str(ROOT / "docs"))
     gallery = importlib.import_module("gallery")
-    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    pages = {name: gallery.pages()[name] for name in gallery.scene_names()}
     written = (ROOT / "docs" / "gallery" / "matrix.inc").read_text(encoding="utf-8")
     monkeypatch.setattr(gallery, "PICTURES", tmp_path)
-    gallery.write_matrix(text)
+    gallery.write_matrix(pages.values())
     assert (tmp_path / "matrix.inc").read_text(encoding="utf-8") == written
     for page in ("index", "gallery"):
         assert "{include} gallery/matrix.inc" in (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    assert (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8") == f"{gallery.HEAD}\n{gallery.grid(pages)}"
     trees = {"alpha": ["agrees", "not-judged", "differs"], "be_ta": ["converges"], "gamma": ["not-judged"]}
     lines = gallery.choice_table({"trees": trees, "loops": {"alpha": ["agrees"]}}).splitlines()
     assert lines[3:6] == ["| alpha | ✓ 1/2 | ✓ |", "| be_<wbr>ta | ↘ |  |", "| gamma | □ |  |"]
@@ -208,11 +209,11 @@ def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.Monk
 
 
 def test_the_gallery_gives_no_error_bar_where_no_motion_is_unique() -> None:
-    """A section whose engines are held to laws alone has no error bar and no errors, and there are such sections."""
-    sections = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8").split("\n## ")[1:]
-    laws_alone = [section for section in sections if "laws of mechanics alone" in section]
-    assert {section.partition("\n")[0] for section in laws_alone} >= {"cradle", "dominoes", "painleve_rod"}
-    assert not [section for section in laws_alone if "Error bar" in section or "positions [m]" in section]
+    """A page whose engines are held to laws alone has no error bar and no errors, and there are such pages."""
+    pages = [page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "gallery").glob("*.md")]
+    laws_alone = [page for page in pages if "laws of mechanics alone" in page]
+    assert {page.partition("\n")[0].removeprefix("# ") for page in laws_alone} >= {"cradle", "dominoes", "painleve_rod"}
+    assert not [page for page in laws_alone if "Error bar" in page or "positions [m]" in page]
 
 
 def test_the_nightly_workflow_parses_and_runs_what_there_is() -> None:
