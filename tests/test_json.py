@@ -29,6 +29,7 @@ from proofroll.report.comparison.records import (
     WorstJudgement,
 )
 from proofroll.report.ladder.ladder import Absence, KnownTruth, LadderContent, RungFound, SideFound, TermFound
+from proofroll.report.page.advice import Advised, QuestionAnswer
 from proofroll.robots.check.explain import RobotCause
 from proofroll.robots.check.records import (
     DrawnBody,
@@ -185,7 +186,20 @@ TRADEOFF = (
         (
             "json.md",
             "The other commands",
-            (Against, RunChange, TwoRuns, Drilled, Mutated, Hunt, FoundKind, SmallestScene, Surprise, SurpriseKind),
+            (
+                Against,
+                RunChange,
+                TwoRuns,
+                QuestionAnswer,
+                Advised,
+                Drilled,
+                Mutated,
+                Hunt,
+                FoundKind,
+                SmallestScene,
+                Surprise,
+                SurpriseKind,
+            ),
         ),
     ],
     ids=["robots", "against", "compare", "stability", "tradeoff", "ladder", "onset", "others"],

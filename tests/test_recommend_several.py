@@ -163,3 +163,12 @@ def test_a_tolerance_means_the_same_everywhere(proofroll: Proofroll, report: Pat
     assert {(item["tolerance"], item["unit"]) for item in parts} == {(1e-3, "part of the path")}
     lengths = [json.loads(proofroll(*given, text)[1]) for text in ("1e-3", "1 mm", "1e-3 m")]
     assert {(item["tolerance"], item["unit"]) for item in lengths} == {(1e-3, "m")}
+
+
+def test_a_kind_without_a_report_is_told_what_makes_one(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A kind of scenes, or several in one word, needs a report: the command that makes it is told, exit 2."""
+    made_by = {"loops": "proofroll report --only loops", "pendulum,cone": "proofroll report pendulum cone"}
+    for name, command in made_by.items():
+        code, _, err = proofroll("recommend", name, "--out", str(tmp_path))
+        assert code == 2
+        assert f"report.json, which is not there; {command} makes it" in err

@@ -105,6 +105,7 @@ def recommend(
             scenes, tolerance, engine or [], stored, forces=forces, every_setting=every_setting, as_json=as_json
         )
     (scene,) = scenes
+    _require_no_kind(scene, report_file)
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.report.tradeoff.tables import answer_lines
@@ -150,6 +151,21 @@ def _own_lines(recommendation: Recommendation) -> list[str]:
         raise ProofrollError(f"--lines: the adapter of {choice.point.engine} tells none")
     options_set = {name: value for name, value in choice.point.settings.items() if value is not None}
     return engine.lines(resolve_settings(engine, options_set))
+
+
+def _require_no_kind(name: str, path: Path) -> None:
+    """Raises InputError for a kind of scenes or several names in one, which only a report answers."""
+    from proofroll.files.scene_file import is_scene, scene_names
+    from proofroll.report.kinds import group_of
+    from proofroll.studies.cases import scene_of_run
+
+    if is_scene(name) or name.endswith(".toml"):
+        return
+    kinds = {group_of(scene_of_run(scene, {}, ())) for scene in scene_names()} if name.isidentifier() else set()
+    if "," in name or any(name in {kind, *kind.split()} for kind in kinds):
+        studies = name.replace(",", " ") if "," in name else f"--only {name}"
+        advice = f"kinds and several scenes are answered from {path}, which is not there; proofroll report {studies}"
+        raise InputError("scenes", name, f"{advice} makes it")
 
 
 def _is_in_report(name: str, path: Path) -> bool:

@@ -1,5 +1,6 @@
 """The verdict: an observable of one run compared with the truth, within the error bars of both."""
 
+import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -86,6 +87,11 @@ class Judgement:
     reason: str = ""
     remarks: tuple[str, ...] = ()
     floor: str = ""
+
+    @property
+    def of_allowed(self) -> float:
+        """Error over what is allowed; infinite where nothing is."""
+        return self.error / self.tolerance if self.tolerance else math.inf
 
 
 @dataclass(frozen=True)

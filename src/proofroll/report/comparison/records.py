@@ -82,7 +82,11 @@ class WorstJudgement(Judgement):
 
 @dataclass(frozen=True, kw_only=True)
 class ReportedRow(Setting):
-    """Summary of a row over the points of the parameters: the worst of everything; ``claim``: what is expected."""
+    """Summary of a row over the points of the parameters: the worst of everything.
+
+    ``claim`` is what is expected; ``worst`` names the quantity with the worst verdict, of equal ones the one nearest to
+    its limit or furthest beyond it, empty where none was judged.
+    """
 
     verdict: Verdict
     verdicts: dict[str, int]
@@ -95,6 +99,7 @@ class ReportedRow(Setting):
     claim: Row
     as_expected: bool
     observables: dict[str, WorstJudgement]
+    worst: str
     seconds_per_second: float | None
     rough_cost: float | None
     message: str

@@ -130,6 +130,7 @@ def _summary(runs: list[ReportedRun]) -> dict[str, Any]:
     judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
     names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
     reason, limit = _why(judged)
+    observables = {name: _worst(judged, name) for name in names}
     causes: dict[str, Diagnosis] = {}
     for item in (item for run in runs for item in run.diagnosis):
         causes.setdefault(item.cause.id, item)
@@ -144,12 +145,18 @@ def _summary(runs: list[ReportedRun]) -> dict[str, Any]:
         "remarks": _remarks(runs),
         "diagnosis": list(causes.values()),
         "as_expected": not any(run.contradictions for run in runs),
-        "observables": {name: _worst(judged, name) for name in names},
+        "observables": observables,
+        "worst": max(names, key=lambda name: _severity(observables[name]), default=""),
         "seconds_per_second": max((x for run in runs if (x := run.seconds_per_second) is not None), default=None),
         "rough_cost": max((x for run in runs if (x := run.rough_cost) is not None), default=None),
         "message": next((run.message for run in runs if run.status != Status.DONE), ""),
         "coarser": max((run.coarser for run in runs), key=list(CoarserSteps).index),
     }
+
+
+def _severity(item: Judgement) -> tuple[int, float]:
+    """Sort key of a judgement: its verdict, then its error over what is allowed."""
+    return SEVERITY.index(item.verdict), item.of_allowed
 
 
 def _why(runs: list[ReportedRun]) -> tuple[str, str]:
@@ -191,12 +198,7 @@ def _remarks(runs: list[ReportedRun]) -> list[str]:
 
 def _furthest(judged: list[tuple[ReportedRun, Judgement | None]]) -> tuple[ReportedRun, Judgement | None]:
     """ReportedRun and judgement with the worst verdict, of equal ones the one furthest beyond its tolerance."""
-
-    def badness(pair: tuple[ReportedRun, Judgement | None]) -> tuple[int, float]:
-        item = pair[1]
-        return (SEVERITY.index(item.verdict), item.error / item.tolerance) if item else (-1, 0.0)
-
-    return max(judged, key=badness)
+    return max(judged, key=lambda pair: _severity(pair[1]) if pair[1] else (-1, 0.0))
 
 
 def _worst(runs: list[ReportedRun], name: str) -> WorstJudgement:

@@ -14,7 +14,7 @@ from proofroll.report.page.answer import (
     told,
 )
 from proofroll.report.page.choice_cell import CANNOT, NO_RUN
-from proofroll.report.page.choice_matrix import ChoiceColumn, ChoiceMatrix
+from proofroll.report.page.choice_matrix import ASKED, ChoiceColumn, ChoiceMatrix
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,24 @@ class Advised:
     choice: str | None = None
     cost: float | None = None
     judged: bool = True
+
+
+@dataclass(frozen=True)
+class QuestionAnswer:
+    """Answer to a question: a tolerance relative to the path, whether forces count, a sentence, and all advice."""
+
+    tolerance: float
+    forces: bool
+    sentence: str
+    advice: list[Advised]
+
+
+def answers_to_all(matrix: ChoiceMatrix) -> list[QuestionAnswer]:
+    """Answers to every question that a page offers."""
+    return [
+        QuestionAnswer(tolerance, forces, answer(matrix, tolerance, forces).sentence, advice(matrix, tolerance, forces))
+        for forces, tolerance in ASKED
+    ]
 
 
 def advice(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> list[Advised]:

@@ -22,6 +22,7 @@ from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine
+from proofroll.report.page.advice import QuestionAnswer, answers_to_all
 from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, choice_matrix
 from proofroll.report.page.first_sentences import Kept, kept, three_sentences
 from proofroll.report.page.precision import WorkPrecision, work_precision
@@ -111,6 +112,7 @@ class ReportContent:
         environment: command, machine and versions that made it.
         findings: three sentences on the whole report.
         table: every quantity of every run.
+        answers: to each question that the page offers, from the function that page and terminal print.
         against: changes since an earlier report.
         replay: its cases without their numbers, which can be computed from the named trajectories.
     """
@@ -128,6 +130,7 @@ class ReportContent:
     table: LongTable
     format: int = FORMAT
     replay: Sequence[Any] | None = field(default=None, metadata=OPTIONAL)
+    answers: list[QuestionAnswer] = field(default_factory=list)
     against: Against | None = field(default=None, metadata=OPTIONAL)
 
     @property
@@ -143,8 +146,9 @@ class ReportContent:
 
     @property
     def summarised(self) -> ReportContent:
-        """Content with its three sentences recomputed."""
-        return dataclasses.replace(self, findings=three_sentences(self.comparisons, self.entries, self.choice))
+        """Content with its three sentences and its answers recomputed."""
+        sentences = three_sentences(self.comparisons, self.entries, self.choice)
+        return dataclasses.replace(self, findings=sentences, answers=answers_to_all(self.choice))
 
     @cached_property
     def choice(self) -> ChoiceMatrix:

@@ -120,14 +120,8 @@ def _speed(row: ReportedRow) -> str:
 
 
 def worst_of(row: ReportedRow) -> WorstJudgement | None:
-    """Judgement of the quantity with the worst verdict, of equal ones the one nearest to its limit or furthest off."""
-    judged = row.observables.values()
-    return max(judged, key=lambda item: (SEVERITY.index(item.verdict), _beyond(item)), default=None)
-
-
-def _beyond(item: WorstJudgement) -> float:
-    """Error over what is allowed."""
-    return item.error / item.tolerance if item.tolerance else math.inf
+    """Judgement of the row's worst quantity; None where none was judged."""
+    return row.observables.get(row.worst)
 
 
 def answer_lines(content: ReportedComparison, rows: Sequence[ReportedRow]) -> list[str]:
@@ -157,7 +151,7 @@ def answer_lines(content: ReportedComparison, rows: Sequence[ReportedRow]) -> li
 
 def _ratio(row: ReportedRow) -> float:
     worst = worst_of(row)
-    return 0.0 if worst is None else _beyond(worst)
+    return 0.0 if worst is None else worst.of_allowed
 
 
 def _off(row: ReportedRow) -> str:
@@ -192,10 +186,10 @@ def _nearest(row: ReportedRow) -> str:
     text = f"No setting agrees. Nearest: {', '.join(row_words(row))}"
     if row.verdict in _HOLDS:
         return f"{text}, {_why(row, []) or row.verdict}."
-    text += f": {symbol(worst.observable)}, {error(_beyond(worst))} times what is allowed"
+    text += f": {symbol(worst.observable)}, {error(worst.of_allowed)} times what is allowed"
     if row.verdict is not Verdict.CONVERGES or row.resolution != "dt" or not worst.order or worst.order < 0:
         return f"{text}."
-    halvings = math.ceil(math.log2(_beyond(worst)) / worst.order)
+    halvings = math.ceil(math.log2(worst.of_allowed) / worst.order)
     return f"{text}; the next step to try is dt {number((row.resolution_value or 0.0) / 2**halvings, 3)} s."
 
 

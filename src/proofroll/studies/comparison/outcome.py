@@ -204,7 +204,7 @@ class Outcome:
         """HTML table for a notebook: a row for each run, with the observable that is furthest beyond its tolerance."""
         rows, gauges = [], []
         for run in self.runs:
-            worst_of = max(run.judgements, key=lambda item: item.error / item.tolerance, default=None)
+            worst_of = max(run.judgements, key=lambda item: item.of_allowed, default=None)
             cells = ["", "", "", run.result.message]
             if worst_of is not None:
                 off = [number(value) + spaced(worst_of.unit) for value in (worst_of.error, worst_of.tolerance)]
