@@ -52,7 +52,7 @@ def _evaluated(folder: Path, tables: dict[str, Any], name: str, relation: Relati
 
 @pytest.mark.parametrize("name", _RELATIONS)
 def test_a_sound_truth_keeps_each_relation(name: str, tmp_path: Path) -> None:
-    """The truth of a double pendulum moves alike turned, renamed, reordered, reversed, and sampled otherwise."""
+    """The truth of a double pendulum moves alike turned, renamed, reordered, reversed, halved and sampled otherwise."""
     assert _evaluated(tmp_path, _TABLES, name, _RELATIONS[name]).surprises == ()
     assert (tmp_path / "scene" / name.replace(" ", "_") / "scene.toml").is_file()
 

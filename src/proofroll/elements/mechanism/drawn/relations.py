@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -96,9 +97,29 @@ def _reversed_back(truth: Mapping[Any, Any], _: object) -> dict[str, Any]:
     return {name: signs[name[0]] * value[::-1] for name, value in values.items()}
 
 
+def _weld(tables: dict[str, Any], _: object) -> None:
+    """Makes two halves of each body, one fixed in the other's frame. Raises LookupError if a body has no inertia."""
+    halves = []
+    for body in tables["bodies"]:
+        body["mass"] /= 2
+        body["inertia"] = [part / 2 for part in body["inertia"]]
+        halves.append(deepcopy(body) | {"name": f"half_of_{body['name']}"})
+    tables["joints"] += [
+        {"name": f"weld_of_{body['name']}", "kind": "fixed", "parent": body["name"], "child": half["name"]}
+        for body, half in zip(tables["bodies"], halves, strict=True)
+    ]
+    tables["bodies"] += halves
+
+
+def _unwelded(truth: Mapping[Any, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
+    count = len(tables["bodies"])
+    return _coordinates(truth) | {name: truth[name].to_numpy()[:, :count] for name in ("p_WB", "v_WB")}
+
+
 RELATIONS: Mapping[str, Relation] = {
     "turned": Relation(_turn, _turned_back),
     "renamed": Relation(_rename, _renamed_back),
     "reordered": Relation(_reorder, _reordered_back),
     "reversed": Relation(_reverse, _reversed_back),
+    "welded": Relation(_weld, _unwelded),
 }
