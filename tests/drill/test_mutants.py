@@ -99,7 +99,7 @@ def test_late_reactions_of_a_fast_rotor_are_named(scene: str) -> None:
     ("scene", "parameters", "until"),
     [
         ("sphere_in_cylinder", {}, 0.3),
-        ("sphere_in_cylinder", {"mu_static": 0.2, "mu_kinetic": 0.15}, 0.4),
+        ("slide_to_roll", {"speed": 1.0}, 0.2),
         ("double_pendulum", {}, 0.3),
         pytest.param("slider_crank", {}, 0.2, marks=pytest.mark.drill),
         pytest.param("arm_pd", {}, 0.3, marks=pytest.mark.drill),
