@@ -221,23 +221,32 @@ SWING = ("double_pendulum", "pendulum", "oscillators", "gyroscope_cart", "driven
 FACTORS = (1.0, 0.5, 0.25)
 # Runs of them take seconds.
 LONG = {"chain", "gyroscope_cart", "servo", "sled"}
+NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
+
+
+def _marks(scene: str, index: int, place: int) -> tuple[pytest.MarkDecorator, ...]:
+    if place == (index + 1) % len(FORMULATIONS):
+        return (pytest.mark.drill,) if scene in LONG else ()
+    return NIGHTLY if scene in LONG else (pytest.mark.drill,)
+
+
 # Every method on a ball and on a tree, and two of them on each other scene, one of which in every run of the tests.
 HONEST = [
-    pytest.param(
-        scene,
-        formulation,
-        marks=() if place == (index + 1) % len(FORMULATIONS) and scene not in LONG else pytest.mark.drill,
-    )
+    pytest.param(scene, formulation, marks=_marks(scene, index, place))
     for scenes in (tuple(ROLL), SWING, tuple(SWITCH))
     for index, scene in enumerate(scenes)
     for place, formulation in enumerate(FORMULATIONS)
     if index == 0 or (place - index) % len(FORMULATIONS) in {0, 1}
 ]
-# Methods of other kinds, on a loop, at a joint's laws and in contact.
+# Methods of other kinds, on a loop, at a joint's laws and in contact: one of them on each before a change lands.
+FIRST: dict[str, tuple[pytest.MarkDecorator, ...]] = {
+    "stop-semi_implicit": (),
+    "loop-multistep": (pytest.mark.drill,),
+    "servo-implicit": (pytest.mark.drill,),
+    "sled-implicit_euler": (pytest.mark.drill,),
+}
 HONEST += [
-    pytest.param(
-        scene, formulation, marks=() if (scene, formulation) == ("stop", "semi_implicit") else pytest.mark.drill
-    )
+    pytest.param(scene, formulation, marks=FIRST.get(f"{scene}-{formulation}", NIGHTLY))
     for scene in ("loop", *SWITCH)
     for formulation in ORDERS
 ]
