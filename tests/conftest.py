@@ -117,7 +117,10 @@ _TRUTHS = KnownTruths()
 _OF_TRUTHS = (
     "tests/unit/truth/",
     "tests/unit/papers/blajer_2006/truth/",
-    *(f"tests/drill/test_{name}.py" for name in ("contact_truths", "joint_law_truths", "referee", "random_scenes")),
+    *(
+        f"tests/drill/test_{name}.py"
+        for name in ("contact_truths", "joint_law_truths", "law_faults", "published", "referee", "random_scenes")
+    ),
 )
 
 

@@ -51,14 +51,15 @@ def test_every_mutant_is_detected_and_most_are_named() -> None:
 
 
 WITHOUT_FAULT = {(kind.__bases__, repr(kind.scene), kind.until): kind for kind in map(without_fault, mutants())}
-# Scenes whose truth takes little time.
+NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
+# Scenes whose truth takes little time; the others are for the night, as the drill of mutants is.
 QUICK = {"sphere_in_cylinder", "two_bounces", "double_pendulum", "heavy_top", "free_body", "saturated_servo"}
 
 
 @pytest.mark.parametrize(
     "kind",
     [
-        pytest.param(kind, id=kind.__name__, marks=() if kind.scene[0] in QUICK else pytest.mark.drill)
+        pytest.param(kind, id=kind.__name__, marks=() if kind.scene[0] in QUICK else NIGHTLY)
         for kind in WITHOUT_FAULT.values()
     ],
 )
