@@ -19,6 +19,8 @@ from proofroll.studies.versions.difference import _apart
 UNTIL = 2.0
 # The ball turns by more than a whole turn in this time [s], and costs more.
 ENDS = {"pendulum": UNTIL, "tilted_cylinder": 0.5}
+# Four seconds of processor.
+SLOW = ("gamma", "projection")
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +30,15 @@ def fine() -> dict[str, float]:
     return {"q.pivot": float(ends["pendulum"]["q.pivot"][-1]), "gamma": float(ends["tilted_cylinder"]["gamma"][-1])}
 
 
-@pytest.mark.parametrize("engine", ["truth", *(name for name in engine_names() if name != "reduced")])
-@pytest.mark.parametrize(("scene", "angle"), [("pendulum", "q.pivot"), ("tilted_cylinder", "gamma")])
+@pytest.mark.parametrize(
+    ("scene", "angle", "engine"),
+    [
+        pytest.param(scene, angle, engine, marks=[pytest.mark.drill] if (angle, engine) == SLOW else [])
+        for scene, angle in (("pendulum", "q.pivot"), ("tilted_cylinder", "gamma"))
+        for engine in ("truth", *engine_names())
+        if engine != "reduced"
+    ],
+)
 def test_two_samples_are_enough_for_an_engine(engine: str, scene: str, angle: str, fine: dict[str, float]) -> None:
     """Who asks for start and end alone is given the angle that others are given, by the truth and by every engine."""
     run = proofroll.simulate(scene, engine, until=ENDS[scene], every=5.0)
