@@ -7,13 +7,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.sampling import BallSample
-from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind, planted
+from proofroll_drill.mutants.base import STEP, Mutant, planted
 
 
 class ToldBall(Mutant):
@@ -30,10 +29,6 @@ class ToldBall(Mutant):
         return np.asarray(self.body.surface.frame(self.body.surface.locate(p[None]))[0])
 
 
-class _LateForce(OneStepBehind, ToldBall):
-    """Base of the mutant with the force of the step before."""
-
-
 def _told(name: str, fault: str, named: str, **said: Any) -> type[Mutant]:
     """Mutant whose samples have other fields, each from the mutant and its right sample."""
 
@@ -41,10 +36,6 @@ def _told(name: str, fault: str, named: str, **said: Any) -> type[Mutant]:
         return dataclasses.replace(sample, **{field: value(self, sample) for field, value in said.items()})
 
     return planted(ToldBall, name, fault, named, misreport=misreport)
-
-
-def _in_body_axes(sample: BallSample, vector: Any) -> FloatArray:
-    return np.asarray(Rotation.from_quat(sample.q_WB, scalar_first=True).inv().apply(vector))
 
 
 def _mirrored(self: Any, sample: Any) -> FloatArray:
@@ -88,12 +79,6 @@ class Shifted(ToldBall):
 _ball = partial(planted, ToldBall)
 FAULTS = (
     _told(
-        "BodySpin",
-        "body spin for world spin",
-        "angular velocity in body axes",
-        w_WB=lambda _, sample: _in_body_axes(sample, sample.w_WB),
-    ),
-    _told(
         "LocalSpin",
         "spin along the surface's axes",
         "angular velocity in the surface's axes",
@@ -106,18 +91,11 @@ FAULTS = (
         "clamped",
         w_WB=lambda self, sample: np.clip(sample.w_WB, -60, 60) if self.t else sample.w_WB,
     ),
-    _told("NegativeForce", "force of the ball on the wall", "wrong sign", force=lambda _, sample: -sample.force),
     _told(
         "LocalForce",
         "force in the surface's axes",
         "ball in the surface's axes",
         force=lambda self, sample: self.local(sample.p_WB).T @ sample.force,
-    ),
-    _told(
-        "BodyForce",
-        "force in body axes",
-        "ball in body axes",
-        force=lambda _, sample: _in_body_axes(sample, sample.force),
     ),
     _told("FrictionSign", "friction with the wrong sign", "friction has the wrong sign", force=_mirrored),
     _told("StaleAxes", "stale normal: the force along the axes of a step before", "normal of", force=_along_stale_axes),
@@ -129,26 +107,12 @@ FAULTS = (
     ),
     _told("ContactPoint", "position of the contact point", "contact point", p_WB=_contact_point),
     _told(
-        "BallScalarLast",
-        "quaternion with its scalar last",
-        "scalar last",
-        q_WB=lambda _, sample: np.roll(sample.q_WB, -1),
-    ),
-    _told(
         "Inverse",
         "quaternion of the inverse rotation",
         "inverse rotation",
         q_WB=lambda _, sample: sample.q_WB * [1, -1, -1, -1],
     ),
     _ball("Single", "float32", "single-precision", misreport=_single),
-    _ball("Late", "one step of lag", "one step (0.002 s) late", clock=lambda _, t: t - STEP),
     _ball("OneTooMany", "one step too many", "one step (0.002 s) early", clock=lambda _, t: t + STEP),
     Shifted,
-    planted(
-        _LateForce,
-        "LateForce",
-        "force of the step before",
-        "force is one step (0.002 s) late",
-        misreport=lambda self, sample: dataclasses.replace(sample, force=self.behind.sample().force),
-    ),
 )
