@@ -19,6 +19,7 @@ from dear import pytest_runtest_setup, pytest_runtest_teardown, pytest_terminal_
 from forked_workers import Forks
 from hostile import ENTRY_POINTS
 from hypothesis import HealthCheck, Phase, settings
+from known_truths import KnownTruths
 from no_skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 -- hooks, which pytest finds here
 from warm_workers import WarmWorkers
 from xdist.remote import Producer
@@ -111,15 +112,27 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadSco
 
 _WARM_WORKERS = WarmWorkers()
 _FORKS = Forks()
+_TRUTHS = KnownTruths()
+# Tests of truths, which find each anew.
+_OF_TRUTHS = (
+    "tests/unit/truth/",
+    "tests/unit/papers/blajer_2006/truth/",
+    *(
+        f"tests/drill/test_{name}.py"
+        for name in ("contact_truths", "joint_law_truths", "law_faults", "published", "referee", "random_scenes")
+    ),
+)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """Tests and the fixtures that they are the first to need share worker processes, unless they are about these."""
+    """Tests and the fixtures that they are the first to need share workers and truths, unless they are about these."""
     with ExitStack() as stack:
         if not item.get_closest_marker("own_workers"):
             stack.enter_context(_WARM_WORKERS.lent())
             stack.enter_context(_FORKS.lent())
+        if not item.nodeid.startswith(_OF_TRUTHS):
+            stack.enter_context(_TRUTHS.lent())
         return (yield)
 
 

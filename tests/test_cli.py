@@ -52,7 +52,7 @@ BAD = {
     "parameter of another form": (with_option("--set", "speed"), 2, ["--set = 'speed'", "parameter=value"]),
     "parameter twice": ([*RUN, "--set", "speed=3", "--set", "speed=4"], 2, ["speed is given twice"]),
     "unknown setting": (with_option("--engine", "oracle[step=1]"), 2, ["oracle: step = ", "choose from formulation"]),
-    "unknown formulation": (with_option("--engine", "broken[formulation=new]"), 2, ["= 'new'", "open_none"]),
+    "unknown formulation": (with_option("--engine", "projection[formulation=new]"), 2, ["= 'new'", "euler"]),
     "a setting for the truth": (with_option("--engine", "truth[dt=1]"), 2, ["truth", "no settings"]),
     "ball as large as the cylinder": (with_option("--set", "radius=0.225"), 2, ["radius = 0.225", "cylinder_radius"]),
     "negative mass": (with_option("--set", "mass=-1"), 2, ["mass = -1", "above 0"]),
@@ -313,7 +313,7 @@ tolerance = "tight"
     ("engine", "code", "as_expected"),
     [
         ("oracle", 0, True),
-        ("broken[formulation=hidden_gravity]", 1, False),
+        ("tiny", 1, False),
         ("exits", 3, None),
         ("absent", 3, None),
     ],

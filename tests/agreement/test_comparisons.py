@@ -49,8 +49,16 @@ def held(comparison: Comparison) -> list[Row]:
     return list(first.values())
 
 
+# Comparisons whose rows take longest, a quarter of a minute each and more: they run every night. What switches and
+# what rolls are held in others, which run before each change lands.
+NIGHTLY = {"accuracy", "stick_slip"}
 ROWS = [
-    pytest.param(comparison, row, id=f"{comparison.name}-{row.engine}")
+    pytest.param(
+        comparison,
+        row,
+        id=f"{comparison.name}-{row.engine}",
+        marks=[pytest.mark.nightly] if comparison.name in NIGHTLY else [],
+    )
     for comparison in map(loaded, comparison_names())
     for row in held(comparison)
 ]
@@ -126,6 +134,7 @@ LAST_SPECIAL = 2.25
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["pinocchio[formulation=impulses,preset=tuned,dt=5e-4]"])
 def test_row_at_the_stair_edge(engine: str, store: Store) -> None:

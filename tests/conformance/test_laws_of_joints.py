@@ -86,7 +86,13 @@ def test_formulations_are_checked_on_what_they_are_made_for() -> None:
 
 @pytest.mark.parametrize(
     "law",
-    ["damping", "armature", *(pytest.param(law, marks=pytest.mark.drill) for law in ["torque", "friction", *DRIVES])],
+    [
+        "damping",
+        *(
+            pytest.param(law, marks=[pytest.mark.drill, pytest.mark.nightly])
+            for law in ("armature", "torque", "friction", *DRIVES)
+        ),
+    ],
 )
 def test_a_law_that_is_left_out_is_noticed(law: str) -> None:
     """An engine that says it has a law, and moves without it, fails the checks of its motion."""

@@ -313,10 +313,13 @@ def test_no_result_of_another_arithmetic_is_used(tmp_path: Path) -> None:
 
 
 def test_tests_that_fail_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Failed tests are named; a run of pytest without tests is no success either."""
+    """Failed tests are named; a run of pytest without tests is no success either; other files are not collected."""
     said = {"out": "FAILED tests/test_it.py::test_it - assert 1 < 0\n1 failed in 1.0s\n"}
 
     def ran(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
+        files = {Path(word).name for word in command if word.endswith(".py")}
+        assert "test_natural_units.py" in files
+        assert "test_cli.py" not in files
         return subprocess.CompletedProcess(command, 1, stdout=said["out"])
 
     monkeypatch.setattr(the_matrix, "took_effect", lambda *_: "")

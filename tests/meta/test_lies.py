@@ -43,9 +43,10 @@ from proofroll.studies.tradeoff.curve import CurvePoint, with_errors
 
 # A truth of its own at other times, of what switches.
 SLOW = {"a clock 1 % slow", "a clock 1 % slow from the start of a slide"}
-# Each lie is told of one scene in every run of the tests, and in the drills of one of each other kind: their elements
-# and truths have code of their own, scenes of one kind have not. Scenes of a kind take turns, so that each has many.
-KINDS = (BALLS, MECHANISMS, ("sled",))
+# Each lie is told of one scene, every other one in every run of the tests, and of one of the other kind in the drills:
+# joints and contacts have code of their own, scenes of one kind have not. Scenes of a kind take turns, so that each has
+# many.
+KINDS = (MECHANISMS, (*BALLS, "sled"))
 
 
 def told(lie: Lie, place: int) -> dict[str, tuple[pytest.MarkDecorator, ...]]:
@@ -53,7 +54,7 @@ def told(lie: Lie, place: int) -> dict[str, tuple[pytest.MarkDecorator, ...]]:
     first = lie.scenes[place % len(lie.scenes)]
     others = [[about for about in kind if about in lie.scenes] for kind in KINDS if first not in kind]
     drills = dict.fromkeys((kind[place % len(kind)] for kind in others if kind), (pytest.mark.drill,))
-    return {first: (pytest.mark.drill,) if lie.name in SLOW else ()} | drills
+    return {first: (pytest.mark.drill,) if place % 2 or lie.name in SLOW else ()} | drills
 
 
 LIES = [
@@ -220,23 +221,32 @@ SWING = ("double_pendulum", "pendulum", "oscillators", "gyroscope_cart", "driven
 FACTORS = (1.0, 0.5, 0.25)
 # Runs of them take seconds.
 LONG = {"chain", "gyroscope_cart", "servo", "sled"}
+NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
+
+
+def _marks(scene: str, index: int, place: int) -> tuple[pytest.MarkDecorator, ...]:
+    if place == (index + 1) % len(FORMULATIONS):
+        return (pytest.mark.drill,) if scene in LONG else ()
+    return NIGHTLY if scene in LONG else (pytest.mark.drill,)
+
+
 # Every method on a ball and on a tree, and two of them on each other scene, one of which in every run of the tests.
 HONEST = [
-    pytest.param(
-        scene,
-        formulation,
-        marks=() if place == (index + 1) % len(FORMULATIONS) and scene not in LONG else pytest.mark.drill,
-    )
+    pytest.param(scene, formulation, marks=_marks(scene, index, place))
     for scenes in (tuple(ROLL), SWING, tuple(SWITCH))
     for index, scene in enumerate(scenes)
     for place, formulation in enumerate(FORMULATIONS)
     if index == 0 or (place - index) % len(FORMULATIONS) in {0, 1}
 ]
-# Methods of other kinds, on a loop, at a joint's laws and in contact.
+# Methods of other kinds, on a loop, at a joint's laws and in contact: one of them on each before a change lands.
+FIRST: dict[str, tuple[pytest.MarkDecorator, ...]] = {
+    "stop-semi_implicit": (),
+    "loop-multistep": (pytest.mark.drill,),
+    "servo-implicit": (pytest.mark.drill,),
+    "sled-implicit_euler": (pytest.mark.drill,),
+}
 HONEST += [
-    pytest.param(
-        scene, formulation, marks=() if (scene, formulation) == ("stop", "semi_implicit") else pytest.mark.drill
-    )
+    pytest.param(scene, formulation, marks=FIRST.get(f"{scene}-{formulation}", NIGHTLY))
     for scene in ("loop", *SWITCH)
     for formulation in ORDERS
 ]

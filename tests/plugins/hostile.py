@@ -321,7 +321,6 @@ ENTRY_POINTS = {
     for kind in [*vars().values()]
     if isinstance(kind, type) and issubclass(kind, Oracle)
 } | {
-    "broken": "broken:Broken",
     "laddered": "laddered:Laddered",
     "tiny": "tiny:Tiny",
     "grown": "tiny:Grown",

@@ -45,7 +45,7 @@ def of_mechanism(scene: Scene, **parts: Any) -> Scene:
 
 _SCENES: Mapping[str, tuple[Callable[[], Scene], float]] = {
     "rolls": (lambda: load_scene("sphere_in_cylinder", asks=("orientation",)), 0.2),
-    "slips": (lambda: load_scene("sphere_in_cylinder", mu_static=0.2, mu_kinetic=0.15), 0.4),
+    "slips": (lambda: load_scene("sphere_in_cylinder", mu_static=0.15, mu_kinetic=0.1), 0.25),
     "tree": (lambda: load_scene("double_pendulum"), 0.12),
     "loop": (lambda: load_scene("slider_crank"), 0.12),
     "driven": (_driven, 0.12),

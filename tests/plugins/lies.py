@@ -266,7 +266,7 @@ def _slips() -> Iterator[Lie]:
         return Lie(name, ("slips",), said, events=events)
 
     yield lie("no events", lambda *_: [])
-    once_more: dict[str, Any] = {"kind": "stick", "time": 0.35, "time_low": 0.35, "time_high": 0.35}
+    once_more: dict[str, Any] = {"kind": "stick", "time": 0.22, "time_low": 0.22, "time_high": 0.22}
     yield lie(
         "an event too many", lambda right, _: [*right, *(dataclasses.replace(e, **once_more) for e in right[-1:])]
     )

@@ -40,12 +40,12 @@ def _mechanisms() -> dict[str, bool]:
 
 
 SCENES = _mechanisms()
-# Every formulation builds every scene with loops; of other scenes each formulation builds every fourth.
+# Each formulation builds every second scene with loops; of other scenes it builds every eighth.
 CASES = [
     (scene, *formulation)
     for index, (scene, number) in enumerate(product(SCENES, range(len(OF_LOOPS + OTHERS))))
     for formulation in [(OF_LOOPS + OTHERS)[number]]
-    if (SCENES[scene] and formulation in OF_LOOPS) or (not SCENES[scene] and index % 4 == 0)
+    if formulation in (OF_LOOPS if SCENES[scene] else OF_LOOPS + OTHERS) and index % (2 if SCENES[scene] else 8) == 0
 ]
 
 

@@ -102,7 +102,7 @@ def arithmetic(
         list[str] | None, typer.Argument(help="Comparisons, studies or ladder:SCENE; by default all.")
     ] = None,
     kind: Annotated[list[str] | None, typer.Option(help="Kind of arithmetic, may be repeated; by default all.")] = None,
-    tests: Annotated[str, typer.Option(help="Run tests too: sensitive, nightly or all.")] = "",
+    tests: Annotated[str, typer.Option(help="Run tests too: quick, sensitive, nightly or all.")] = "",
     comparisons: Annotated[bool, typer.Option(help="Run comparisons.")] = True,
     out: Annotated[Path | None, typer.Option(help="Keep what was found here, a folder for each kind.")] = None,
     jobs: Annotated[int, typer.Option(min=1, help="Workers at once.")] = 1,

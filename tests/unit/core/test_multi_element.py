@@ -51,7 +51,7 @@ def mixed(balls: Scene) -> Scene:
 @pytest.mark.parametrize(
     "engine",
     [
-        "projection[formulation=dependent]",
+        pytest.param("projection[formulation=dependent]", marks=pytest.mark.drill),
         "exudyn[formulation=spheres]",
         "pinocchio[formulation=impulses]",
         "mujoco[formulation=geoms]",

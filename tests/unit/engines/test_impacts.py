@@ -24,7 +24,6 @@ def true() -> xr.Dataset:
     [
         pytest.param("projection[formulation=dependent]", 1e-12, marks=pytest.mark.drill),
         ("pinocchio[formulation=impulses]", 1e-2),
-        ("pinocchio[formulation=impulses,preset=default]", 1e-2),
         ("mujoco[formulation=geoms]", 1e-2),
         ("mujoco[formulation=geoms,dt=1e-4]", 1e-3),
     ],

@@ -21,7 +21,7 @@ RESISTED: dict[str, Any] = {**THROWN, "rolling_resistance": 5e-4}
 ENGINES = [
     pytest.param(RESISTED, "projection[formulation=dependent]", 1e-12, 1e-11, marks=pytest.mark.drill),
     (RESISTED, "pinocchio[formulation=impulses]", 5e-4, 1e-3),
-    (RESISTED, "pinocchio[formulation=impulses,preset=tuned]", 5e-4, 1e-3),
+    pytest.param(RESISTED, "pinocchio[formulation=impulses,preset=tuned]", 5e-4, 1e-3, marks=pytest.mark.drill),
     pytest.param(RESISTED, "exudyn[formulation=spheres]", 1e-3, 1e-3, marks=pytest.mark.drill),
     (THROWN, "mujoco[formulation=geoms,preset=tuned]", 1e-3, 1e-3),
 ]

@@ -17,9 +17,14 @@ from proofroll_drill.arithmetic.differences import Difference, differences, late
 from proofroll_drill.arithmetic.kinds import REPOSITORY, Arithmetic, make_ready, took_effect
 
 _RECORD = "from proofroll_drill.arithmetic.record import main; import sys; main(*sys.argv[1:])"
-# The tests that a change of the last digits may reach, by a mark (pyproject.toml), without the longest or with them; or
-# all tests.
-TESTS = {"sensitive": "arithmetic and not nightly", "nightly": "arithmetic", "all": ""}
+# The tests that a change of the last digits may reach, by a mark (pyproject.toml): without drills, without the longest
+# or with them; or all tests.
+TESTS = {
+    "quick": "arithmetic and not drill",
+    "sensitive": "arithmetic and not nightly",
+    "nightly": "arithmetic",
+    "all": "",
+}
 
 
 @dataclass(frozen=True)
@@ -154,7 +159,7 @@ def _tested(kind: Arithmetic, tests: str, folder: Path, jobs: int) -> tuple[list
         "-rfE",
         "-m",
         TESTS[tests],
-        *(_with(TESTS[tests]) if TESTS[tests] else []),
+        *(_with("arithmetic") if TESTS[tests] else []),
     ]
     environment = kind.variables(folder / "site")
     done = subprocess.run(

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.sampling import BallSample
-from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
+from proofroll_drill.mutants.base import STEP, Mutant, planted
 
 
 class ToldBall(Mutant):
@@ -29,149 +29,36 @@ class ToldBall(Mutant):
         return np.asarray(self.body.surface.frame(self.body.surface.locate(p[None]))[0])
 
 
-class BodySpin(ToldBall):
-    """ω along the body's axes."""
+def _told(name: str, fault: str, named: str, **said: Any) -> type[Mutant]:
+    """Mutant whose samples have other fields, each from the mutant and its right sample."""
 
-    fault = "body spin for world spin"
-    named = ("angular velocity in body axes",)
+    def misreport(self: Any, sample: BallSample) -> BallSample:
+        return dataclasses.replace(sample, **{field: value(self, sample) for field, value in said.items()})
 
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Turned back."""
-        assert sample.q_WB is not None  # it is asked for
-        turn = Rotation.from_quat(sample.q_WB, scalar_first=True)
-        return dataclasses.replace(sample, w_WB=turn.inv().apply(sample.w_WB))
+    return planted(ToldBall, name, fault, named, misreport=misreport)
 
 
-class LocalSpin(ToldBall):
-    """ω along e1, e2, e3."""
-
-    fault = "spin along the surface's axes"
-    named = ("angular velocity in the surface's axes",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Its components."""
-        return dataclasses.replace(sample, w_WB=self.local(sample.p_WB).T @ sample.w_WB)
+def _mirrored(self: Any, sample: Any) -> FloatArray:
+    """Force mirrored at the normal."""
+    e1 = self.local(sample.p_WB)[:, 0]
+    return np.asarray(2 * (sample.force @ e1) * e1 - sample.force)
 
 
-class NegativeForce(ToldBall):
-    """The force on the wall."""
-
-    fault = "force of the ball on the wall"
-    named = ("wrong sign",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Minus."""
-        assert sample.force is not None
-        return dataclasses.replace(sample, force=-sample.force)
+def _along_stale_axes(self: Any, sample: Any) -> FloatArray:
+    """Force turned by what the normal turns in a step."""
+    before = sample.p_WB - (STEP if self.t else 0.0) * sample.v_WB
+    return np.asarray(self.local(before) @ self.local(sample.p_WB).T @ sample.force)
 
 
-class LocalForce(ToldBall):
-    """The force along e1, e2, e3."""
-
-    fault = "force in the surface's axes"
-    named = ("ball in the surface's axes",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Its components, but at time 0."""
-        assert sample.force is not None
-        return dataclasses.replace(sample, force=self.local(sample.p_WB).T @ sample.force)
+def _contact_point(self: Any, sample: BallSample) -> FloatArray:
+    """Point one radius out, from the first step on."""
+    return sample.p_WB + (self.body.ball.radius * self.local(sample.p_WB)[:, 0] if self.t else 0.0)
 
 
-class BodyForce(ToldBall):
-    """The force along the body's axes."""
-
-    fault = "force in body axes"
-    named = ("ball in body axes",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Turned back."""
-        assert sample.force is not None
-        assert sample.q_WB is not None
-        turn = Rotation.from_quat(sample.q_WB, scalar_first=True)
-        return dataclasses.replace(sample, force=turn.inv().apply(sample.force))
-
-
-class FrictionSign(ToldBall):
-    """N is right, the friction points the other way."""
-
-    fault = "friction with the wrong sign"
-    named = ("friction has the wrong sign",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Mirrored at the normal."""
-        assert sample.force is not None
-        e1 = self.local(sample.p_WB)[:, 0]
-        return dataclasses.replace(sample, force=2 * (sample.force @ e1) * e1 - sample.force)
-
-
-class StaleAxes(ToldBall):
-    """The force is put along the axes of the step before."""
-
-    fault = "stale normal: the force along the axes of a step before"
-    named = ("normal of",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Turned by what the normal turns in a step."""
-        assert sample.force is not None
-        before = sample.p_WB - (STEP if self.t else 0.0) * sample.v_WB
-        return dataclasses.replace(sample, force=self.local(before) @ self.local(sample.p_WB).T @ sample.force)
-
-
-class Impulse(ToldBall):
-    """The solver's impulse over the wrong step."""
-
-    fault = "impulse instead of force"
-    named = ("force is the wall's force on the ball",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Times a step."""
-        assert sample.force is not None
-        return dataclasses.replace(sample, force=sample.force * STEP)
-
-
-class Clamped(ToldBall):
-    """No component of the spin is beyond 60 rad/s: two of three get there, one of them by another way at each time."""
-
-    fault = "spin clamped at 60 rad/s"
-    named = ("clamped",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """After the first step."""
-        return dataclasses.replace(sample, w_WB=np.clip(sample.w_WB, -60, 60) if self.t else sample.w_WB)
-
-
-class Single(ToldBall):
-    """All numbers are cut to 24 bits."""
-
-    fault = "float32"
-    named = ("single-precision",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Rounded."""
-        cut = {name: np.float64(np.float32(getattr(sample, name))) for name in ("p_WB", "v_WB", "w_WB", "force")}
-        return dataclasses.replace(sample, **cut)  # type: ignore[arg-type]  # vectors by name
-
-
-class Late(ToldBall):
-    """A state of a step before."""
-
-    fault = "one step of lag"
-    named = ("one step (0.002 s) late",)
-
-    def clock(self, t: float) -> float:
-        """Behind."""
-        return t - STEP
-
-
-class OneTooMany(ToldBall):
-    """A step more than asked for at the first call."""
-
-    fault = "one step too many"
-    named = ("one step (0.002 s) early",)
-
-    def clock(self, t: float) -> float:
-        """Ahead."""
-        return t + STEP
+def _single(_: Any, sample: BallSample) -> BallSample:
+    """Sample whose numbers are cut to 24 bits."""
+    cut = {name: np.float64(np.float32(getattr(sample, name))) for name in ("p_WB", "v_WB", "w_WB", "force")}
+    return dataclasses.replace(sample, **cut)  # type: ignore[arg-type]  # vectors by name
 
 
 class Shifted(ToldBall):
@@ -189,48 +76,43 @@ class Shifted(ToldBall):
         return t + 0.004
 
 
-class LateForce(OneStepBehind, ToldBall):
-    """The state is of now, the force of the step before."""
-
-    fault = "force of the step before"
-    named = ("force is one step (0.002 s) late",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """The other's force."""
-        return dataclasses.replace(sample, force=self.behind.sample().force)
-
-
-class ContactPoint(ToldBall):
-    """The contact point's place."""
-
-    fault = "position of the contact point"
-    named = ("contact point",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """One radius out, from the first step on."""
-        out = self.body.ball.radius * self.local(sample.p_WB)[:, 0] if self.t else 0.0
-        return dataclasses.replace(sample, p_WB=sample.p_WB + out)
-
-
-class BallScalarLast(ToldBall):
-    """Another convention for quaternions."""
-
-    fault = "quaternion with its scalar last"
-    named = ("scalar last",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """x, y, z, w."""
-        assert sample.q_WB is not None
-        return dataclasses.replace(sample, q_WB=np.roll(sample.q_WB, -1))
-
-
-class Inverse(ToldBall):
-    """The world in the body."""
-
-    fault = "quaternion of the inverse rotation"
-    named = ("inverse rotation",)
-
-    def misreport(self, sample: BallSample) -> BallSample:
-        """Conjugated."""
-        assert sample.q_WB is not None
-        return dataclasses.replace(sample, q_WB=sample.q_WB * [1, -1, -1, -1])
+_ball = partial(planted, ToldBall)
+FAULTS = (
+    _told(
+        "LocalSpin",
+        "spin along the surface's axes",
+        "angular velocity in the surface's axes",
+        w_WB=lambda self, sample: self.local(sample.p_WB).T @ sample.w_WB,
+    ),
+    # two of three components of the spin get there, one of them by another way at each time
+    _told(
+        "Clamped",
+        "spin clamped at 60 rad/s",
+        "clamped",
+        w_WB=lambda self, sample: np.clip(sample.w_WB, -60, 60) if self.t else sample.w_WB,
+    ),
+    _told(
+        "LocalForce",
+        "force in the surface's axes",
+        "ball in the surface's axes",
+        force=lambda self, sample: self.local(sample.p_WB).T @ sample.force,
+    ),
+    _told("FrictionSign", "friction with the wrong sign", "friction has the wrong sign", force=_mirrored),
+    _told("StaleAxes", "stale normal: the force along the axes of a step before", "normal of", force=_along_stale_axes),
+    _told(
+        "Impulse",
+        "impulse instead of force",
+        "force is the wall's force on the ball",
+        force=lambda _, sample: sample.force * STEP,
+    ),
+    _told("ContactPoint", "position of the contact point", "contact point", p_WB=_contact_point),
+    _told(
+        "Inverse",
+        "quaternion of the inverse rotation",
+        "inverse rotation",
+        q_WB=lambda _, sample: sample.q_WB * [1, -1, -1, -1],
+    ),
+    _ball("Single", "float32", "single-precision", misreport=_single),
+    _ball("OneTooMany", "one step too many", "one step (0.002 s) early", clock=lambda _, t: t + STEP),
+    Shifted,
+)

@@ -102,6 +102,20 @@ class Mutant:
         return dataclasses.replace(self.claimed.built(), **moves)
 
 
+def planted(base: type[Mutant], name: str, fault: str, named: str | tuple[str, ...], **fields: Any) -> type[Mutant]:
+    """Mutant of a base: its fault, words of the cause that has to be named, and what makes it faulty.
+
+    Args:
+        base: the engine without the fault.
+        name: name of the class.
+        fault: planted fault, in a few words.
+        named: words of the cause; one of them suffices.
+        fields: attributes and methods of the class.
+    """
+    words = (named,) if isinstance(named, str) else named
+    return type(name, (base,), {"__doc__": fault, "fault": fault, "named": words, **fields})
+
+
 class Honest(Mutant):
     """Base of mutants with an honest certificate, which shows the fault."""
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,13 +17,14 @@ from proofroll.elements.mechanism.contact.acting import Acting, heading_of
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.start import touches
 from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import coefficients_of
 from proofroll.truth.numerics.hybrid import follow, states_of
 from proofroll.truth.tree.contact_tree import ContactTree
-from proofroll_drill.mutants.base import STEP
-from proofroll_drill.mutants.mechanism_models import MechanismMutant
+from proofroll_drill.mutants.base import STEP, planted
+from proofroll_drill.mutants.mechanism_models import MechanismMutant, each, times
 
 SLED: Any = ("sled", {})
 BALLS: Any = (str(Path(__file__).parent / "two_bounces"), {})
@@ -90,93 +93,13 @@ class ContactMutant(MechanismMutant):
         )
 
 
-def of_pairs(mechanism: Mechanism, change: Any) -> Mechanism:
-    """Each pair changed."""
-    return dataclasses.replace(mechanism, pairs=tuple(change(pair) for pair in mechanism.pairs))
+class TurningMutant(ContactMutant):
+    """Two balls on a floor, followed by the truth's first route, which has all laws of a pair."""
 
-
-def of_geometry(mechanism: Mechanism, name: str, **values: Any) -> Mechanism:
-    """One geometry changed."""
-    changed = (dataclasses.replace(g, **values) if g.name == name else g for g in mechanism.geometries)
-    return dataclasses.replace(mechanism, geometries=tuple(changed))
-
-
-class FrictionOff(ContactMutant):
-    """Every pair is smooth."""
-
-    fault = "friction of contacts off"
-    named = ("friction of all contacts is off",)
-
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """Smooth pairs."""
-        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=0.0))
-
-
-class FrictionOnePercent(ContactMutant):
-    """A hundredth less friction."""
-
-    fault = "friction of contacts 1 % off"
-    named = ("friction of all contacts is 0.99 ",)
-
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """A hundredth less of each pair."""
-        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=0.99 * pair.friction))
-
-
-class FrictionOfOneFoot(ContactMutant):
-    """One of three feet grips a tenth more."""
-
-    fault = "friction of one contact 1.1 times"
-    named = ("friction of left is 1.1",)
-
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """The first pair alone."""
-        first, *others = mechanism.pairs
-        return dataclasses.replace(
-            mechanism, pairs=(dataclasses.replace(first, friction=1.1 * first.friction), *others)
-        )
-
-
-class FrictionOfAnImpact(ContactMutant):
-    """One impact rubs a tenth more."""
-
-    fault = "friction of an impact 1.1 times"
-    scene: ClassVar[Any] = ("two_spheres", {})
-    until, every = 0.2, 0.01  # the impact, at 0.1 s, lies on a sample
-    named = ("friction of impacts is 1.1",)
-
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """A tenth more."""
-        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=1.1 * pair.friction))
-
-
-class FrictionOfBounces(FrictionOfAnImpact):
-    """Each bounce rubs a tenth more."""
-
-    fault = "friction of bounces 1.1 times"
-    scene: ClassVar[Any] = ("spinning_bounce", {})
-    until, every = 1.0, 0.02
-
-
-class RestitutionOfAnImpact(ContactMutant):
-    """One impact returns nine tenths of its speed."""
-
-    fault = "restitution of an impact 0.9 times"
-    scene: ClassVar[Any] = ("two_spheres", {})
-    until, every = 0.2, 0.01  # the impact, at 0.1 s, lies on a sample
-    named = ("restitution of impacts is 0.9", "restitution of all pairs is 0.9")
-
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """A tenth less."""
-        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, restitution=0.9 * pair.restitution))
-
-
-class RestitutionOfBounces(RestitutionOfAnImpact):
-    """Each bounce returns nine tenths of its speed."""
-
-    fault = "restitution of bounces 0.9 times"
-    scene: ClassVar[Any] = ("spinning_bounce", {})
-    until, every = 1.0, 0.02
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        name: needs | {MechanismCapability.TURNING_FRICTION} for name, needs in ContactMutant.provides.items()
+    }
+    scene: ClassVar[Any] = (str(Path(__file__).parent / "rolling_and_sliding"), {})
 
 
 class Pyramid(ContactDynamics):
@@ -190,121 +113,155 @@ class Pyramid(ContactDynamics):
         return np.asarray(np.sign(direction[most]) * np.eye(3)[most])
 
 
-class PyramidForCone(ContactMutant):
-    """Friction is bounded by a square."""
-
-    fault = "a pyramid of friction in place of the cone"
-    named = ("friction pyramid",)
-    law = Pyramid
+def _one_less(_: Any, mechanism: Mechanism) -> Mechanism:
+    """All pairs but the last."""
+    return dataclasses.replace(mechanism, pairs=mechanism.pairs[:-1])
 
 
-class ContactLeftOut(ContactMutant):
-    """One foot touches nothing."""
-
-    fault = "a contact left out"
-    named = ("the contact back is left out",)
-
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """All pairs but the last."""
-        return dataclasses.replace(mechanism, pairs=mechanism.pairs[:-1])
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """The last force is zero."""
-        assert sample.contact_force is not None
-        return dataclasses.replace(sample, contact_force=np.append(sample.contact_force, np.zeros((1, 3)), axis=0))
+def _with_zero(_: Any, sample: MechanismSample) -> MechanismSample:
+    """Sample with a last force of zero."""
+    assert sample.contact_force is not None
+    return dataclasses.replace(sample, contact_force=np.append(sample.contact_force, np.zeros((1, 3)), axis=0))
 
 
-class FootMoved(ContactMutant):
-    """One foot is a millimetre further ahead, and its certificate says so."""
-
-    fault = "a foot moved 1 mm"
-    honest = True
-    named = ("places of contact",)
-
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """Ahead."""
-        x, y, z = next(g.position for g in mechanism.geometries if g.name == "left_foot")
-        return of_geometry(mechanism, "left_foot", position=(x + 1e-3, y, z))
+def _on_the_other_body(_: Any, sample: MechanismSample) -> MechanismSample:
+    """Sample with the force on the second body."""
+    assert sample.contact_force is not None
+    return dataclasses.replace(sample, contact_force=-sample.contact_force)
 
 
-class FootMovedSilently(FootMoved):
-    """The same, and its certificate has the scene's place."""
-
-    fault = "a foot moved 1 mm, and not told"
-    honest = False
-    named = ("left_foot is at (0.151, 0.1, -0.08)",)
-
-
-class NormalTurned(ContactMutant):
-    """The floor leans by a thousandth, and its certificate says so."""
-
-    fault = "normal of a contact turned"
-    scene: ClassVar[Any] = BALLS
-    honest = True
-    named = ("normals of contact",)
-
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """Another floor."""
-        return of_geometry(mechanism, "floor", normal=(1e-3, 0.0, 1.0))
-
-
-class NormalTurnedSilently(NormalTurned):
-    """The same, and its certificate has the scene's normal."""
-
-    fault = "normal of a contact turned, and not told"
-    until, every = 0.4, 0.02
-    honest = False
-    named = ("normal of floor is turned by 0.001 rad",)
-
-
-class OtherBody(ContactMutant):
-    """The force on the second body is reported."""
-
-    fault = "force of contact on the other body"
-    named = ("contact_forces has the wrong sign",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Minus."""
-        assert sample.contact_force is not None
-        return dataclasses.replace(sample, contact_force=-sample.contact_force)
-
-
-class RestitutionSwapped(ContactMutant):
+def _swapped_restitutions(_: Any, mechanism: Mechanism) -> Mechanism:
     """Each ball bounces as the other should."""
-
-    fault = "restitution swapped between pairs"
-    scene = BALLS
-    until, every = 0.4, 0.02
-    named = ("restitution is of another pair",)
-
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """Swapped."""
-        one, two = mechanism.pairs
-        swapped = (one.restitution, two.restitution)[::-1]
-        pairs = (dataclasses.replace(p, restitution=e) for p, e in zip((one, two), swapped, strict=True))
-        return dataclasses.replace(mechanism, pairs=tuple(pairs))
+    one, two = mechanism.pairs
+    pairs = dataclasses.replace(one, restitution=two.restitution), dataclasses.replace(two, restitution=one.restitution)
+    return dataclasses.replace(mechanism, pairs=pairs)
 
 
-class LateImpact(ContactMutant):
-    """The ball goes on for a step before the impact acts."""
+def _late_impact(self: Any) -> MechanismSample:
+    """Sample of free flight for a step from where a ball comes to the floor, before the impact acts."""
+    sample = ContactMutant.sample(self)
+    p, v = np.array(sample.p_WB), np.array(sample.v_WB)
+    for happened in self.path.happenings:
+        since = self.t - happened.time
+        if since <= 0:
+            continue
+        number = [pair.name for pair in self.mechanism.pairs].index(happened.name)
+        comes, e, g = 9.81 * happened.time, self.mechanism.pairs[number].restitution, 9.81
+        p[number, 2] += -comes * STEP - g * STEP**2 / 2 - e * comes * since + g * since**2 / 2
+        p[number, 2] += e * (comes + g * STEP) * (since - STEP) - g * (since - STEP) ** 2 / 2
+        v[number, 2] += (1 + e) * g * STEP
+    return dataclasses.replace(sample, p_WB=p, v_WB=v)
 
-    fault = "impact one step late"
-    scene = BALLS
-    until, every = 0.4, 0.02
-    named = ("impacts come one step",)
-    late = STEP
 
-    def sample(self) -> MechanismSample:
-        """Free flight from where the ball is a step after it has come to the floor."""
-        sample = super().sample()
-        p, v = np.array(sample.p_WB), np.array(sample.v_WB)
-        for happened in self.path.happenings:
-            since = self.t - happened.time
-            if since <= 0:
-                continue
-            number = [pair.name for pair in self.mechanism.pairs].index(happened.name)
-            comes, e, g = 9.81 * happened.time, self.mechanism.pairs[number].restitution, 9.81
-            p[number, 2] += -comes * STEP - g * STEP**2 / 2 - e * comes * since + g * since**2 / 2
-            p[number, 2] += e * (comes + g * STEP) * (since - STEP) - g * (since - STEP) ** 2 / 2
-            v[number, 2] += (1 + e) * g * STEP
-        return dataclasses.replace(sample, p_WB=p, v_WB=v)
+def _pairs(factor: float, field: str, name: str = "") -> Callable[[Any, Mechanism], Mechanism]:
+    return each("pairs", name, **{field: times(factor, field)})
+
+
+_AHEAD = each(
+    "geometries", "left_foot", position=lambda foot: (foot.position[0] + 1e-3, foot.position[1], foot.position[2])
+)
+_LEANING = each("geometries", "floor", normal=lambda _: (1e-3, 0.0, 1.0))
+# One impact, at 0.1 s on a sample, and a sequence of bounces.
+_ONE = {"scene": ("two_spheres", {}), "until": 0.2, "every": 0.01}
+_MANY = {"scene": ("spinning_bounce", {}), "until": 1.0, "every": 0.02}
+_FALL = {"scene": BALLS, "until": 0.4, "every": 0.02}
+_LESS_RESTITUTION = ("restitution of impacts is 0.9", "restitution of all pairs is 0.9")
+_fault, _turning = partial(planted, ContactMutant), partial(planted, TurningMutant)
+FAULTS = (
+    _fault("FrictionOff", "friction of contacts off", "friction of all contacts is off", other=_pairs(0.0, "friction")),
+    _fault(
+        "FrictionOnePercent",
+        "friction of contacts 1 % off",
+        "friction of all contacts is 0.99 ",
+        other=_pairs(0.99, "friction"),
+    ),
+    # one of three feet
+    _fault(
+        "FrictionOfOneFoot",
+        "friction of one contact 1.1 times",
+        "friction of left is 1.1",
+        other=_pairs(1.1, "friction", "left"),
+    ),
+    _fault(
+        "FrictionOfAnImpact",
+        "friction of an impact 1.1 times",
+        "friction of impacts is 1.1",
+        other=_pairs(1.1, "friction"),
+        **_ONE,
+    ),
+    _fault(
+        "FrictionOfBounces",
+        "friction of bounces 1.1 times",
+        "friction of impacts is 1.1",
+        other=_pairs(1.1, "friction"),
+        **_MANY,
+    ),
+    _fault(
+        "RestitutionOfAnImpact",
+        "restitution of an impact 0.9 times",
+        _LESS_RESTITUTION,
+        other=_pairs(0.9, "restitution"),
+        **_ONE,
+    ),
+    _fault(
+        "RestitutionOfBounces",
+        "restitution of bounces 0.9 times",
+        _LESS_RESTITUTION,
+        other=_pairs(0.9, "restitution"),
+        **_MANY,
+    ),
+    _fault("PyramidForCone", "a pyramid of friction in place of the cone", "friction pyramid", law=Pyramid),
+    _fault(
+        "ContactLeftOut", "a contact left out", "the contact back is left out", other=_one_less, misreport=_with_zero
+    ),
+    _fault("FootMoved", "a foot moved 1 mm", "places of contact", honest=True, other=_AHEAD),
+    _fault("FootMovedSilently", "a foot moved 1 mm, and not told", "left_foot is at (0.151, 0.1, -0.08)", other=_AHEAD),
+    _fault(
+        "NormalTurned", "normal of a contact turned", "normals of contact", scene=BALLS, honest=True, other=_LEANING
+    ),
+    _fault(
+        "NormalTurnedSilently",
+        "normal of a contact turned, and not told",
+        "normal of floor is turned by 0.001 rad",
+        other=_LEANING,
+        **_FALL,
+    ),
+    _fault(
+        "OtherBody",
+        "force of contact on the other body",
+        "contact_forces has the wrong sign",
+        misreport=_on_the_other_body,
+    ),
+    _fault(
+        "RestitutionSwapped",
+        "restitution swapped between pairs",
+        "restitution is of another pair",
+        other=_swapped_restitutions,
+        **_FALL,
+    ),
+    _fault("LateImpact", "impact one step late", "impacts come one step", late=STEP, sample=_late_impact, **_FALL),
+    _turning(
+        "RollingResistanceMore",
+        "rolling resistance 1.1 times",
+        "rolling resistance of rolls is 1.1 times",
+        other=_pairs(1.1, "rolling_resistance"),
+    ),
+    _turning(
+        "RollingResistanceByRadius",
+        "rolling resistance with the radius as its arm",
+        "rolling resistance of rolls is 0.05 times",
+        other=_pairs(0.05, "rolling_resistance"),
+    ),
+    _turning(
+        "SpinningFrictionOff",
+        "friction against spin off",
+        "friction against spin of slides is off",
+        other=_pairs(0.0, "spinning_friction"),
+    ),
+    _turning(
+        "StaticForKinetic",
+        "static friction in a slip",
+        "slides slips with its static friction",
+        other=each("pairs", friction=lambda pair: pair.static, static_friction=lambda _: None),
+    ),
+)

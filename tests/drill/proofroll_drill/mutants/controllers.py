@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, ClassVar
 
 from proofroll.core.controlled_engine import commanded
@@ -12,6 +13,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.control import Control
 from proofroll.elements.mechanism.scene.policy import Observation, PolicySource
 from proofroll.robots.probe import make
+from proofroll_drill.mutants.base import planted
 from proofroll_drill.mutants.mechanism_models import MechanismMutant
 
 
@@ -31,60 +33,44 @@ class ControlMutant(MechanismMutant):
     def drive(self, values: Any) -> None:
         """Targets of the harness, which its own replace."""
 
-    def other(self, mechanism: Mechanism) -> Mechanism:
-        """Mechanism with another controller."""
-        assert mechanism.control is not None
-        return dataclasses.replace(mechanism, control=self.control(mechanism.control))
-
-    def control(self, control: Control) -> Control:
-        """Controller that it runs."""
-        return control
-
-
-class InstantLate(ControlMutant):
-    """Sets targets one instant late."""
-
-    fault = "targets an instant late"
-    named = ("one instant late",)
-
-    def control(self, control: Control) -> Control:
-        """Controller of one instant more."""
-        return dataclasses.replace(control, delay=1)
-
-
-class LongPeriod(ControlMutant):
-    """Leaves a step more between instants; the first is right."""
-
-    fault = "one step more between instants"
-    named = ("one step longer",)
-
-    def control(self, control: Control) -> Control:
-        """Controller of a lower rate."""
-        return dataclasses.replace(control, rate=1 / (1 / control.rate + self.step))
-
-
-class ScaleOfActions(ControlMutant):
-    """Takes 0.8 of the scale of actions."""
-
-    fault = "scale of actions"
-    named = ("scale of actions is 0.8",)
-
-    def control(self, control: Control) -> Control:
-        """Controller of a smaller scale."""
-        return dataclasses.replace(control, scale=0.8 * control.scale)
-
-
-class SignOfGravity(ControlMutant):
-    """Policy that sees gravity with the other sign."""
-
-    fault = "sign of the observed gravity"
-    named = ("observed gravity",)
-
-    def control(self, control: Control) -> Control:
-        """Policy behind a wrong observation."""
-        return dataclasses.replace(control, policy=PolicySource("upside_down", make=_upside_down))
-
 
 def _upside_down(joints: Sequence[str]) -> Callable[[Observation], Any]:
     policy = make(joints)
     return lambda seen: policy(dataclasses.replace(seen, gravity_B=-seen.gravity_B))
+
+
+def _controller(**fields: Callable[[Any, Control], Any]) -> Callable[[Any, Mechanism], Mechanism]:
+    """Method ``other`` of a mutant: fields of the controller, each from the mutant and the right controller."""
+
+    def other(self: Any, mechanism: Mechanism) -> Mechanism:
+        right = mechanism.control
+        assert right is not None
+        control = dataclasses.replace(right, **{name: value(self, right) for name, value in fields.items()})
+        return dataclasses.replace(mechanism, control=control)
+
+    return other
+
+
+_fault = partial(planted, ControlMutant)
+FAULTS = (
+    _fault("InstantLate", "targets an instant late", "one instant late", other=_controller(delay=lambda *_: 1)),
+    # the first is right
+    _fault(
+        "LongPeriod",
+        "one step more between instants",
+        "one step longer",
+        other=_controller(rate=lambda self, right: 1 / (1 / right.rate + self.step)),
+    ),
+    _fault(
+        "ScaleOfActions",
+        "scale of actions",
+        "scale of actions is 0.8",
+        other=_controller(scale=lambda _, right: 0.8 * right.scale),
+    ),
+    _fault(
+        "SignOfGravity",
+        "sign of the observed gravity",
+        "observed gravity",
+        other=_controller(policy=lambda *_: PolicySource("upside_down", make=_upside_down)),
+    ),
+)

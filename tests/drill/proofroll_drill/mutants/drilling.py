@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import inspect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,42 +24,21 @@ from proofroll.running.recording import record
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 from proofroll_drill.mutants import (
-    applied_forces,
-    ball_models,
     ball_samples,
-    ball_settings,
-    bushings,
+    balls,
     contact_models,
     controllers,
     joint_laws,
+    loads,
     mechanism_models,
-    mechanism_numbers,
     mechanism_samples,
-    mechanism_settings,
-    prescribed,
-    turning,
 )
 from proofroll_drill.mutants.base import Mutant
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
 
-MODULES: tuple[ModuleType, ...] = (
-    applied_forces,
-    ball_models,
-    ball_samples,
-    ball_settings,
-    bushings,
-    contact_models,
-    controllers,
-    joint_laws,
-    mechanism_models,
-    mechanism_numbers,
-    mechanism_samples,
-    mechanism_settings,
-    prescribed,
-    turning,
-)
+MODULES = (ball_samples, balls, contact_models, controllers, joint_laws, loads, mechanism_models, mechanism_samples)
 # Least tolerance of every observable: relative to its size, and in errors of the engine without the fault.
 _TOLERANCE, _OF_METHOD = 1e-6, 10.0
 _plain: dict[Any, Sequence[Judgement]] = {}  # by bases of an engine and what it is asked
@@ -96,12 +73,13 @@ class Mutated:
 
 def mutants() -> list[type[Mutant]]:
     """All, in the order of their modules."""
-    found = [kind for module in MODULES for _, kind in inspect.getmembers(module, inspect.isclass)]
-    return [kind for kind in found if issubclass(kind, Mutant) and kind.fault and kind.__module__ in _names()]
+    return [kind for module in MODULES for kind in module.FAULTS]
 
 
-def _names() -> set[str]:
-    return {module.__name__ for module in MODULES}
+def mutant(name: str) -> type[Mutant]:
+    """The one of a name."""
+    (kind,) = (kind for kind in mutants() if kind.__name__ == name)
+    return kind
 
 
 def mutant_drill(progress: Callable[[str], None] = lambda _: None, cluster: Cluster | None = None) -> Iterator[Mutated]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.sampling import MechanismSample
-from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
+from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind, planted
 from proofroll_drill.mutants.mechanism_models import CRANK, PENDULUM, TOP, MechanismMutant
 
 
@@ -43,160 +44,110 @@ def _turns(sample: MechanismSample) -> Rotation:
     return Rotation.from_quat(sample.q_WB, scalar_first=True)
 
 
-class BodyRates(ToldMechanism):
-    """ω along each body's own axes."""
-
-    fault = "body spin for world spin of a top"
-    scene = TOP
-    named = ("angular velocity in body axes",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Turned back, from the first step on."""
-        return dataclasses.replace(sample, w_WB=_turns(sample).inv().apply(sample.w_WB)) if self.t else sample
+class BehindMechanism(OneStepBehind, ToldMechanism):
+    """Base of mutants with reactions of the step before."""
 
 
-class CentrePosition(ToldMechanism):
-    """Positions of the centres of mass."""
+def _told(name: str, fault: str, named: str, said: Mapping[str, Callable[..., Any]], **more: Any) -> type[Mutant]:
+    """Mutant whose samples have other fields, each from the mutant and its right sample."""
 
-    fault = "positions of the centres of mass"
-    named = ("p_WB is the position of the centres of mass",)
+    def misreport(self: Any, sample: MechanismSample) -> MechanismSample:
+        return dataclasses.replace(sample, **{field: value(self, sample) for field, value in said.items()})
 
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Shifted, from the first step on."""
-        return dataclasses.replace(sample, p_WB=sample.p_WB + _turns(sample).apply(self.com)) if self.t else sample
+    return planted(ToldMechanism, name, fault, named, misreport=misreport, **more)
 
 
-class CentreVelocity(ToldMechanism):
-    """Velocities of the centres of mass."""
-
-    fault = "velocities of the centres of mass"
-    named = ("v_WB is the velocity of the centres of mass",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Shifted, from the first step on."""
-        arm = _turns(sample).apply(self.com)
-        return dataclasses.replace(sample, v_WB=sample.v_WB + np.cross(sample.w_WB, arm)) if self.t else sample
+def _moving(value: Callable[..., Any], field: str) -> Mapping[str, Callable[..., Any]]:
+    """Another field of a sample from the first step on."""
+    return {field: lambda self, sample: value(self, sample) if self.t else getattr(sample, field)}
 
 
-class OnParent(ToldMechanism):
-    """The wrench on the parent."""
-
-    fault = "reaction on the wrong body"
-    named = ("force has the wrong sign",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Minus."""
-        assert sample.joint_force is not None
-        assert sample.joint_torque is not None
-        return dataclasses.replace(sample, joint_force=-sample.joint_force, joint_torque=-sample.joint_torque)
+def _about_centre(self: Any, sample: Any) -> Any:
+    """Moments about the centre of mass of each child."""
+    coms = np.concatenate([self.com, np.zeros((1, 3))])
+    arm = self.of_children(sample).apply(np.array([coms[body] - at for body, at in self.ends]))
+    return sample.joint_torque - np.cross(arm, sample.joint_force)
 
 
-class BodyReaction(ToldMechanism):
-    """The wrench along the child's axes."""
-
-    fault = "reaction in body axes"
-    named = ("joint in body axes",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Turned back."""
-        assert sample.joint_force is not None
-        return dataclasses.replace(sample, joint_force=self.of_children(sample).inv().apply(sample.joint_force))
+def _late_reactions(self: Any, sample: MechanismSample) -> MechanismSample:
+    """Sample with the reactions of the step before."""
+    old = self.behind.sample()
+    return dataclasses.replace(sample, joint_force=old.joint_force, joint_torque=old.joint_torque)
 
 
-class Swapped(ToldMechanism):
-    """The joints' reactions in another order."""
-
-    fault = "reactions in another order of joints"
-    named = ("of another joint",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Reversed."""
-        assert sample.joint_force is not None
-        assert sample.joint_torque is not None
-        return dataclasses.replace(sample, joint_force=sample.joint_force[::-1], joint_torque=sample.joint_torque[::-1])
-
-
-class AboutCentre(ToldMechanism):
-    """Moments about the centre of mass."""
-
-    fault = "moment about the centre of mass"
-    named = ("moment about the centre of mass",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Moment about the centre of mass of each child."""
-        assert sample.joint_force is not None
-        assert sample.joint_torque is not None
-        coms = np.concatenate([self.com, np.zeros((1, 3))])
-        arm = self.of_children(sample).apply(np.array([coms[body] - at for body, at in self.ends]))
-        return dataclasses.replace(sample, joint_torque=sample.joint_torque - np.cross(arm, sample.joint_force))
-
-
-class LoopReaction(BodyReaction):
-    """Reactions of loops with the same fault; not every component is determined."""
-
-    fault = "reactions of loops in body axes"
-    scene = CRANK
-
-
-class LoopSwapped(Swapped):
-    """The same in loops."""
-
-    fault = "reactions of loops in another order"
-    scene = CRANK
-
-
-class LoopAboutCentre(AboutCentre):
-    """The same in loops."""
-
-    fault = "moments of loops about the centres of mass"
-    scene: ClassVar[Any] = ("andrews_squeezer", {})
-    until, every, step = 0.012, 0.001, 5e-5  # it turns by 80 degrees in 2 ms
-
-
-class Unnormalised(ToldMechanism):
-    """The quaternion grows, and its matrix is taken as if it did not."""
-
-    fault = "quaternion not normalised"
-    scene = TOP
-    named = ("q_WB has length",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Quaternions that grow by a twentieth per second."""
-        assert sample.q_WB is not None
-        return dataclasses.replace(sample, q_WB=sample.q_WB * (1 + 0.05 * self.t))
-
-
-class MechanismScalarLast(ToldMechanism):
-    """Another convention for quaternions."""
-
-    fault = "quaternions of bodies with their scalar last"
-    scene = CRANK
-    named = ("scalar last",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """x, y, z, w, from the first step on."""
-        assert sample.q_WB is not None
-        return dataclasses.replace(sample, q_WB=np.roll(sample.q_WB, -1, axis=-1)) if self.t else sample
-
-
-class LateReaction(OneStepBehind, ToldMechanism):
-    """The reactions of the step before."""
-
-    fault = "reactions of the step before"
-    named = ("force is one step (0.002 s) late",)
-
-    def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """The other's."""
-        old = self.behind.sample()
-        return dataclasses.replace(sample, joint_force=old.joint_force, joint_torque=old.joint_torque)
-
-
-class LateMechanism(ToldMechanism):
-    """A state of a step before."""
-
-    fault = "a mechanism one step late"
-    named = ("one step (0.002 s) late",)
-
-    def clock(self, t: float) -> float:
-        """Behind."""
-        return t - STEP
+_WRENCH = ("joint_force", "joint_torque")
+_MINUS, _REVERSED = (
+    {name: lambda _, sample, name=name: -getattr(sample, name) for name in _WRENCH},
+    {name: lambda _, sample, name=name: getattr(sample, name)[::-1] for name in _WRENCH},
+)
+_IN_BODY_AXES = {"joint_force": lambda self, sample: self.of_children(sample).inv().apply(sample.joint_force)}
+_ABOUT_CENTRE = {"joint_torque": _about_centre}
+LateReaction = planted(
+    BehindMechanism,
+    "LateReaction",
+    "reactions of the step before",
+    "force is one step (0.002 s) late",
+    misreport=_late_reactions,
+)
+FAULTS = (
+    _told(
+        "BodyRates",
+        "body spin for world spin of a top",
+        "angular velocity in body axes",
+        _moving(lambda _, sample: _turns(sample).inv().apply(sample.w_WB), "w_WB"),
+        scene=TOP,
+    ),
+    _told(
+        "CentrePosition",
+        "positions of the centres of mass",
+        "p_WB is the position of the centres of mass",
+        _moving(lambda self, sample: sample.p_WB + _turns(sample).apply(self.com), "p_WB"),
+    ),
+    _told(
+        "CentreVelocity",
+        "velocities of the centres of mass",
+        "v_WB is the velocity of the centres of mass",
+        _moving(lambda self, sample: sample.v_WB + np.cross(sample.w_WB, _turns(sample).apply(self.com)), "v_WB"),
+    ),
+    _told("OnParent", "reaction on the wrong body", "force has the wrong sign", _MINUS),
+    _told("BodyReaction", "reaction in body axes", "joint in body axes", _IN_BODY_AXES),
+    _told("Swapped", "reactions in another order of joints", "of another joint", _REVERSED),
+    _told("AboutCentre", "moment about the centre of mass", "moment about the centre of mass", _ABOUT_CENTRE),
+    # of a loop's reactions not every component is determined
+    _told("LoopReaction", "reactions of loops in body axes", "joint in body axes", _IN_BODY_AXES, scene=CRANK),
+    _told("LoopSwapped", "reactions of loops in another order", "of another joint", _REVERSED, scene=CRANK),
+    # it turns by 80 degrees in 2 ms
+    _told(
+        "LoopAboutCentre",
+        "moments of loops about the centres of mass",
+        "moment about the centre of mass",
+        _ABOUT_CENTRE,
+        scene=("andrews_squeezer", {}),
+        until=0.012,
+        every=0.001,
+        step=5e-5,
+    ),
+    # by a twentieth per second, and its matrix is taken as if it did not grow
+    _told(
+        "Unnormalised",
+        "quaternion not normalised",
+        "q_WB has length",
+        {"q_WB": lambda self, sample: sample.q_WB * (1 + 0.05 * self.t)},
+        scene=TOP,
+    ),
+    _told(
+        "MechanismScalarLast",
+        "quaternions of bodies with their scalar last",
+        "scalar last",
+        _moving(lambda _, sample: np.roll(sample.q_WB, -1, axis=-1), "q_WB"),
+        scene=CRANK,
+    ),
+    LateReaction,
+    planted(
+        ToldMechanism,
+        "LateMechanism",
+        "a mechanism one step late",
+        "one step (0.002 s) late",
+        clock=lambda _, t: t - STEP,
+    ),
+)

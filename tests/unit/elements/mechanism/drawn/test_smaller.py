@@ -48,8 +48,8 @@ def is_valid(folder: Path, tables: Mapping[str, Any]) -> bool:
 def test_changes_apply_or_are_refused_in_words(family: str, tmp_path: Path) -> None:
     """Each change leads to a scene that the reader accepts, or refuses with its own error; most are accepted."""
     tables, before = drawn(family), deepcopy(drawn(family))
-    candidates = [changed(tables, change) for change in FAMILIES[family].smaller(tables)]
-    candidates += [changed(tables, change) for _, change in FAMILIES[family].nearest(tables)][::4]
+    candidates = [changed(tables, change) for change in list(FAMILIES[family].smaller(tables))[::2]]
+    candidates += [changed(tables, change) for _, change in FAMILIES[family].nearest(tables)][::8]
     assert tables == before
     accepted = [is_valid(tmp_path, candidate) for candidate in candidates if candidate is not None]
     assert sum(accepted) > len(accepted) / 2
