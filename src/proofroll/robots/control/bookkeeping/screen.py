@@ -207,6 +207,11 @@ class MistakeScreen:
             answer[:, k] = np.einsum("hij,hj->hi", self._inverse(M, free, kinds)[number.ravel()], load[:, k])
         return answer
 
+    @property
+    def unexplained(self) -> float:
+        """Mean square of the velocities that the law itself leaves unexplained, with the best treatment of gains."""
+        return min(float(np.square(self.left([self.law], treatment)).mean()) for treatment in TREATMENTS)
+
     def best(self, candidates: Sequence[Mistake]) -> list[Screened]:
         """Mistakes with their sizes in each treatment of gains, those that leave least first."""
         trials = [(item, size) for item in candidates for size in (item.trials or _FACTORS if item.sized else (1.0,))]
