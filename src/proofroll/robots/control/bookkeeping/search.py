@@ -116,7 +116,7 @@ class MotionSearch:
         mechanism: the robot.
         law: its controller's law as it should be.
         seen: motion that a program says it made; its interval is a whole number of each step.
-        steps: that the program may have made [s].
+        steps: possible steps of the program [s].
         time: of the search; None: as long as it needs.
 
     Attributes:
@@ -230,8 +230,9 @@ class MotionSearch:
         if law.policy is None and not all(isinstance(item, float) for item in law.targets):
             return
         moved = partial(_moved, law)
-        fits = [(*screen.numbers(moved, len(law.joints), treatment), treatment) for treatment in TREATMENTS]
-        for near, _, treatment in sorted(fits, key=lambda fit: fit[1]):
+        offsets_near = {treatment: screen.offsets(treatment) for treatment in TREATMENTS}
+        left = {name: float(np.square(screen.left([moved(near)], name)).mean()) for name, near in offsets_near.items()}
+        for treatment, near in sorted(offsets_near.items(), key=lambda item: left[item[0]]):
             for scheme in motions.schemes_of(treatment):
                 if self._time.over:
                     return
