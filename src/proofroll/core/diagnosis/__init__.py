@@ -138,8 +138,8 @@ class Hypothesis(Generic[EvidenceT, ResultT]):
     Attributes:
         id: unique within the kind of element, or among those about robot files.
         grounds: the test, and why it is a proof; of robot files the behaviour of the engine.
-        test: yields candidate causes, of which :func:`diagnose` drops those that do not close the difference; of robot
-            files the models that an engine with that behaviour would hold.
+        test: yields candidate causes, and :func:`diagnose` drops those that do not close the difference; of robot files
+            it yields the models that an engine with that behaviour would hold.
         known: engine -> versions in which it was seen.
         remedy: action that a user can take.
     """

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from proofroll.core.arrays import slices
-from proofroll.robots.check.two_formulations import Dynamics, Frames, passive, poses, world_jacobians
+from proofroll.robots.check.two_formulations import Dynamics, Frames, TreeMotion, passive, world_jacobians
 from proofroll.robots.model import Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import Reading
 from proofroll.robots.states import RobotStates
@@ -65,14 +65,18 @@ class RobotTruth:
         """Terms of the equation of motion by the first formulation."""
         if self.like is not None and _moves_alike(self.robot, self.like.robot):
             return self.like.dynamics
-        return world_jacobians(self.robot, self.states, self.frames)
+        return world_jacobians(self.robot, self.states, self._motion)
 
     @cached_property
+    def _motion(self) -> TreeMotion:
+        if self.like is not None and _joints_alike(self.robot, self.like.robot, _PLACES):
+            return self.like._motion
+        return TreeMotion.of(self.robot, self.states)
+
+    @property
     def frames(self) -> Frames:
         """Poses of all bodies."""
-        if self.like is not None and self.robot.joints is self.like.robot.joints:
-            return self.like.frames
-        return poses(self.robot, self.states)
+        return self._motion.frames
 
     @cached_property
     def passive(self) -> Array:
@@ -133,19 +137,21 @@ class RobotTruth:
 # Attributes of joints that enter the passive forces only, not M, h or poses.
 _PASSIVE = {"damping", "friction", "stiffness", "rest"}
 _MOTION = [field.name for field in dataclasses.fields(RobotJoint) if field.name not in _PASSIVE]
+# Attributes of joints on which poses and Jacobians depend.
+_PLACES = ("name", "kind", "parent", "child", "position", "rotation", "axis", "child_position")
 
 
 def _moves_alike(robot: Robot, rival: Robot) -> bool:
     """True if the robots differ only in passive forces and couplings."""
-    return (
-        robot.bodies is rival.bodies
-        and robot.gravity is rival.gravity
-        and len(robot.joints) == len(rival.joints)
-        and all(
-            getattr(joint, name) is getattr(partner, name)
-            for joint, partner in zip(robot.joints, rival.joints, strict=True)
-            for name in _MOTION
-        )
+    return robot.bodies is rival.bodies and robot.gravity is rival.gravity and _joints_alike(robot, rival, _MOTION)
+
+
+def _joints_alike(robot: Robot, rival: Robot, attributes: Sequence[str]) -> bool:
+    """True if the joints of two robots have the same values of some attributes."""
+    return len(robot.joints) == len(rival.joints) and all(
+        getattr(joint, name) is getattr(partner, name)
+        for joint, partner in zip(robot.joints, rival.joints, strict=True)
+        for name in attributes
     )
 
 

@@ -133,7 +133,7 @@ def hypothesis(known: Mapping[str, str], remedy: str) -> Callable[[Change], Robo
             if (model := change(evidence)) is not None:
                 yield model
 
-        return Hypothesis(change.__name__, behaviour, models, known, remedy)
+        return Hypothesis(id=change.__name__, grounds=behaviour, test=models, known=known, remedy=remedy)
 
     return decorate
 
