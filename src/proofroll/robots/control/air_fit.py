@@ -23,8 +23,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import skew
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.record import BASE, ControlRecord
-from proofroll.robots.control.record_layer import LayerCause
+from proofroll.robots.control.record import BASE, ControlRecord, LayerCause
 from proofroll.robots.model import Array
 
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at

@@ -18,7 +18,7 @@ from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import Mistake
 
-_FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried, 1 being right
+_FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried where 1 is right
 _AT_ONCE = 500  # laws that move at once: some 100 MB
 _SLOPE, _ROUNDS = 1e-3, 3  # part of a size for slopes, and rounds of a fit
 _AT_LIMIT, _BEYOND = 0.99, 2.5  # part of the limit of an effort that is clamped; and of the least offset that does so
@@ -201,7 +201,7 @@ class MistakeScreen:
 
     def best(self, candidates: Sequence[Mistake]) -> list[Screened]:
         """Mistakes with their sizes in each treatment of gains, those that leave least first."""
-        trials = [(item, size) for item in candidates for size in (item.trials or _FACTORS if item.sized else (1.0,))]
+        trials = [(item, size) for item in candidates for size in _sizes(item)]
         laws = [item.changed(self.law, size) for item, size in trials]
         screened: list[Screened] = []
         for treatment in TREATMENTS:
@@ -250,6 +250,13 @@ class MistakeScreen:
         return np.array(
             [np.median(off[mask]) if mask.any() else _BEYOND * off[np.abs(off).argmax()] for off, mask in columns]
         )
+
+
+def _sizes(mistake: Mistake) -> tuple[float, ...]:
+    """Sizes of a mistake that are tried; 1 where it has none."""
+    if not mistake.sized:
+        return (1.0,)
+    return mistake.starts + (_FACTORS if mistake.none == 1 else ())
 
 
 def _laws(law: ControlLaw, screened: Sequence[Screened], sizes: Array) -> list[ControlLaw]:

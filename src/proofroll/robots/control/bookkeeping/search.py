@@ -20,7 +20,7 @@ from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import Mistake, SearchTime, fitted, mistakes, offsets_told
 from proofroll.robots.control.bookkeeping.screen import TREATMENTS, MistakeScreen, Screened
 from proofroll.robots.control.bookkeeping.seen import LawMotions, SeenMotion
-from proofroll.robots.control.record_layer import LayerCause
+from proofroll.robots.control.record import LayerCause
 
 _CLOSES = 0.05  # part of a distance between motions that an explanation may leave
 EXACT = 1e-3  # part of a distance that leaves nothing to explain
