@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from proofroll.core.integrators import classical_step
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.robots.control.bookkeeping.air import AirRobot
@@ -149,17 +150,15 @@ class MistakeScreen:
                 free = (np.abs(acting) < limit) & ~holds  # what is clamped does not follow
                 return self._solved(rows, armature + h * np.where(free, kd, 0.0), load)
 
-            acting = efforts((np.where(lag, late[0], state[0]), np.where(lag, late[1], state[1])))
-            if treatment != "rk4":
-                v = v + h * accelerated(acting)
-                q = q + h * v[..., self._at_v]
+            def rates(x: Array) -> Array:
+                q, v = x[..., : self._at_v.size], x[..., self._at_v.size :][..., self._at_v]
+                return np.concatenate([v, accelerated(efforts((q, v)))], axis=-1)
+
+            if treatment == "rk4":
+                q, v = np.split(classical_step(rates, np.concatenate([q, v], axis=-1), h), [self._at_v.size], axis=-1)
             else:
-                rates = [(state[1], accelerated(acting))]
-                for part in (h / 2, h / 2, h):
-                    moved = state[1] + part * rates[-1][1][..., self._at_v]
-                    rates.append((moved, accelerated(efforts((q + part * rates[-1][0], moved)))))
-                q = q + h / 6 * (rates[0][0] + 2 * rates[1][0] + 2 * rates[2][0] + rates[3][0])
-                v = v + h / 6 * (rates[0][1] + 2 * rates[1][1] + 2 * rates[2][1] + rates[3][1])
+                v = v + h * accelerated(efforts((np.where(lag, late[0], state[0]), np.where(lag, late[1], state[1]))))
+                q = q + h * v[..., self._at_v]
             late = state
         unexplained = np.einsum("kji,hkj->hki", self._roots, v - self._seen)
         return np.asarray(unexplained.reshape(len(laws), -1))
