@@ -198,7 +198,9 @@ class MotionSearch:
                 break
             words = item.mistake.words
             self.tried.add(words)
-            for explanation in filter(lambda trial: trial.differs, self._moved_alike(item, motions)):
+            settled = any(map(self._settles, several.values()))  # a rival of what leaves nothing is near at once
+            trials = self._moved_alike(item, motions, _CLOSES if settled else _NEAR)
+            for explanation in (trial for trial in trials if trial.differs):
                 several[words] = min(several.get(words, explanation), explanation, key=lambda trial: trial.after)
                 if self._settles(explanation):
                     enough = min(enough, _ALIKE * item.left)
@@ -207,15 +209,18 @@ class MotionSearch:
             several |= {item.mistake.words: item for item in sorted(poses, key=lambda item: item.after)[:1]}
         return sorted(several.values(), key=lambda item: item.rank / (_CLOSES if item.mistake.numbers else 1.0))
 
-    def _moved_alike(self, item: Screened, motions: LawMotions) -> Iterator[MistakeExplanation]:
-        """Explanations by a mistake, with the schemes of a treatment with which its motion comes near."""
+    def _moved_alike(self, item: Screened, motions: LawMotions, near: float) -> Iterator[MistakeExplanation]:
+        """Explanations by a mistake, with the schemes of a treatment with which its motion comes near.
+
+        ``near``: part of the distance without a mistake that is left with the size in the screen.
+        """
         mistake, size = item.mistake, item.size
 
         def sized(sizes: Array) -> ControlLaw:
             return mistake.changed(self.law, max(0.0, float(sizes[0])))
 
         for scheme in motions.schemes_of(item.treatment):
-            distance = motions.distance(mistake.changed(self.law, size), scheme, _NEAR * self.before)
+            distance = motions.distance(mistake.changed(self.law, size), scheme, near * self.before)
             if math.isfinite(distance) and mistake.sized:
                 size = max(0.0, float(motions.fit(sized, np.array([size]), scheme, rounds=3)[0]))
                 distance = motions.distance(mistake.changed(self.law, size), scheme)
