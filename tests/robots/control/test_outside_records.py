@@ -12,92 +12,68 @@ from outside_records import CONTROL, JOINTS, MISTAKES, OBSERVED, PROGRAMS, Loop,
 
 from proofroll.robots.control.judge import RecordJudgement, judge_record
 
-BASE = ("p_WB", "q_WB", "v_WB", "w_WB")
+STATE = {"time", "q", "v", "p_WB", "q_WB", "v_WB", "w_WB"}
+Columns = dict[str, np.ndarray]
+Judged = Callable[..., RecordJudgement]
 Proofroll = Callable[..., tuple[int, str, str]]
 # What three decimals of velocities do not show: of forces, a payload takes away 5.7, as it takes 5.6 of a right record.
 FINE = ("gravity 9.80", "payload")
+# Cases that stand for all of them where no drill is run.
+QUICK = {
+    ("mujoco", "", "no clamp"),
+    ("mujoco", "single", "gravity 9.80"),
+    ("mujoco", "3", "a step less"),
+    ("pinocchio", "", "no armature"),
+    ("pinocchio", "single", "xyzw"),
+    ("pinocchio", "3", "legs swapped"),
+    ("mujoco", "", "half the rate"),
+    ("pinocchio", "single", "four times the rate"),
+    ("mujoco", "3", "an action repeated"),
+    ("pinocchio", "", "two instants late"),
+    ("mujoco", "single", "velocity of the centre"),
+    ("pinocchio", "", "held efforts"),
+    ("mujoco", "", "clipped targets"),
+    ("pinocchio", "single", "low pass"),
+    ("mujoco", "3", "damping"),
+    ("pinocchio", "3", "dry friction"),
+}
+ALL = [
+    pytest.param(*case, marks=() if case in QUICK else (pytest.mark.drill, pytest.mark.slow))
+    for case in ((program, digits, name) for program in PROGRAMS for digits in ("", "single", "3") for name in MISTAKES)
+    if case[1] != "3" or case[2] not in FINE
+]
+OF_OBSERVATIONS = [
+    pytest.param(name, marks=() if name in {"xyzw", "velocity back", "rates at 0.05"} else pytest.mark.drill)
+    for name in OBSERVED
+]
+
+
+def recorded(name: str, program: str = "mujoco", **settings: object) -> Columns:
+    """Columns of somebody's loop around a program with a mistake; empty: without one."""
+    return columns_of(Loop(**(MISTAKES[name][2] if name else {}), **settings).record(PROGRAMS[program]))  # type: ignore[arg-type]
+
+
+def only(columns: Columns, *kinds: str) -> Columns:
+    """Columns of a state, and of some more kinds."""
+    return {key: values for key, values in columns.items() if key.split(".")[0] in STATE | {*kinds}}
 
 
 @pytest.fixture
-def judged(tmp_path: Path) -> Callable[..., RecordJudgement]:
-    """Judgement of a record of somebody's loop around a program, written with some digits."""
+def legs(tmp_path: Path) -> list[str]:
+    """Options that name the robot of the loops and its controller."""
     (tmp_path / "legs.urdf").write_text(urdf())
     (tmp_path / "legs.toml").write_text(CONTROL)
+    return ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
 
-    def judgement(program: str, digits: str, **mistake: object) -> RecordJudgement:
-        columns = columns_of(Loop(**mistake).record(PROGRAMS[program]))  # type: ignore[arg-type]
-        record = written(columns, tmp_path / "record.csv", digits)
-        return judge_record(record, tmp_path / "legs.urdf", tmp_path / "legs.toml")
+
+@pytest.fixture
+def judged(legs: list[str], tmp_path: Path) -> Judged:
+    """Judgement of columns, written with some digits."""
+
+    def judgement(columns: Columns, digits: str = "") -> RecordJudgement:
+        return judge_record(written(columns, tmp_path / "record.csv", digits), Path(legs[1]), Path(legs[3]))
 
     return judgement
-
-
-@pytest.mark.parametrize("program", PROGRAMS)
-@pytest.mark.parametrize("digits", ["", "single", "3"])
-def test_a_right_record_of_another_program_holds(
-    program: str, digits: str, judged: Callable[..., RecordJudgement]
-) -> None:
-    """Every layer of a right record holds, to 1e-9 with all digits."""
-    layers = judged(program, digits).layers
-    assert [layer.name for layer in layers if not layer.holds] == []
-    assert max(layer.residual for layer in layers if layer.residual is not None) < (0.1 if digits == "3" else 1e-5)
-    if not digits:
-        assert all(layer.residual is not None and layer.residual < 1e-9 for layer in layers)
-
-
-@pytest.mark.parametrize(
-    ("program", "digits", "name"),
-    [
-        ("mujoco", "", "no clamp"),
-        ("mujoco", "single", "gravity 9.80"),
-        ("mujoco", "3", "a step less"),
-        ("pinocchio", "", "no armature"),
-        ("pinocchio", "single", "xyzw"),
-        ("pinocchio", "3", "legs swapped"),
-        ("mujoco", "", "half the rate"),
-        ("pinocchio", "single", "four times the rate"),
-        ("mujoco", "3", "an action repeated"),
-        ("pinocchio", "", "two instants late"),
-        ("mujoco", "single", "velocity of the centre"),
-        ("pinocchio", "", "held efforts"),
-        ("mujoco", "", "clipped targets"),
-        ("pinocchio", "single", "low pass"),
-        ("mujoco", "3", "damping"),
-        ("pinocchio", "3", "dry friction"),
-    ],
-)
-def test_a_mistake_of_another_program_is_named(
-    program: str, digits: str, name: str, judged: Callable[..., RecordJudgement]
-) -> None:
-    """A mistake in a loop around another program stops at its layer and is named; a limit is that of the URDF."""
-    _named(judged(program, digits, **MISTAKES[name][2]), name)
-
-
-@pytest.mark.drill
-@pytest.mark.slow
-@pytest.mark.parametrize("program", PROGRAMS)
-@pytest.mark.parametrize("digits", ["", "single", "3"])
-def test_all_mistakes_of_another_program_are_named(
-    program: str, digits: str, judged: Callable[..., RecordJudgement]
-) -> None:
-    """Each mistake stops at its layer and is named there, but a little of gravity or mass in three decimals."""
-    for name in MISTAKES:
-        if digits != "3" or name not in FINE:
-            _named(judged(program, digits, **MISTAKES[name][2]), name)
-
-
-def without(columns: dict[str, np.ndarray], *kinds: str) -> dict[str, np.ndarray]:
-    """Columns but those of some kinds."""
-    return {name: values for name, values in columns.items() if not name.startswith(kinds)}
-
-
-def judged_without(folder: Path, name: str, *kinds: str, program: str = "mujoco") -> RecordJudgement:
-    """Judgement of a record of a mistake that lacks columns of some kinds."""
-    (folder / "legs.urdf").write_text(urdf())
-    (folder / "legs.toml").write_text(CONTROL)
-    columns = columns_of(Loop(**(MISTAKES[name][2] if name else {})).record(PROGRAMS[program]))
-    record = written(without(columns, *kinds), folder / "record.csv")
-    return judge_record(record, folder / "legs.urdf", folder / "legs.toml")
 
 
 def require_first(judgement: RecordJudgement, layer: str, cause: str) -> None:
@@ -106,65 +82,65 @@ def require_first(judgement: RecordJudgement, layer: str, cause: str) -> None:
     assert (wrong.name, wrong.causes[0].id) == (layer, cause)
 
 
-@pytest.mark.parametrize("name", ["xyzw", "velocity back", "rates at 0.05"])
-def test_a_mistake_of_an_observation_shows_in_actions(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("digits", ["", "single", "3"])
+def test_a_right_record_of_another_program_holds(program: str, digits: str, judged: Judged) -> None:
+    """Every layer of a right record holds, to 1e-9 with all digits."""
+    layers = judged(recorded("", program), digits).layers
+    assert [layer.name for layer in layers if not layer.holds] == []
+    assert max(layer.residual for layer in layers if layer.residual is not None) < (0.1 if digits == "3" else 1e-5)
+    if not digits:
+        assert all(layer.residual is not None and layer.residual < 1e-9 for layer in layers)
+
+
+@pytest.mark.parametrize(("program", "digits", "name"), ALL)
+def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: str, judged: Judged) -> None:
+    """A mistake in a loop around another program stops at its layer and is named; a limit is that of the URDF."""
+    cause, layer, _ = MISTAKES[name]
+    require_first(judged(recorded(name, program), digits), layer, cause)
+
+
+@pytest.mark.parametrize("name", OF_OBSERVATIONS)
+def test_a_mistake_of_an_observation_shows_in_actions(name: str, judged: Judged) -> None:
     """Where no observation is recorded, its mistakes are named at the action."""
-    require_first(judged_without(tmp_path, name, "observed"), "action", MISTAKES[name][0])
-
-
-@pytest.mark.drill
-@pytest.mark.parametrize("name", OBSERVED)
-def test_mistakes_of_observations_show_in_actions(name: str, tmp_path: Path) -> None:
-    """Every mistake of an observation is named at the action, where none is recorded."""
-    require_first(judged_without(tmp_path, name, "observed", program="pinocchio"), "action", MISTAKES[name][0])
+    columns = only(recorded(name, "pinocchio"), "action", "target", "effort")
+    require_first(judged(columns), "action", MISTAKES[name][0])
 
 
 @pytest.mark.parametrize("name", ["damping", "dry friction", "payload"])
-def test_what_no_file_has_is_named_with_what_it_explains(name: str, tmp_path: Path) -> None:
+def test_what_no_file_has_is_named_with_what_it_explains(name: str, judged: Judged) -> None:
     """Damping, dry friction and a payload are named at the accelerations with their sizes, and close them."""
-    layer = judged_without(tmp_path, name).layers[-1]
+    layer = judged(recorded(name)).layers[-1]
     size = next(iter(MISTAKES[name][2].values()))
     assert (layer.name, layer.holds, layer.causes[0].id) == ("acceleration", False, MISTAKES[name][0])
     assert layer.causes[0].size == pytest.approx(size, rel=1e-6)
     assert layer.causes[0].after < 1e-6 < layer.residual  # type: ignore[operator]
 
 
-def test_a_payload_shows_in_states_alone(tmp_path: Path) -> None:
-    """A payload is named with its mass and place from states alone, and a right record of states holds."""
-    kinds = ("observed", "action", "target", "effort")
-    judgement = judged_without(tmp_path, "payload", *kinds)
+def test_a_payload_shows_in_states_alone(judged: Judged) -> None:
+    """A payload is named with its mass and place from states alone."""
+    judgement = judged(only(recorded("payload")))
     require_first(judgement, "motion", "payload")
     assert "trunk carries 0.15 kg more, at (0.1, 0.05, 0.12) m" in "\n".join(judgement.lines())
 
 
-def test_two_mistakes_at_two_layers_are_both_named(tmp_path: Path) -> None:
+def test_two_mistakes_at_two_layers_are_both_named(judged: Judged) -> None:
     """Each layer is computed from recorded ones, so mistakes at several layers are named one by one."""
-    (tmp_path / "legs.urdf").write_text(urdf())
-    (tmp_path / "legs.toml").write_text(CONTROL)
-    columns = columns_of(Loop(kd=0.1, pose=np.zeros(6), xyzw=True).record(PROGRAMS["mujoco"]))
-    judgement = judge_record(written(columns, tmp_path / "record.csv"), tmp_path / "legs.urdf", tmp_path / "legs.toml")
+    judgement = judged(recorded("", kd=0.1, pose=np.zeros(6), xyzw=True))
     causes = {layer.name: layer.causes[0].id for layer in judgement.layers if not layer.holds and layer.causes}
     assert causes["observation"] == "quaternion"
     assert causes["target"] == "pose_missing"
     assert causes["effort"] == "kd"
 
 
-def test_a_quaternion_of_few_digits_is_no_mistake(tmp_path: Path) -> None:
+def test_a_quaternion_of_few_digits_is_no_mistake(judged: Judged) -> None:
     """What a program loses of a quaternion, its length shows; other columns have all digits."""
-    (tmp_path / "legs.urdf").write_text(urdf())
-    (tmp_path / "legs.toml").write_text(CONTROL)
-    columns = columns_of(Loop().record(PROGRAMS["mujoco"]))
+    columns = recorded("")
     columns |= {
         name: np.float32(values).astype(float) * (1 + 1e-5) for name, values in columns.items() if name[:5] == "q_WB."
     }
-    judgement = judge_record(written(columns, tmp_path / "record.csv"), tmp_path / "legs.urdf", tmp_path / "legs.toml")
+    judgement = judged(columns)
     assert judgement.agrees, "\n".join(judgement.lines())
-
-
-def _named(judgement: RecordJudgement, name: str) -> None:
-    cause, layer, _ = MISTAKES[name]
-    first = next(item for item in judgement.layers if not item.holds)
-    assert (first.name, first.causes[0].id) == (layer, cause), name
 
 
 @pytest.mark.drill
@@ -172,82 +148,79 @@ def _named(judgement: RecordJudgement, name: str) -> None:
     ("name", "said"),
     [("", "every layer that was looked at holds"), ("spin in the world", "angular velocity of the base is observed")],
 )
-def test_states_alone_tell_a_mistake(name: str, said: str, proofroll: Proofroll, tmp_path: Path) -> None:
+def test_states_alone_tell_a_mistake(
+    name: str, said: str, proofroll: Proofroll, legs: list[str], tmp_path: Path
+) -> None:
     """A record of states every 5 ms, in single precision, is held against motions under the law and its mistakes."""
-    (tmp_path / "legs.urdf").write_text(urdf())
-    (tmp_path / "legs.toml").write_text(CONTROL)
-    loop = Loop(step=5e-3, steps=20, **(MISTAKES[name][2] if name else {}))
-    columns = columns_of(loop.record(PROGRAMS["mujoco"]))
-    states = {key: values for key, values in columns.items() if key.split(".")[0] in {"time", "q", "v", *BASE}}
-    record = written(states, tmp_path / "record.csv", "single")
-    asked = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
-    code, out, err = proofroll("judge", str(record), *asked)
+    record = written(only(recorded(name, step=5e-3, steps=20)), tmp_path / "record.csv", "single")
+    code, out, err = proofroll("judge", str(record), *legs)
     assert code == int(bool(name)), out + err
     assert said in " ".join(out.split())
 
 
 @pytest.mark.drill
 def test_a_search_that_ran_out_of_time_decides_nothing(
-    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    proofroll: Proofroll, legs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """States that are off, and that no search has explained, are neither right nor wrong: exit 3, with the reason."""
     monkeypatch.setattr("proofroll.robots.control.layers.SEARCH_TIME", 0.0)
-    (tmp_path / "legs.urdf").write_text(urdf())
-    (tmp_path / "legs.toml").write_text(CONTROL)
-    columns = columns_of(Loop(step=5e-3, steps=20, **MISTAKES["spin in the world"][2]).record(PROGRAMS["mujoco"]))
-    states = {key: values for key, values in columns.items() if key.split(".")[0] in {"time", "q", "v", *BASE}}
-    record = written(states, tmp_path / "record.csv", "single")
-    robot = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
-    code, out, err = proofroll("judge", str(record), *robot)
+    record = written(only(recorded("spin in the world", step=5e-3, steps=20)), tmp_path / "record.csv", "single")
+    code, out, err = proofroll("judge", str(record), *legs)
     assert code == 3, out + err
     assert "not decided: off by" in out
-    assert proofroll("judge", str(record), *robot, "--as", "isaaclab", "--map", "a=q.b")[0] == 2
+    assert proofroll("judge", str(record), *legs, "--as", "isaaclab", "--map", "a=q.b")[0] == 2
     code, out, err = proofroll("judge", str(record), "pendulum", "--as", "isaaclab")
     assert (code, "give --robot and --control" in " ".join(err.split())) == (2, True)
 
 
-@pytest.mark.parametrize(("begin", "named"), [(0.04, False), (0.033, False), (0.033, True)])
-def test_a_record_that_begins_later(begin: float, named: bool, proofroll: Proofroll, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("begin", "name", "said"),
+    [
+        (0.04, "", "every layer that was looked at holds"),
+        (0.033, "", "every layer that was looked at holds"),
+        (0.033, "state before", "servos see the state of the step before"),
+    ],
+)
+def test_a_record_that_begins_later(
+    begin: float, name: str, said: str, proofroll: Proofroll, legs: list[str], tmp_path: Path
+) -> None:
     """A record that begins at an instant, or between two, holds in every layer, and a mistake in it is named."""
-    (tmp_path / "legs.urdf").write_text(urdf())
-    (tmp_path / "legs.toml").write_text(CONTROL)
-    columns = columns_of(Loop(steps=100, **(MISTAKES["state before"][2] if named else {})).record(PROGRAMS["mujoco"]))
+    columns = recorded(name)
     rows = columns["time"] >= begin - 1e-9
     record = written({key: values[rows] for key, values in columns.items()}, tmp_path / "record.csv")
-    asked = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
-    code, out, err = proofroll("judge", str(record), *asked)
-    assert code == int(named), out + err
-    said = "servos see the state of the step before" if named else "every layer that was looked at holds"
+    code, out, err = proofroll("judge", str(record), *legs)
+    assert code == int(bool(name)), out + err
     assert said in " ".join(out.split())
 
 
 @pytest.mark.drill
-def test_states_of_a_record_that_begins_later(proofroll: Proofroll, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("kinds", "name", "code", "said"),
+    [
+        ((), "", 3, "a policy that observes its last action needs what was before"),
+        (("action",), "", 0, "every layer that was looked at holds"),
+        (("action",), "half kd", 1, "kd is 0.5 of the right one"),
+    ],
+)
+def test_states_of_a_record_that_begins_later(
+    kinds: tuple[str, ...], name: str, code: int, said: str, proofroll: Proofroll, legs: list[str], tmp_path: Path
+) -> None:
     """States alone from a later instant on need what a policy saw before, and are judged with its actions."""
-    (tmp_path / "legs.urdf").write_text(urdf())
-    (tmp_path / "legs.toml").write_text(CONTROL)
-    asked = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
-    for kinds, mistake, code, said in (
-        ({"time", "q", "v", *BASE}, {}, 3, "a policy that observes its last action needs what was before"),
-        ({"time", "q", "v", "action", *BASE}, {}, 0, "every layer that was looked at holds"),
-        ({"time", "q", "v", "action", *BASE}, MISTAKES["half kd"][2], 1, "kd is 0.5 of the right one"),
-    ):
-        columns = columns_of(Loop(step=5e-3, steps=40, **mistake).record(PROGRAMS["mujoco"]))
-        rows = columns["time"] >= 0.035 - 1e-9
-        states = {key: values[rows] for key, values in columns.items() if key.split(".")[0] in kinds}
-        got, out, err = proofroll("judge", str(written(states, tmp_path / "record.csv")), *asked)
-        assert got == code, out + err
-        assert said in " ".join(out.split())
+    columns = recorded(name, step=5e-3, steps=40)
+    rows = columns["time"] >= 0.035 - 1e-9
+    states = {key: values[rows] for key, values in only(columns, *kinds).items()}
+    got, out, err = proofroll("judge", str(written(states, tmp_path / "record.csv")), *legs)
+    assert got == code, out + err
+    assert said in " ".join(out.split())
 
 
-def test_a_record_with_names_and_units_of_its_own(proofroll: Proofroll, tmp_path: Path) -> None:
+def test_a_record_with_names_and_units_of_its_own(proofroll: Proofroll, legs: list[str], tmp_path: Path) -> None:
     """Columns of another program are named by ``--map``; milliseconds, degrees and axes of the base are converted.
 
     A gear of the URDF explains efforts of motors, and its velocity limit is said where the record passes it.
     """
-    (tmp_path / "legs.urdf").write_text(urdf().replace('velocity="40"', 'velocity="0.5"'))
-    (tmp_path / "legs.toml").write_text(CONTROL)
-    ours = columns_of(Loop().record(PROGRAMS["pinocchio"]))
+    Path(legs[1]).write_text(urdf().replace('velocity="40"', 'velocity="0.5"'))
+    ours = recorded("", "pinocchio")
     turned = {key: np.stack([ours[f"{key}.{axis}"] for axis in "xyz"], axis=1) for key in ("v_WB", "w_WB")}
     quaternion = np.stack([ours[f"q_WB.{axis}"] for axis in "wxyz"], axis=1)
     theirs, names = {"t": 1e3 * ours["time"]}, {"t": "time[ms]"}
@@ -264,8 +237,7 @@ def test_a_record_with_names_and_units_of_its_own(proofroll: Proofroll, tmp_path
         for theirs_name, key in (("lin", "v_WB"), ("ang", "w_WB")):
             theirs[f"{theirs_name}_{axis}"] = _in_base(quaternion, turned[key])[:, k]
             names[f"{theirs_name}_{axis}"] = f"{key}_B.{axis}"
-    asked = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
-    asked += ["--map", ",".join(f"{key}={name}" for key, name in names.items())]
+    asked = [*legs, "--map", ",".join(f"{key}={name}" for key, name in names.items())]
     record = written(theirs, tmp_path / "record.csv")
     code, out, err = proofroll("judge", str(record), *asked)
     assert code == 0, out + err
@@ -284,10 +256,8 @@ def _in_base(quaternion: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("layout", ["playground", "isaaclab", "legged_gym"])
-def test_arrays_of_a_training_framework(layout: str, tmp_path: Path) -> None:
+def test_arrays_of_a_training_framework(layout: str, legs: list[str], tmp_path: Path) -> None:
     """Arrays are read with the quaternion, frames, point and order of joints of their program, in single precision."""
-    (tmp_path / "legs.urdf").write_text(urdf())
-    (tmp_path / "legs.toml").write_text(CONTROL)
     ours = Loop().record(PROGRAMS["mujoco"])
     turned, spin = ours["q_WB"], ours["w_WB"]
     by_level = [0, 3, 1, 4, 2, 5] if layout == "isaaclab" else range(6)
@@ -313,7 +283,7 @@ def test_arrays_of_a_training_framework(layout: str, tmp_path: Path) -> None:
         arrays = dict(zip(names, values, strict=True)) | {"actions": joints["action"]}
     stored = {name: values.astype(np.float32) for name, values in arrays.items()}
     np.savez(tmp_path / "record.npz", dt=1e-3, **stored)
-    judgement = judge_record(tmp_path / "record.npz", tmp_path / "legs.urdf", tmp_path / "legs.toml", layout=layout)
+    judgement = judge_record(tmp_path / "record.npz", Path(legs[1]), Path(legs[3]), layout=layout)
     assert judgement.agrees, "\n".join(judgement.lines())
     assert [layer.name for layer in judgement.layers if layer.residual is not None][:2] == ["instants", "action"]
 
@@ -328,15 +298,12 @@ def test_arrays_of_a_training_framework(layout: str, tmp_path: Path) -> None:
     ],
 )
 def test_arrays_that_cannot_be_read(
-    asked: list[str], lacking: tuple[str, ...], said: str, proofroll: Proofroll, tmp_path: Path
+    asked: list[str], lacking: tuple[str, ...], said: str, proofroll: Proofroll, legs: list[str], tmp_path: Path
 ) -> None:
     """Arrays without the name of their program, with a wrong one, or without times are one line."""
-    (tmp_path / "legs.urdf").write_text(urdf())
-    (tmp_path / "legs.toml").write_text(CONTROL)
     arrays = {"qpos": np.zeros((9, 13)), "qvel": np.zeros((9, 12)), "dt": np.array(0.01)}
     np.savez(tmp_path / "record.npz", **{key: values for key, values in arrays.items() if key not in lacking})
-    files = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
-    code, _, err = proofroll("judge", str(tmp_path / "record.npz"), *files, *asked)
+    code, _, err = proofroll("judge", str(tmp_path / "record.npz"), *legs, *asked)
     assert code == 2
     assert said in err
 
@@ -353,15 +320,12 @@ def test_arrays_that_cannot_be_read(
     ],
 )
 def test_arrays_of_another_shape(
-    layout: str, changed: dict[str, np.ndarray], said: str, proofroll: Proofroll, tmp_path: Path
+    layout: str, changed: dict[str, np.ndarray], said: str, proofroll: Proofroll, legs: list[str], tmp_path: Path
 ) -> None:
     """An array with too few columns or rows is one line with its own name and what it should have."""
-    (tmp_path / "legs.urdf").write_text(urdf())
-    (tmp_path / "legs.toml").write_text(CONTROL)
     gym = {"root_states": np.ones((9, 13)), "dof_pos": np.zeros((9, 6)), "dof_vel": np.zeros((9, 6))}
     arrays = {"qpos": np.ones((9, 13)), "qvel": np.zeros((9, 12))} if layout == "playground" else gym
     np.savez(tmp_path / "record.npz", dt=0.01, **(arrays | changed))
-    files = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml"), "--as", layout]
-    code, _, err = proofroll("judge", str(tmp_path / "record.npz"), *files)
+    code, _, err = proofroll("judge", str(tmp_path / "record.npz"), *legs, "--as", layout)
     assert (code, err.count("\n")) == (2, 1), err
     assert re.search(said, err)

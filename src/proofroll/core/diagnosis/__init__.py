@@ -11,9 +11,10 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Generic, Protocol, runtime_checkable
 
 import numpy as np
+from typing_extensions import TypeVar
 
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
@@ -126,23 +127,28 @@ class Cause:
         return f"{self.says} ({self.quantity} off by {difference}{unit}, by {remainder}{unit} with that)"
 
 
+EvidenceT = TypeVar("EvidenceT", default=Evidence)
+ResultT = TypeVar("ResultT", default=Cause)
+
+
 @dataclass(frozen=True)
-class Hypothesis:
+class Hypothesis(Generic[EvidenceT, ResultT]):
     """A cause that can be tested. A new one is one function (:func:`hypothesis`) in the element's tuple.
 
     Attributes:
-        id: unique within the kind of element.
-        grounds: the test, and why it is a proof.
-        test: yields candidate causes; :func:`diagnose` drops those that do not close the difference.
+        id: unique within the kind of element, or among those about robot files.
+        grounds: the test, and why it is a proof; of robot files the behaviour of the engine.
+        test: yields candidate causes, and :func:`diagnose` drops those that do not close the difference; of robot files
+            it yields the models that an engine with that behaviour would hold.
+        known: engine -> versions in which it was seen.
+        remedy: action that a user can take.
     """
 
     id: str
     grounds: str
-    test: Callable[[Evidence], Iterable[Cause]]
-
-    def proven(self, evidence: Evidence) -> bool:
-        """True if some cause of the hypothesis is proven."""
-        return any(cause.proven for cause in self.test(evidence))
+    test: Callable[[EvidenceT], Iterable[ResultT]]
+    known: Mapping[str, str] = field(default_factory=dict)
+    remedy: str = ""
 
 
 def hypothesis(name: str, grounds: str) -> Callable[[Callable[[Evidence], Iterable[Cause]]], Hypothesis]:

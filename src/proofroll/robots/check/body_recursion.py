@@ -4,10 +4,11 @@ M comes column by column. Source: Featherstone, Rigid Body Dynamics Algorithms, 
 """
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import skews
-from proofroll.robots.check.two_formulations import Dynamics, armature, turned_armature, within
+from proofroll.robots.check.two_formulations import Dynamics, Frames, armature, turned_armature
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import RobotStates
 
@@ -57,6 +58,33 @@ def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity:
         if joint.parent != NO_BODY:
             force[joint.parent] = force[joint.parent] + force[joint.child] @ X[joint.child]
     return torque
+
+
+def within(joint: RobotJoint, states: RobotStates) -> tuple[Array, Array]:
+    """Position and rotation of the child in its parent's frame, shapes (states, 3) and (states, 3, 3)."""
+    count = states.count
+    slid = np.zeros((count, 3))
+    turned = np.broadcast_to(np.eye(3), (count, 3, 3))
+    if joint.kind == JointKind.REVOLUTE:
+        turned = Rotation.from_rotvec(states.angle[joint.name][:, None] * joint.axis).as_matrix()
+    elif joint.kind == JointKind.PRISMATIC:
+        slid = states.angle[joint.name][:, None] * joint.axis
+    elif joint.kind == JointKind.SPHERICAL:
+        turned = states.rotation[joint.name]
+    elif joint.kind == JointKind.FREE:
+        return joint.position + states.position[joint.name], states.rotation[joint.name]
+    R = joint.rotation @ turned
+    return joint.position + slid @ joint.rotation.T - R @ joint.child_position, R
+
+
+def poses(robot: Robot, states: RobotStates) -> Frames:
+    """Position of the origin and rotation of every body in the world, shapes (states, 3) and (states, 3, 3)."""
+    placed = {NO_BODY: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
+    for joint in robot.joints:
+        p, R = placed[joint.parent]
+        r, Q = within(joint, states)
+        placed[joint.child] = (p + (R @ r[..., None])[..., 0], R @ Q)
+    return placed
 
 
 def _subspace(joint: RobotJoint, R: Array) -> Array:

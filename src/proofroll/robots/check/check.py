@@ -14,13 +14,12 @@ import numpy as np
 from proofroll.core.errors import InputError, Missing, require_known
 from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
 from proofroll.files.toml import read_toml
-from proofroll.robots.check.body_recursion import body_recursion
+from proofroll.robots.check.body_recursion import body_recursion, poses
 from proofroll.robots.check.hypotheses import hypotheses
 from proofroll.robots.check.importer_row import importer_row, row_with_copy
 from proofroll.robots.check.layers import LAYERS, RobotTruth
 from proofroll.robots.check.lint import lint
 from proofroll.robots.check.records import DrawnBody, DrawnJoint, DrawnRobot, ImporterRow, RobotCheck, UsedTruth
-from proofroll.robots.check.two_formulations import poses
 from proofroll.robots.files import reading
 from proofroll.robots.files.meaning import USUAL, CheckSettings, moving_robot, source_of
 from proofroll.robots.files.mjcf.compiler import Compiler

@@ -130,11 +130,10 @@ class Search:
     def _tried(self, step: _Step, hypothesis: RobotHypothesis, layer: str, most: float = math.inf) -> _Step | None:
         """Step after a hypothesis; None: it changes nothing, or leaves a difference above ``most`` at the layer."""
         truth, reading = step.truth, step.reading
-        result = hypothesis.change(
-            RobotEvidence(
-                file=self.file, robot=truth.robot, reading=reading, recompiled=self.recompiled, reread=self.reread
-            )
+        evidence = RobotEvidence(
+            file=self.file, robot=truth.robot, reading=reading, recompiled=self.recompiled, reread=self.reread
         )
+        result = next(iter(hypothesis.test(evidence)), None)
         if result is None or result is truth.robot:
             return None
         if isinstance(result, Reading):
@@ -150,7 +149,7 @@ class Search:
         difference, remainder = step.found[layer], left[layer]
         cause = RobotCause(
             id=hypothesis.id,
-            name=hypothesis.name,
+            name=hypothesis.grounds,
             layer=layer,
             before=difference,
             after=remainder,

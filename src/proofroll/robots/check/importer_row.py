@@ -16,9 +16,8 @@ from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.number_format import counted
 from proofroll.core.plugins import EngineSpec, plain_name
 from proofroll.robots.check.explain import Search
-from proofroll.robots.check.layers import LAYERS, TOLERANCE, RobotTruth, differences, first_failing
+from proofroll.robots.check.layers import LAYERS, TOLERANCE, RobotTruth, differences, first_failing, worst_place
 from proofroll.robots.check.records import HeldLayer, ImporterRow
-from proofroll.robots.check.worst_place import worst_place
 from proofroll.robots.files import reading
 from proofroll.robots.files.meaning import meaning
 from proofroll.robots.files.robot_file import RobotFile

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from proofroll.core.arrays import slices
-from proofroll.robots.check.two_formulations import Dynamics, Frames, passive, poses, world_jacobians
+from proofroll.robots.check.two_formulations import Dynamics, Frames, TreeMotion, passive, world_jacobians
 from proofroll.robots.model import Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import Reading
 from proofroll.robots.states import RobotStates
@@ -65,14 +65,18 @@ class RobotTruth:
         """Terms of the equation of motion by the first formulation."""
         if self.like is not None and _moves_alike(self.robot, self.like.robot):
             return self.like.dynamics
-        return world_jacobians(self.robot, self.states, self.frames)
+        return world_jacobians(self.robot, self.states, self._motion)
 
     @cached_property
+    def _motion(self) -> TreeMotion:
+        if self.like is not None and _joints_alike(self.robot, self.like.robot, _PLACES):
+            return self.like._motion
+        return TreeMotion.of(self.robot, self.states)
+
+    @property
     def frames(self) -> Frames:
         """Poses of all bodies."""
-        if self.like is not None and self.robot.joints is self.like.robot.joints:
-            return self.like.frames
-        return poses(self.robot, self.states)
+        return self._motion.frames
 
     @cached_property
     def passive(self) -> Array:
@@ -133,19 +137,21 @@ class RobotTruth:
 # Attributes of joints that enter the passive forces only, not M, h or poses.
 _PASSIVE = {"damping", "friction", "stiffness", "rest"}
 _MOTION = [field.name for field in dataclasses.fields(RobotJoint) if field.name not in _PASSIVE]
+# Attributes of joints on which poses and Jacobians depend.
+_PLACES = ("name", "kind", "parent", "child", "position", "rotation", "axis", "child_position")
 
 
 def _moves_alike(robot: Robot, rival: Robot) -> bool:
     """True if the robots differ only in passive forces and couplings."""
-    return (
-        robot.bodies is rival.bodies
-        and robot.gravity is rival.gravity
-        and len(robot.joints) == len(rival.joints)
-        and all(
-            getattr(joint, name) is getattr(partner, name)
-            for joint, partner in zip(robot.joints, rival.joints, strict=True)
-            for name in _MOTION
-        )
+    return robot.bodies is rival.bodies and robot.gravity is rival.gravity and _joints_alike(robot, rival, _MOTION)
+
+
+def _joints_alike(robot: Robot, rival: Robot, attributes: Sequence[str]) -> bool:
+    """True if the joints of two robots have the same values of some attributes."""
+    return len(robot.joints) == len(rival.joints) and all(
+        getattr(joint, name) is getattr(partner, name)
+        for joint, partner in zip(robot.joints, rival.joints, strict=True)
+        for name in attributes
     )
 
 
@@ -252,3 +258,63 @@ def _largest(values: Iterable[float]) -> float:
     """The largest value; infinity if one is not finite."""
     values = [float(value) for value in values]
     return max(values, default=0.0) if np.all(np.isfinite(values)) else float("inf")
+
+
+_TORQUES = ("gravity", "bias", "inverse dynamics")
+
+
+def worst_place(truth: RobotTruth, reading: Reading, layer: str) -> str | None:
+    """Clause with joint or body, state (counted from 0), the engine's and the true value; None: not for this layer."""
+    groups = truth.robot.groups
+    common = [name for name in reading.joints if name in groups]
+    bodies = {joint.name: joint.child for joint in truth.robot.moving}
+    carried = [name for name in common if name in reading.mass]
+    if layer in {"mass", "bodies"} and carried:
+        kinds: dict[str, tuple[dict[str, Array], dict[str, Array]]] = {
+            "mass": ({n: np.array(reading.mass[n]) for n in carried}, {n: np.array(groups[n].mass) for n in carried}),
+            "centre of mass": (reading.com, {n: groups[n].com for n in carried}),
+            "inertia": (reading.inertia, {n: groups[n].inertia for n in carried}),
+        }
+        for what, (values, true) in kinds.items():
+            worst = max(carried, key=lambda name: float(np.abs(values[name] - true[name]).max()))
+            numbers, true_numbers = np.ravel(values[worst]), np.ravel(true[worst])
+            index = int(np.argmax(np.abs(numbers - true_numbers)))
+            if abs(numbers[index] - true_numbers[index]) > 1e-9 * max(abs(numbers[index]), abs(true_numbers[index])):
+                return f"body {bodies[worst]}: {what} {numbers[index]:.6g}, true {true_numbers[index]:.6g}"
+    if layer == "kinematics":
+        true_poses = truth.frames
+        differences = [
+            (float(np.abs(values - true).max(axis=axes)[state]), name, what, state)
+            for name in common
+            if name in reading.position
+            for what, values, true, axes in (
+                ("position", reading.position[name], true_poses[bodies[name]][0], (1,)),
+                ("rotation", reading.rotation[name], true_poses[bodies[name]][1], (1, 2)),
+            )
+            for state in [int(np.argmax(np.abs(values - true).max(axis=axes)))]
+        ]
+        off, name, what, state = max(differences, default=(0.0, "", "", 0))
+        return f"body {bodies[name]}: {what} off by {off:.3g} at state {state}" if name else None
+    if layer in _TORQUES:
+        texts, expected = {
+            "gravity": (reading.g, truth.dynamics.g),
+            "bias": (reading.h, truth.dynamics.h),
+            "inverse dynamics": (reading.inverse, truth.inverse),
+        }[layer]
+        return None if texts is None else _torque(truth, reading, texts, expected)
+    return None
+
+
+def _torque(truth: RobotTruth, reading: Reading, values: Array, true: Array) -> str | None:
+    start, worst = 0, (0.0, "")
+    for name, dofs in zip(reading.joints, reading.dofs, strict=True):
+        columns = truth.robot.columns.get(name)
+        if columns is not None and columns.stop - columns.start == dofs:
+            torque, true_torque = values[:, start : start + dofs], true[:, columns]
+            state, index = np.unravel_index(int(np.argmax(np.abs(torque - true_torque))), torque.shape)
+            sentence = (
+                f"joint {name}: {torque[state, index]:.6g} at state {state}, true {true_torque[state, index]:.6g}"
+            )
+            worst = max(worst, (float(np.abs(torque - true_torque).max()), sentence))
+        start += dofs
+    return worst[1] or None

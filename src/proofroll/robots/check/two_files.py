@@ -14,14 +14,14 @@ import numpy as np
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.plugins import EngineSpec
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.robots.check.body_recursion import body_recursion
+from proofroll.robots.check.body_recursion import body_recursion, poses
 from proofroll.robots.check.check import bar_of, robot_drawing
 from proofroll.robots.check.importer_row import importer_row
 from proofroll.robots.check.joint_names import proposed_patterns, with_patterns
 from proofroll.robots.check.layers import LAYERS, RobotTruth
 from proofroll.robots.check.lint import lint
 from proofroll.robots.check.records import AgainstCheck, ImporterRow, UnlikeValue, UsedTruth
-from proofroll.robots.check.two_formulations import passive, poses
+from proofroll.robots.check.two_formulations import passive
 from proofroll.robots.files import reading
 from proofroll.robots.files.meaning import USUAL, CheckSettings, moving_robot, source_of
 from proofroll.robots.files.robot_file import LintRemark, RobotFile

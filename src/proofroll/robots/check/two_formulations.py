@@ -1,8 +1,11 @@
-"""Truth of a robot at given states, by two formulations that share only the motion within one joint.
+"""Truth of a robot at given states, by two formulations that share nothing but the robot's data.
 
-A, here: Jacobians in world axes, M = Σ Jᵀ I J, and h from the accelerations that remain at zero joint accelerations.
+A, here: Jacobians in world axes of the tree of scenes, M = Σ Jᵀ I J, and h from the accelerations that remain at zero
+joint accelerations.
 B, :mod:`proofroll.robots.check.body_recursion`: recursive Newton-Euler with spatial vectors in body axes.
 """
+
+from __future__ import annotations
 
 import dataclasses
 from functools import cached_property
@@ -11,15 +14,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import cross
-from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism, Tree
+from proofroll.elements.mechanism.scene.checks import ZERO, Z
+from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.elements.mechanism.scene.rotations import skews
-from proofroll.robots.model import NO_BODY, Array, Robot, RobotJoint
+from proofroll.robots.model import NO_BODY, Array, Robot
 from proofroll.robots.states import RobotStates
 
 # Smallest eigenvalue of the scaled mass matrix that counts as nonzero: some 64 velocities times round-off.
 _SINGULAR = 1e-14
 # Largest matrix product, in multiplications, that OpenBLAS computes in one thread; more threads are slower here.
 _ALONE = 2**18
+_FIELDS = ("p_WB", "R_WB", "w_WB", "J", "bias")  # of a motion of a scene's tree
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,86 +67,110 @@ def passive(robot: Robot, states: RobotStates) -> Array:
     return torques
 
 
-def within(joint: RobotJoint, states: RobotStates) -> tuple[Array, Array]:
-    """Position and rotation of the child in its parent's frame, shapes (states, 3) and (states, 3, 3)."""
-    count = states.count
-    slid = np.zeros((count, 3))
-    turned = np.broadcast_to(np.eye(3), (count, 3, 3))
-    if joint.kind == JointKind.REVOLUTE:
-        turned = Rotation.from_rotvec(states.angle[joint.name][:, None] * joint.axis).as_matrix()
-    elif joint.kind == JointKind.PRISMATIC:
-        slid = states.angle[joint.name][:, None] * joint.axis
-    elif joint.kind == JointKind.SPHERICAL:
-        turned = states.rotation[joint.name]
-    elif joint.kind == JointKind.FREE:
-        return joint.position + states.position[joint.name], states.rotation[joint.name]
-    R = joint.rotation @ turned
-    return joint.position + slid @ joint.rotation.T - R @ joint.child_position, R
-
-
 Frames = dict[str, tuple[Array, Array]]
 
 
-def poses(robot: Robot, states: RobotStates) -> Frames:
-    """Position of the origin and rotation of every body in the world, shapes (states, 3) and (states, 3, 3)."""
-    placed = {NO_BODY: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
-    for joint in robot.joints:
-        p, R = placed[joint.parent]
-        r, Q = within(joint, states)
-        placed[joint.child] = (p + _rotate(R, r), R @ Q)
-    return placed
+def _tree_of(robot: Robot) -> tuple[Tree, dict[str, Array]]:
+    """Tree of a scene with the joints of a robot, and body -> axes that it has there, in its own.
+
+    Bodies and joints are numbered, and all axes are the world's where coordinates are 0, up to the turn of a free base.
+    """
+    names = {NO_BODY: WORLD} | {joint.child: f"body {number}" for number, joint in enumerate(robot.joints)}
+    axes, joints = {NO_BODY: np.eye(3)}, []
+    for number, joint in enumerate(robot.joints):
+        free = joint.kind == JointKind.FREE
+        axes[joint.child] = S = np.eye(3) if free else joint.rotation.T @ axes[joint.parent]
+        joints.append(
+            Joint(
+                name=f"joint {number}",
+                kind=JointKind(joint.kind),
+                parent=names[joint.parent],
+                child=names[joint.child],
+                position=ZERO if free else tuple(axes[joint.parent].T @ joint.position),
+                axis=tuple(S.T @ joint.axis) if joint.kind in ONE_COORDINATE else Z,
+                child_position=tuple(S.T @ joint.child_position),
+            )
+        )
+    return Tree(Mechanism(tuple(Body(names[joint.child], 1.0) for joint in robot.joints), tuple(joints))), axes
 
 
-def _rotate(R: Array, r: Array) -> Array:
-    return np.asarray(np.einsum("sij,sj->si", R, r))
+@dataclasses.dataclass(frozen=True)
+class TreeMotion:
+    """Motion of a robot by the tree of a scene; the first axis of arrays counts states.
 
+    Attributes:
+        frames: body -> position of its origin and its rotation in the world, shapes (states, 3) and (states, 3, 3).
+        J: derivative of the velocities of all origins and of the angular velocities, in world axes, by the robot's
+            velocities, shape (states, bodies, 6, n); bodies in the order of joints.
+        bias: accelerations at zero joint accelerations, shape (states, bodies, 6).
+        w: angular velocities, shape (states, bodies, 3).
+    """
 
-@dataclasses.dataclass
-class _Motion:
-    """Motion of a body in world axes: Jacobians, angular velocity, accelerations at zero joint accelerations."""
-
-    Jv: Array
-    Jw: Array
+    frames: Frames
+    J: Array
+    bias: Array
     w: Array
-    a: Array
-    alpha: Array
+
+    @classmethod
+    def of(cls, robot: Robot, states: RobotStates) -> TreeMotion:
+        """Motion of a robot at some states."""
+        tree, axes = _tree_of(robot)
+        count, nv, moved = states.count, tree.mechanism.nv, tree.mechanism
+        q, T, drift = np.zeros((count, moved.nq)), np.zeros((count, nv, robot.dofs)), np.zeros((count, nv))
+        places = {joint.name: moved.joint_index[f"joint {number}"] for number, joint in enumerate(robot.joints)}
+        free = []
+        for joint in robot.moving:
+            at_q, at_v = moved.q_slices[places[joint.name]], moved.v_slices[places[joint.name]]
+            S, columns = axes[joint.child], robot.columns[joint.name]
+            if joint.dofs == 1:
+                q[:, at_q.start], T[:, at_v, columns] = states.angle[joint.name], 1.0
+                continue
+            R = states.rotation[joint.name]
+            q[:, at_q.stop - 4 : at_q.stop] = Rotation.from_matrix(S.T @ R @ S).as_quat(scalar_first=True)
+            T[:, at_v, columns] = S.T if joint.dofs == 3 else np.kron(np.eye(2), R.swapaxes(1, 2))
+            if joint.kind == JointKind.FREE:
+                q[:, at_q.start : at_q.start + 3] = joint.position + states.position[joint.name]
+                free.append(at_v)
+        v = (T @ states.stacked(states.velocity, robot)[..., None])[..., 0]
+        for at_v in free:  # its velocity along the body's axes turns with them
+            drift[:, at_v.start : at_v.start + 3] = cross(v[:, at_v][:, :3], v[:, at_v][:, 3:])
+        motions = [tree.at(*state) for state in zip(q, v, strict=True)]
+        p, R, w, J, bias = (np.array([getattr(motion, name)[:-1] for motion in motions]) for name in _FIELDS)
+        return cls(
+            frames={joint.child: (p[:, k], R[:, k] @ axes[joint.child].T) for k, joint in enumerate(robot.joints)},
+            J=J @ T[:, None],
+            bias=bias + (J @ drift[:, None, :, None])[..., 0],
+            w=w,
+        )
 
 
-def world_jacobians(robot: Robot, states: RobotStates, frames: Frames | None = None) -> Dynamics:
+def world_jacobians(robot: Robot, states: RobotStates, motion: TreeMotion | None = None) -> Dynamics:
     """Terms of the equation of motion by Jacobians in world axes (formulation A).
 
-    ``frames`` are the :func:`poses`, if they are known already.
+    ``motion`` is that of the robot, if it is known already.
     """
-    count, n = states.count, robot.dofs
+    motion = TreeMotion.of(robot, states) if motion is None else motion
+    bodies = [robot.bodies[joint.child] for joint in robot.joints]
+    mass = np.array([body.mass for body in bodies])[:, None]
+    R = np.stack([motion.frames[joint.child][1] for joint in robot.joints], axis=1)
+    r = (R @ np.array([body.com for body in bodies])[..., None])[..., 0]
+    inertia = R @ np.array([body.inertia for body in bodies]) @ R.swapaxes(2, 3)
+    w, Jw = motion.w, motion.J[:, :, 3:]
+    a, alpha = motion.bias[..., :3], motion.bias[..., 3:]
+    Jc = motion.J[:, :, :3] - skews(r) @ Jw
+    ac = a + cross(alpha, r) + cross(w, cross(w, r))
+    Iw, Ialpha = ((inertia @ rate[..., None])[..., 0] for rate in (w, alpha))
+    M = _summed(mass[..., None] * Jc, Jc) + _summed(inertia @ Jw, Jw)
+    g = -_summed(Jc, np.broadcast_to(mass * robot.gravity, ac.shape)[..., None])[..., 0]
+    c = _summed(Jc, (mass * ac)[..., None])[..., 0] + _summed(Jw, (Ialpha + cross(w, Iw))[..., None])[..., 0]
     v = states.stacked(states.velocity, robot)
-    frames = poses(robot, states) if frames is None else frames
-    rest = np.zeros((count, 3))
-    motions = {NO_BODY: _Motion(Jv=np.zeros((count, 3, n)), Jw=np.zeros((count, 3, n)), w=rest, a=rest, alpha=rest)}
-    for joint in robot.joints:
-        motions[joint.child] = _carried(robot, joint, motions[joint.parent], frames, v)
-    M, g, c = np.zeros((count, n, n)), np.zeros((count, n)), np.zeros((count, n))
-    if motions.keys() - {NO_BODY}:
-        bodies = [robot.bodies[joint.child] for joint in robot.joints]
-        mass = np.array([body.mass for body in bodies])[:, None]
-        R = np.array([frames[joint.child][1] for joint in robot.joints])  # (bodies, states, 3, 3)
-        r = R @ np.array([body.com for body in bodies])[:, None, :, None]
-        inertia = R @ np.array([body.inertia for body in bodies])[:, None] @ R.swapaxes(2, 3)
-        moving = [motions[joint.child] for joint in robot.joints]
-        Jv, Jw, w, a, alpha = (np.array([getattr(motion, name) for motion in moving]) for name in vars(moving[0]))
-        Jc = Jv - skews(r[..., 0]) @ Jw
-        ac = a + _swung(w, alpha, r[..., 0])
-        Iw, Ialpha = (np.einsum("bsij,bsj->bsi", inertia, rate) for rate in (w, alpha))
-        M = _summed(mass[..., None, None] * Jc, Jc) + _summed(inertia @ Jw, Jw)
-        g = -_summed(Jc, np.broadcast_to((mass * robot.gravity)[:, None], ac.shape)[..., None])[..., 0]
-        c = _summed(Jc, (mass[..., None] * ac)[..., None])[..., 0]
-        c += _summed(Jw, (Ialpha + cross(w, Iw))[..., None])[..., 0]
     return Dynamics(M + np.diag(armature(robot)), g, g + c + turned_armature(robot, v))
 
 
 def _summed(A: Array, B: Array) -> Array:
-    """Sum of oneᵀ other over bodies, shape (states, any, any), of arrays of shape (bodies, states, 3, any)."""
-    left, right = (array.swapaxes(0, 1).reshape(array.shape[1], -1, array.shape[3]) for array in (A, B))
-    total = np.zeros((A.shape[1], A.shape[3], B.shape[3]))
+    """Sum of Aᵀ B over bodies, shape (states, any, any), of arrays of shape (states, bodies, 3, any)."""
+    left, right = (array.reshape(len(array), -1, array.shape[3]) for array in (A, B))
+    total = np.zeros((len(A), A.shape[3], B.shape[3]))
     rows = max(1, _ALONE // (A.shape[3] * B.shape[3]))
     for start in range(0, left.shape[1], rows):
         total += left[:, start : start + rows].swapaxes(1, 2) @ right[:, start : start + rows]
@@ -161,32 +191,3 @@ def turned_armature(robot: Robot, v: Array) -> Array:
             columns = slice(robot.columns[joint.name].start, robot.columns[joint.name].start + 3)
             torques[:, columns] = -joint.armature * np.cross(rate[:, 3:], rate[:, :3])
     return torques
-
-
-def _carried(robot: Robot, joint: RobotJoint, parent: _Motion, frames: Frames, v: Array) -> _Motion:
-    (p_parent, R_parent), (p, R) = frames[joint.parent], frames[joint.child]
-    r = p - p_parent
-    Jv, Jw = parent.Jv - skews(r) @ parent.Jw, parent.Jw.copy()
-    if joint.kind == JointKind.FIXED:
-        return _Motion(Jv=Jv, Jw=Jw, w=parent.w, a=parent.a + _swung(parent.w, parent.alpha, r), alpha=parent.alpha)
-    columns = robot.columns[joint.name]
-    rate = v[:, columns]
-    if joint.kind == JointKind.FREE:
-        Jv[:, :, columns], Jw[:, :, columns] = np.eye(3, 6), np.eye(3, 6, 3)
-        return _Motion(Jv=Jv, Jw=Jw, w=rate[:, 3:], a=np.zeros_like(p), alpha=np.zeros_like(p))
-    u = R @ (np.eye(3) if joint.kind == JointKind.SPHERICAL else joint.axis[:, None])  # (states, 3, velocities)
-    relative = np.einsum("sij,sj->si", u, rate)
-    if joint.kind == JointKind.PRISMATIC:
-        Jv[:, :, columns] = u
-        a = parent.a + _swung(parent.w, parent.alpha, r) + 2 * cross(parent.w, relative)
-        return _Motion(Jv=Jv, Jw=Jw, w=parent.w, a=a, alpha=parent.alpha)
-    anchor = p_parent + _rotate(R_parent, np.broadcast_to(joint.position, p.shape))
-    Jw[:, :, columns], Jv[:, :, columns] = u, -skews(p - anchor) @ u
-    w, alpha = parent.w + relative, parent.alpha + cross(parent.w, relative)
-    a = parent.a + _swung(parent.w, parent.alpha, anchor - p_parent) + _swung(w, alpha, p - anchor)
-    return _Motion(Jv=Jv, Jw=Jw, w=w, a=a, alpha=alpha)
-
-
-def _swung(w: Array, alpha: Array, r: Array) -> Array:
-    """Acceleration of a point at r relative to the body's origin: α × r + ω × (ω × r)."""
-    return cross(alpha, r) + cross(w, cross(w, r))

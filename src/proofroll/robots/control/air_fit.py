@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.diagnosis.fitting import least_squares_parameters
@@ -24,8 +23,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import skew
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.record import BASE, ControlRecord
-from proofroll.robots.control.record_layer import LayerCause
+from proofroll.robots.control.record import BASE, ControlRecord, LayerCause
 from proofroll.robots.model import Array
 
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
@@ -128,14 +126,14 @@ def acceleration_fit(
         efforts: of the joints from each row on, (times, n).
         held_mask: True at rows at which no target changes, (times,).
     """
-    robot = AirRobot(mechanism, law.change(armature=np.zeros(len(law.joints)), gravity=1.0))
+    robot = AirRobot.bare(mechanism, law)
     motion = _motion(record, robot)
     if isinstance(motion, str):
         return motion
     states, velocities, base_axes = motion
     # A method adds steps to the velocity of a floating base along the world's axes, or along the base's.
     moving = [(velocities, base_axes)] + ([] if robot.base is None else [(np.array([v for _, v in states]), None)])
-    table = _Table(record, law, robot, mechanism, states, efforts)
+    table = _Table(record, law, robot, states, efforts)
     trials: list[tuple[bool, _Rows]] = []
     try:
         for central, (rated, axes) in itertools.product((False, True), moving):
@@ -300,14 +298,11 @@ class _Table:
         record: ControlRecord,
         law: ControlLaw,
         robot: AirRobot,
-        mechanism: Mechanism,
         states: list[tuple[Array, Array]],
         efforts: Array,
     ) -> None:
         self.law, self.robot, self.at, self.efforts = law, robot, states, efforts
         self.step = float(np.diff(record.time).mean())
-        bare = law.change(armature=0.0 * law.armature)
-        self.weightless = AirRobot(replace(mechanism, gravity=(0.0, 0.0, 0.0)), bare)
         self.rated = _largest(record, ("v.", "v_WB.", "w_WB."))
         self.placed, self.forced = _largest(record, ("q.", "q_WB.")), _largest(record, ("effort.",))
         self._known: dict[int, tuple[Array, ...]] = {}
@@ -315,13 +310,8 @@ class _Table:
     def _forces(self, row: int) -> tuple[Array, ...]:
         """Mass matrix with armatures, inertial forces, weight, and the whitening of free directions, at a row."""
         if row not in self._known:
-            q, v = self.at[row]
-            robot = self.robot
-            M = robot.equations.inertial(robot.equations.tree.at(q, v))[1]
-            inner = M @ self.weightless.equations.solve(q, v).acceleration
-            weight = M @ robot.equations.solve(q, v).acceleration - inner
-            armed = M + np.diag(robot.load(self.law.armature))
-            free = null_space(robot.equations.rows(q).C) if robot.equations.rank else np.eye(len(M))
+            M, inner, weight, free = self.robot.forces(*self.at[row])
+            armed = M + np.diag(self.robot.load(self.law.armature))
             into = np.linalg.inv(np.linalg.cholesky(free.T @ armed @ free)) @ free.T
             self._known[row] = armed, inner, weight, into
         return self._known[row]

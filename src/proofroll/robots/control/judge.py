@@ -17,9 +17,8 @@ from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.layers import record_layers
-from proofroll.robots.control.record import ControlRecord, read_record, record_of
+from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
-from proofroll.robots.control.record_layer import Layer
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,7 @@ from proofroll.robots.control.bookkeeping.mistakes import (
 )
 from proofroll.robots.control.bookkeeping.search import MistakeExplanation, best_size, explanations, largest
 from proofroll.robots.control.motion import motion_layer
-from proofroll.robots.control.record import BASE, OBSERVED, ControlRecord
-from proofroll.robots.control.record_layer import Layer, LayerCause
+from proofroll.robots.control.record import BASE, OBSERVED, ControlRecord, Layer, LayerCause
 from proofroll.robots.model import Array
 
 # Least residual that counts, in parts of the largest number of its column: round-off of a sum of some terms.

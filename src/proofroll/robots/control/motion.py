@@ -12,10 +12,9 @@ from proofroll.robots.control.air_fit import AirFit, states_of
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw, RobotState
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, SEARCH_TIME, SearchTime, mistakes
-from proofroll.robots.control.bookkeeping.search import EXACT, MistakeSearch, explained
-from proofroll.robots.control.bookkeeping.seen import SHOWN, WHOLE, LawMotions, SeenMotion
-from proofroll.robots.control.record import ControlRecord
-from proofroll.robots.control.record_layer import Layer
+from proofroll.robots.control.bookkeeping.search import MotionSearch
+from proofroll.robots.control.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
+from proofroll.robots.control.record import ControlRecord, Layer
 
 _STEPS, _LEAST_STEP = (1, 2, 5, 10), 4.9e-4  # steps between rows that are tried, and the shortest [s]
 # What no motion under a law has, and the fit of forces tells; damping moves the robot as more of kd does.
@@ -65,39 +64,6 @@ def _looks_back(law: ControlLaw) -> bool:
     return bool(np.any(answers[0] != answers[1]))
 
 
-def _without_mistakes(
-    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, steps: list[float]
-) -> dict[float, float]:
-    """Distance of a motion from the nearest one under the law, by the step of the program [s]."""
-    motions = {step: LawMotions(mechanism, law, seen, step) for step in steps}
-    return {step: min(tried.distance(law, scheme) for scheme in tried.schemes) for step, tried in motions.items()}
-
-
-def _best(
-    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, plain: dict[float, float], time: SearchTime
-) -> MistakeSearch:
-    """Search at the step of the program, which the record does not tell: the one whose motions come nearest.
-
-    Args:
-        mechanism: the robot.
-        law: its controller's law as it should be.
-        seen: the motion of the record.
-        plain: distance without a mistake, by step [s].
-        time: of the search.
-    """
-    if right := [step for step, distance in plain.items() if distance <= seen.bar]:
-        return explained(mechanism, law, seen, right[0])
-    searches: list[MistakeSearch] = []
-    for step in sorted(plain, key=lambda step: plain[step]):
-        if time.over and searches:
-            break
-        searches.append(explained(mechanism, law, seen, step, time))
-        last = searches[-1]
-        if last.explanations and last.explanations[0].after <= max(EXACT * last.before, seen.bar):
-            return last
-    return min(searches, key=lambda item: item.explanations[0].after if item.explanations else item.before)
-
-
 def motion_layer(
     record: ControlRecord,
     law: ControlLaw,
@@ -132,9 +98,9 @@ def motion_layer(
     divided = [n for n in divided if abs(n / every / law.rate % 1 - 0.5) >= 0.5 - WHOLE]
     if not divided:
         return Layer("motion", reason="no step divides both the interval of rows and the time between instants")
-    plain = _without_mistakes(mechanism, law, seen, [every / n for n in divided])
-    least = min(plain.values())
-    fit = forces(record) if least > seen.bar else ""
+    search = MotionSearch(mechanism, law, seen, [every / n for n in divided], time)
+    least = search.before
+    fit = "" if search.right else forces(record)
     fitted = [] if isinstance(fit, str) else [cause for cause in fit.causes if cause.id in _ONLY_FORCES]
     if fitted and any(cause.id != "damping" for cause in fitted):
         return Layer(
@@ -145,22 +111,19 @@ def motion_layer(
             time=float(seen.time[-1]),
             causes=tuple(fitted),
         )
-    best = _best(mechanism, law, seen, plain, time)
-    bar = max(best.spread, seen.bar)
-    if best.explanations or fitted:
-        bar = min([item.after for item in best.explanations] or [seen.bar])
-    causes = (item.cause for item in best.explanations)
+    causes = (*(item.cause for item in search.explanations), *fitted)
+    bar = min([item.after for item in search.explanations] or [seen.bar]) if causes else max(search.spread, seen.bar)
     layer = Layer(
         name="motion",
-        residual=best.before,
+        residual=least,
         bar=bar,
         column="the state",
         time=float(seen.time[-1]),
-        reason=IMPLICIT if best.imitated else "",
-        causes=(*causes, *fitted),
-        tried=best.tried,
+        reason=IMPLICIT if search.imitated else "",
+        causes=causes,
+        tried=len(search.tried),
         known=len(mistakes(law)),
     )
-    undecided = time.over and least > seen.bar and not layer.causes
+    undecided = time.over and not search.right and not causes
     ended = f"the search ended after {SEARCH_TIME:.0f} s of processor time without a mistake that explains it"
     return Layer("motion", reason=f"not decided: off by {error(least)}, and {ended}") if undecided else layer

@@ -13,12 +13,13 @@ import functools
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TypeVar
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from proofroll.core.diagnosis import Hypothesis
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.model import Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import Reading
@@ -112,36 +113,27 @@ def _moved(part: _Part, old: _Part | None, new: _Part | None) -> _Part:
     return dataclasses.replace(part, **changed) if changed else part
 
 
+RobotHypothesis = Hypothesis[RobotEvidence, Robot | Reading]
+# Evidence -> robot that the engine would hold, or its reading of an equivalent file that does not trigger the error;
+# None, or the same robot: the cause does not apply to the file.
 Change = Callable[[RobotEvidence], Robot | Reading | None]
 
 
-@dataclasses.dataclass(frozen=True)
-class RobotHypothesis:
-    """A cause.
-
-    Attributes:
-        id: name of its function.
-        name: behaviour of the engine, in a few words.
-        known: engine -> versions in which it was seen; these engines try it first.
-        remedy: action that a user can take.
-        change: evidence -> robot that the engine would hold, or its reading of an equivalent file that does not trigger
-            the error; None, or the same robot: the cause does not apply to the file.
-    """
-
-    id: str
-    name: str
-    known: Mapping[str, str]
-    remedy: str
-    change: Change
-
-
 def hypothesis(known: Mapping[str, str], remedy: str) -> Callable[[Change], RobotHypothesis]:
-    """Decorator that makes a hypothesis of a function; the first line of its docstring becomes the name."""
+    """Decorator that makes a hypothesis of a function, which gives the id and the first line of its docstring.
+
+    ``known``: engine -> versions in which it was seen; these engines try it first.
+    """
 
     def decorate(change: Change) -> RobotHypothesis:
         text = inspect.getdoc(change) or change.__name__
-        name = text[0].lower() + text[1:].partition("\n")[0].removesuffix(".")
-        return RobotHypothesis(id=change.__name__, name=name, known=known, remedy=remedy, change=change)
+        behaviour = text[0].lower() + text[1:].partition("\n")[0].removesuffix(".")
+
+        def models(evidence: RobotEvidence) -> Iterator[Robot | Reading]:
+            if (model := change(evidence)) is not None:
+                yield model
+
+        return Hypothesis(id=change.__name__, grounds=behaviour, test=models, known=known, remedy=remedy)
 
     return decorate
 
@@ -150,5 +142,5 @@ def hypothesis(known: Mapping[str, str], remedy: str) -> Callable[[Change], Robo
 def hypotheses() -> tuple[RobotHypothesis, ...]:
     """All hypotheses in the modules of this package, sorted by id."""
     modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
-    causes = [item for module in modules for item in vars(module).values() if isinstance(item, RobotHypothesis)]
+    causes = [item for module in modules for item in vars(module).values() if isinstance(item, Hypothesis)]
     return tuple(sorted(causes, key=lambda item: item.id))

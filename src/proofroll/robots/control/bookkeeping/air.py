@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import classical_step
 from proofroll.elements.mechanism import Mechanism
@@ -57,6 +58,23 @@ class AirRobot:
         self.driven = np.array([mechanism.place_of(name) for name in law.joints])
         base = [k for k, joint in enumerate(mechanism.joints) if joint.kind == JointKind.FREE][:1]
         self.base = (mechanism.q_slices[base[0]], mechanism.v_slices[base[0]]) if base else None
+
+    @classmethod
+    def bare(cls, mechanism: Mechanism, law: ControlLaw) -> AirRobot:
+        """Robot without the armature of a law, under the right gravity."""
+        return cls(mechanism, law.change(armature=np.zeros(len(law.joints)), gravity=1.0))
+
+    @cached_property
+    def _weightless(self) -> JointCoordinates:
+        return JointCoordinates(replace(self.mechanism, gravity=(0.0, 0.0, 0.0)), self.equations.rank)
+
+    def forces(self, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
+        """Mass matrix, forces of inertia, weight (nv), and directions that loops and couplings allow (nv, freedoms)."""
+        M = self.equations.inertial(self.equations.tree.at(q, v))[1]
+        inertial = M @ self._weightless.solve(q, v).acceleration
+        weight = M @ self.equations.solve(q, v).acceleration - inertial
+        free = null_space(self.equations.rows(q).C) if self.equations.rank else np.eye(len(M))
+        return M, inertial, weight, free
 
     def coordinates(self, q: Array, v: Array, base: Array | None) -> tuple[Array, Array]:
         """Coordinates and velocities of the mechanism.
@@ -128,7 +146,7 @@ def steps_in_air(
         Diverged: the motion blows up.
     """
     q, v = start
-    period = max(1, whole_steps(0.0, 1 / law.rate, step) + law.extra_steps)
+    period = law.period(step)
     answer, (last, waiting) = law.answer(), law.waiting()
     target, states, counts = law.pose.copy(), [robot.state(law.begins, q, v)], last
     efforts = np.zeros(len(law.joints))

@@ -14,12 +14,7 @@ from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, LAYERS
-from proofroll.robots.control.bookkeeping.search import (
-    MistakeExplanation,
-    MistakeSearch,
-    explained,
-    explained_start,
-)
+from proofroll.robots.control.bookkeeping.search import MistakeExplanation, MotionSearch, explained_start
 from proofroll.robots.control.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
 
 # Names of hypotheses that look at the same number by other means.
@@ -40,33 +35,34 @@ def of_bookkeeping(evidence: Evidence) -> Iterator[Cause]:
         return
     try:
         law = ControlLaw.of(asked.mechanism)
-        search = _at_start(evidence, law) if evidence.run is None else _of_run(evidence, law)
+        if evidence.run is None:
+            yield from _of_start(evidence, law)
+        elif (search := _of_run(evidence, law)) is not None:
+            yield from (_cause(item, search.before, of_run=True) for item in search.explanations[:2])
+            if search.imitated:
+                yield Cause(
+                    id="bookkeeping: implicit kd",
+                    says=IMPLICIT,
+                    quantity="motion",
+                    unit="rad or m",
+                    before=search.explicit,
+                    after=search.before,
+                    remedy="run it at a second step, and look at its armatures and at its integrator",
+                    covers=("motion", *COVERED, "effort"),
+                )
     except InputError:  # motors with gears
         return
-    if search is None:
-        return
-    yield from (_cause(item, search.before, of_run=evidence.run is not None) for item in search.explanations[:2])
-    if search.imitated:
-        yield Cause(
-            id="bookkeeping: implicit kd",
-            says=IMPLICIT,
-            quantity="motion",
-            unit="rad or m",
-            before=search.explicit,
-            after=search.before,
-            remedy="run it at a second step, and look at its armatures and at its integrator",
-            covers=("motion", *COVERED, "effort"),
-        )
 
 
-def _at_start(evidence: Evidence, law: ControlLaw) -> MistakeSearch | None:
-    """Mistakes that explain the accelerations of the certificate; None: it has none."""
-    start = of_start(evidence)
-    return None if start is None else explained_start(evidence.asked.mechanism, law, start.v_rates[0])
+def _of_start(evidence: Evidence, law: ControlLaw) -> Iterator[Cause]:
+    """Mistakes that explain the accelerations of the certificate, if it has them."""
+    if (start := of_start(evidence)) is not None:
+        before, several = explained_start(evidence.asked.mechanism, law, start.v_rates[0])
+        yield from (_cause(item, before, of_run=False) for item in several[:2])
 
 
-def _of_run(evidence: Evidence, law: ControlLaw) -> MistakeSearch | None:
-    """Mistakes that explain a run; None: no motion of steps can be held against it."""
+def _of_run(evidence: Evidence, law: ControlLaw) -> MotionSearch | None:
+    """Search for mistakes that explain a run; None: no motion of steps can be held against it."""
     pair = run_and_truth(evidence)
     if pair is None or evidence.by_step or not is_motion(pair[0]):
         return None
@@ -77,7 +73,7 @@ def _of_run(evidence: Evidence, law: ControlLaw) -> MistakeSearch | None:
     if not whole or float(np.ptp(np.diff(time))) > WHOLE * every:
         return None
     q, v = placed_of(mechanism, pair[0]).of_tree()
-    return explained(mechanism, law, SeenMotion(time, q, v).until(SHOWN), step)
+    return MotionSearch(mechanism, law, SeenMotion(time, q, v).until(SHOWN), [step])
 
 
 def _in_air(mechanism: Mechanism) -> bool:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.control import EFFORT
@@ -212,6 +213,10 @@ class ControlLaw:
             targets[self._entries[0]] = action
             targets = self.pose + self.scale * targets
         return np.asarray(self.signs * targets, float)
+
+    def period(self, step: float) -> int:
+        """Number of steps [s] between two instants, at least 1. Raises InputError if it is not whole."""
+        return max(1, whole_steps(0.0, 1 / self.rate, step) + self.extra_steps)
 
     def waiting(self) -> tuple[Array, list[Array]]:
         """Action before the first instant, (n), and the targets that wait then, the next to act first."""

@@ -61,10 +61,9 @@ class Mistake:
         layer: of :data:`LAYERS`, where a record shows it; where a record lacks that, the next one that it has.
         changed: law with the mistake, for a size.
         sized: True if its size is a number to be fitted.
-        starts: sizes from which a fit begins.
+        starts: sizes from which a fit begins; a screen of mistakes tries them too.
         numbers: count of further fitted numbers.
         none: size with which nothing is wrong.
-        trials: sizes that a screen tries before a fit; empty: the usual parts of the right one.
         absent: clause that names it where its size is 0; empty: ``words`` do.
         later: True if a record may show it at the next layer, as where it lacks a part of an observation, or has an
             action before it is clipped.
@@ -78,7 +77,6 @@ class Mistake:
     starts: tuple[float, ...] = (0.95,)
     numbers: int = 0
     none: float = 1.0
-    trials: tuple[float, ...] = ()
     absent: str = ""
     later: bool = False
 
@@ -124,9 +122,8 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
             layer="acceleration",
             changed=_armed,
             sized=True,
-            starts=(1e-4, 1e-2),
+            starts=_ARMATURES,
             none=0.0,
-            trials=_ARMATURES,
         )
     yield _sized("gravity", "gravity is {size} of the right one", "acceleration", "gravity")
 
@@ -186,9 +183,8 @@ def _of_actions(law: ControlLaw) -> Iterator[Mistake]:
         layer="action",
         changed=lambda law, size: law.change(clip=size),
         sized=True,
-        starts=(0.05, 0.3, 1.0, 5.0),
+        starts=(0.05, 0.1, 0.3, 1.0, 3.0),
         none=math.inf,
-        trials=(0.1, 0.3, 1.0, 3.0),
         later=True,
     )
     for words, order in orders(law.joints):
@@ -202,7 +198,6 @@ def _of_actions(law: ControlLaw) -> Iterator[Mistake]:
         changed=lambda law, size: law.change(smoothing=size),
         sized=True,
         starts=(0.8, 0.3),
-        trials=(0.1, 0.2, 0.5, 0.8),
     )
 
 

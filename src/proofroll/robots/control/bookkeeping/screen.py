@@ -6,26 +6,23 @@ seen. So errors do not add up, the state decides what a policy observes, and hun
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import null_space
 
-from proofroll.core.engine import whole_steps
+from proofroll.core.integrators import classical_step
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import Mistake
 
-_FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried, 1 being right
+_FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried where 1 is right
 _AT_ONCE = 500  # laws that move at once: some 100 MB
 _SLOPE, _ROUNDS = 1e-3, 3  # part of a size for slopes, and rounds of a fit
-_ALONE = (-0.4, -0.2, -0.1, 0.1, 0.2, 0.4)  # values of a number that are tried [rad, m, or parts]
-_SWEEPS, _HELPS = 4, 0.7  # sweeps through these values, and the part that a sweep must leave at most
+_AT_LIMIT, _BEYOND = 0.99, 2.5  # part of the limit of an effort that is clamped; and of the least offset that does so
 # Treatments of gains: kd at the velocity before a step, or after it; or at four stages.
 Treatment = Literal["explicit", "implicit", "rk4"]
 TREATMENTS: tuple[Treatment, ...] = ("explicit", "implicit", "rk4")
@@ -58,19 +55,10 @@ class MistakeScreen:
 
     def __init__(self, mechanism: Mechanism, law: ControlLaw, q: Array, v: Array, step: float, stride: int) -> None:
         self.law, self.step, self.stride = law, step, stride
-        bare = law.change(armature=np.zeros(len(law.joints)), gravity=1.0)
-        self._robot = AirRobot(mechanism, bare)
-        weightless = AirRobot(replace(mechanism, gravity=(0.0, 0.0, 0.0)), bare)
+        self._robot = AirRobot.bare(mechanism, law)
         self._states, self._coupled = [*self._between(q, v)], bool(self._robot.equations.rank)
-        mass, inertial, weight, free = [], [], [], []
-        for state in self._states[:-1]:
-            M = self._robot.equations.inertial(self._robot.equations.tree.at(*state))[1]
-            mass.append(M)
-            inertial.append(M @ weightless.equations.solve(*state).acceleration)
-            weight.append(M @ self._robot.equations.solve(*state).acceleration - inertial[-1])
-            free.append(null_space(self._robot.equations.rows(state[0]).C) if self._coupled else np.eye(len(M)))
-        self._mass, self._inertial, self._weight = np.array(mass), np.array(inertial), np.array(weight)
-        self._free = np.array(free)  # directions that couplings allow, (steps, nv, freedoms)
+        forces = zip(*(self._robot.forces(*state) for state in self._states[:-1]), strict=True)
+        self._mass, self._inertial, self._weight, self._free = map(np.array, forces)
         self._roots = np.linalg.cholesky(self._mass[::stride])
         self._seen = v[1:]
         places = self._robot.driven
@@ -92,7 +80,7 @@ class MistakeScreen:
 
     def _acted(self, law: ControlLaw) -> list[Array]:
         """Actions at the instants of a law, which observes the motion that was seen."""
-        period = max(1, whole_steps(0.0, 1 / law.rate, self.step) + law.extra_steps)
+        period = law.period(self.step)
         key = (period, *law.observing)
         if key not in self._actions:
             answer, (last, _), actions = law.answer(), law.waiting(), []
@@ -105,7 +93,7 @@ class MistakeScreen:
 
     def _targets(self, law: ControlLaw) -> Array:
         """Targets of a law in all steps, (steps, n)."""
-        period = max(1, whole_steps(0.0, 1 / law.rate, self.step) + law.extra_steps)
+        period = law.period(self.step)
         times = law.begins + self.step * np.arange(0, len(self._states), period)
         actions = [None] * len(times) if law.policy is None else self._acted(law)
         counts, targets = law.waiting()[0], []
@@ -162,17 +150,15 @@ class MistakeScreen:
                 free = (np.abs(acting) < limit) & ~holds  # what is clamped does not follow
                 return self._solved(rows, armature + h * np.where(free, kd, 0.0), load)
 
-            acting = efforts((np.where(lag, late[0], state[0]), np.where(lag, late[1], state[1])))
-            if treatment != "rk4":
-                v = v + h * accelerated(acting)
-                q = q + h * v[..., self._at_v]
+            def rates(x: Array) -> Array:
+                q, v = x[..., : self._at_v.size], x[..., self._at_v.size :][..., self._at_v]
+                return np.concatenate([v, accelerated(efforts((q, v)))], axis=-1)
+
+            if treatment == "rk4":
+                q, v = np.split(classical_step(rates, np.concatenate([q, v], axis=-1), h), [self._at_v.size], axis=-1)
             else:
-                rates = [(state[1], accelerated(acting))]
-                for part in (h / 2, h / 2, h):
-                    moved = state[1] + part * rates[-1][1][..., self._at_v]
-                    rates.append((moved, accelerated(efforts((q + part * rates[-1][0], moved)))))
-                q = q + h / 6 * (rates[0][0] + 2 * rates[1][0] + 2 * rates[2][0] + rates[3][0])
-                v = v + h / 6 * (rates[0][1] + 2 * rates[1][1] + 2 * rates[2][1] + rates[3][1])
+                v = v + h * accelerated(efforts((np.where(lag, late[0], state[0]), np.where(lag, late[1], state[1]))))
+                q = q + h * v[..., self._at_v]
             late = state
         unexplained = np.einsum("kji,hkj->hki", self._roots, v - self._seen)
         return np.asarray(unexplained.reshape(len(laws), -1))
@@ -180,7 +166,7 @@ class MistakeScreen:
     def _instants(self, laws: Sequence[ControlLaw], rows: slice) -> tuple[Array, Array]:
         """Coordinates and rates of the driven joints at the instant before each step, of each law."""
         steps = np.arange(len(self._states) - 1)[rows]
-        periods = np.array([max(1, whole_steps(0.0, 1 / law.rate, self.step) + law.extra_steps) for law in laws])
+        periods = np.array([law.period(self.step) for law in laws])
         instants = steps // periods[:, None] * periods[:, None]
         return self._q[instants], self._v[instants][..., self._at_v]
 
@@ -207,9 +193,14 @@ class MistakeScreen:
             answer[:, k] = np.einsum("hij,hj->hi", self._inverse(M, free, kinds)[number.ravel()], load[:, k])
         return answer
 
+    @property
+    def unexplained(self) -> float:
+        """Mean square of the velocities that the law itself leaves unexplained, with the best treatment of gains."""
+        return min(float(np.square(self.left([self.law], treatment)).mean()) for treatment in TREATMENTS)
+
     def best(self, candidates: Sequence[Mistake]) -> list[Screened]:
         """Mistakes with their sizes in each treatment of gains, those that leave least first."""
-        trials = [(item, size) for item in candidates for size in (item.trials or _FACTORS if item.sized else (1.0,))]
+        trials = [(item, size) for item in candidates for size in _sizes(item)]
         laws = [item.changed(self.law, size) for item, size in trials]
         screened: list[Screened] = []
         for treatment in TREATMENTS:
@@ -239,41 +230,32 @@ class MistakeScreen:
             ]
         return fixed + sized
 
-    def numbers(self, law: Callable[[Array], ControlLaw], count: int, treatment: Treatment) -> tuple[Array, float]:
-        """Numbers of a law with which it leaves least, and what it leaves.
+    def offsets(self, treatment: Treatment) -> Array:
+        """Constant offset of each joint's target with which the efforts that moved it are the law's, (n).
 
-        Gauss-Newton, again from other values of each number alone: where an effort is clamped, slopes tell nothing.
+        Where an effort is at its limit throughout, one that keeps it there, as any larger one does.
         """
-        best = np.zeros(count), float(np.square(self.left([law(np.zeros(count))], treatment)).mean())
-        for _ in range(_SWEEPS):
-            trials = np.array([best[0]] * (count * len(_ALONE)))
-            trials[np.arange(len(trials)), np.repeat(np.arange(count), len(_ALONE))] = np.tile(_ALONE, count)
-            squares = np.square(self.left([law(values) for values in trials], treatment)).mean(axis=1)
-            squares_by_number = squares.reshape(count, -1)
-            several = np.where(
-                squares_by_number.min(axis=1) < best[1], np.array(_ALONE)[squares_by_number.argmin(axis=1)], best[0]
-            )
-            starts = [best[0], trials[int(np.argmin(squares))], several]
-            descent = min((self._descended(law, start, treatment) for start in starts), key=lambda pair: pair[1])
-            if descent[1] > _HELPS * best[1]:
-                break
-            best = descent
-        return best
+        law, every = self.law, slice(None, None, self.stride)
+        rates = np.diff(self._v[every], axis=0) / (self.stride * self.step)
+        forces = np.einsum("kij,kj->ki", self._mass[every], rates) - self._inertial[every] - self._weight[every]
+        forces[:, self._at_v] += law.armature * rates[:, self._at_v]
+        turned = np.swapaxes(self._free[every], -1, -2)
+        efforts = (np.linalg.pinv(turned[..., self._at_v]) @ (turned @ forces[..., None]))[..., 0]
+        v = self._v[every][int(treatment == "implicit") :][: len(rates), self._at_v]
+        stiff = np.where(law.kp > 0, law.kp, np.inf)
+        offsets = self._q[every][:-1] + (efforts + law.kd * v) / stiff - self._targets(law)[every]
+        free = np.abs(efforts) < _AT_LIMIT * law.limit
+        columns = zip(offsets.T, free.T, strict=True)
+        return np.array(
+            [np.median(off[mask]) if mask.any() else _BEYOND * off[np.abs(off).argmax()] for off, mask in columns]
+        )
 
-    def _descended(self, law: Callable[[Array], ControlLaw], start: Array, treatment: Treatment) -> tuple[Array, float]:
-        """Numbers of a law that leave least, and what they leave, by Gauss-Newton with halved steps."""
-        values, least, tried = start, math.inf, start
-        step = np.zeros(len(start))
-        for _ in range(2 * _ROUNDS):
-            rows = self.left([law(tried), *(law(tried + change) for change in _SLOPE * np.eye(len(start)))], treatment)
-            square = float(np.square(rows[0]).mean())
-            if square < least:
-                values, least = tried, square
-                step = -np.linalg.lstsq((rows[1:] - rows[0]).T / _SLOPE, rows[0], rcond=None)[0]
-            else:
-                step = step / 2
-            tried = values + step
-        return values, least
+
+def _sizes(mistake: Mistake) -> tuple[float, ...]:
+    """Sizes of a mistake that are tried; 1 where it has none."""
+    if not mistake.sized:
+        return (1.0,)
+    return mistake.starts + (_FACTORS if mistake.none == 1 else ())
 
 
 def _laws(law: ControlLaw, screened: Sequence[Screened], sizes: Array) -> list[ControlLaw]:

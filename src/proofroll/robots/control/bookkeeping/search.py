@@ -1,7 +1,7 @@
 """Search for the mistake of bookkeeping that explains what was seen of a robot: a layer, a start, or a motion.
 
-A motion is tried at the step of the program that is judged and with each way in which programs treat gains. Most
-mistakes are given up at the first samples.
+Motions are tried at the steps that the program may have made and with each way in which programs treat gains: those
+mistakes first that leave least in single intervals of the motion.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -20,14 +20,13 @@ from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import Mistake, SearchTime, fitted, mistakes, offsets_told
 from proofroll.robots.control.bookkeeping.screen import TREATMENTS, MistakeScreen, Screened
 from proofroll.robots.control.bookkeeping.seen import LawMotions, SeenMotion
-from proofroll.robots.control.record_layer import LayerCause
+from proofroll.robots.control.record import LayerCause
 
 _CLOSES = 0.05  # part of a distance between motions that an explanation may leave
 EXACT = 1e-3  # part of a distance that leaves nothing to explain
 _CHANGED = 1e-2  # least change of a fitted size that is no error of a step
 _ALIKE = 100.0  # explanations whose squares in the screen differ by no more are all tried
-# Part of the distance that a window has to show, and its least samples; part that a mistake may leave in it at first.
-_SHOWS, _LEAST, _NEAR = 0.2, 3, 0.4
+_NEAR = 0.7  # part of a distance that a mistake of the size in the screen may leave
 _CLOSES_AT_START = 1e-3  # part of the distance of accelerations that an explanation may leave
 _FOR_A_SIZE = 3.0  # what a fitted size must be better by
 
@@ -110,57 +109,155 @@ def largest(left: Array) -> float:
     return size if math.isfinite(size) else math.inf
 
 
-@dataclass(frozen=True)
-class MistakeSearch:
-    """Result of a search.
-
-    Attributes:
-        before: distance without a mistake, with the scheme that suits best.
-        explanations: the best first; empty if no known mistake explains what was seen, or none is needed.
-        spread: distance between two motions without a mistake, by the two schemes that differ most.
-        explicit: distance without a mistake, with kd at the velocity before a step.
-        imitated: True if the motion is that of kd at the velocity after a step h, and that of explicit kd with an
-            armature of h kd more at each joint as well, as where no effort is at its limit.
-        tried: number of mistakes that were tried.
-    """
-
-    before: float
-    explanations: Sequence[MistakeExplanation] = ()
-    spread: float = 0.0
-    explicit: float = 0.0
-    imitated: bool = False
-    tried: int = 0
-
-
-def explained(
-    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, step: float, time: SearchTime | None = None
-) -> MistakeSearch:
-    """Mistakes that explain the motion of a robot in the air.
+class MotionSearch:
+    """Search for the mistakes that explain the motion of a robot in the air.
 
     Args:
         mechanism: the robot.
         law: its controller's law as it should be.
-        seen: motion that a program says it made; its interval is a whole number of steps.
-        step: of the program [s].
+        seen: motion that a program says it made; its interval is a whole number of each step.
+        steps: possible steps of the program [s].
         time: of the search; None: as long as it needs.
 
+    Attributes:
+        before: distance without a mistake, with the step and the scheme that suit best.
+        tried: words of the mistakes that were tried.
+
     Raises:
-        InputError: the step does not divide the time between instants.
+        InputError: a step does not divide the time between instants.
     """
-    motions = LawMotions(mechanism, law, seen, step)
-    plain = {scheme: motions.distance(law, scheme) for scheme in motions.schemes}
-    scheme = min(plain, key=lambda name: plain[name])
-    distance = plain[scheme]
-    right = distance <= seen.bar
-    trial = None if right else _Trial(motions, distance, scheme, time or SearchTime())
-    return MistakeSearch(
-        before=distance,
-        explanations=() if trial is None else trial.explanations(),
-        spread=motions.spread(),
-        explicit=plain["explicit"],
-        imitated=right and motions.imitated(scheme),
-        tried=0 if trial is None else len(trial.tried),
-    )
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        law: ControlLaw,
+        seen: SeenMotion,
+        steps: Sequence[float],
+        time: SearchTime | None = None,
+    ) -> None:
+        self.law, self.seen, self.tried = law, seen, set[str]()
+        self._time = time or SearchTime()
+        self._at_steps = [LawMotions(mechanism, law, seen, step) for step in steps]
+        self.before, self._best = math.inf, (self._at_steps[0], self._at_steps[0].schemes[0])
+        for motions, scheme in ((item, scheme) for item in self._at_steps for scheme in item.schemes):
+            distance = motions.distance(law, scheme, self.before)
+            if distance < self.before:
+                self.before, self._best = distance, (motions, scheme)
+
+    @property
+    def right(self) -> bool:
+        """True if the motion needs no mistake."""
+        return self.before <= self.seen.bar
+
+    @property
+    def spread(self) -> float:
+        """Distance between two motions without a mistake, by the two schemes that differ most."""
+        return self._best[0].spread()
+
+    @property
+    def explicit(self) -> float:
+        """Distance without a mistake, with kd at the velocity before a step."""
+        return self._best[0].distance(self.law, "explicit")
+
+    @cached_property
+    def imitated(self) -> bool:
+        """True if the motion is that of kd at the velocity after a step h, and that of explicit kd with armatures.
+
+        The armature of each joint is h kd more, which moves it alike where no effort is at its limit.
+        """
+        return self.right and self._best[0].imitated(self._best[1])
+
+    @cached_property
+    def explanations(self) -> Sequence[MistakeExplanation]:
+        """Explanations at the step that suits best, the best first; empty if none is known, or none is needed."""
+        best: list[MistakeExplanation] = []
+        for motions in () if self.right else self._at_steps:
+            several = self._explained(motions)
+            best = min(best, several, key=lambda items: items[0].rank if items else math.inf)
+            if self._time.over or (best and self._settles(best[0])):
+                break
+        return best
+
+    def _settles(self, explanation: MistakeExplanation) -> bool:
+        """True if an explanation leaves nothing to explain."""
+        return explanation.after <= max(EXACT * self.before, self.seen.bar)
+
+    def _explained(self, motions: LawMotions) -> list[MistakeExplanation]:
+        """Explanations at a step, the best first; another pose is tried where a mistake leaves something to explain."""
+        law, seen = self.law, self.seen
+        screen = MistakeScreen(motions.mechanism, law, seen.q, seen.v, motions.step, motions.stride)
+        candidates = [
+            item
+            for item in mistakes(law)
+            if item.id != "rate" or _divides(motions.step, 1 / item.changed(law, 1.0).rate)
+        ]
+        several: dict[str, MistakeExplanation] = {}
+        enough = screen.unexplained
+        for item in screen.best(candidates):
+            if item.left > enough or self._time.over:
+                break
+            words = item.mistake.words
+            self.tried.add(words)
+            settled = any(map(self._settles, several.values()))  # a rival of what leaves nothing is near at once
+            trials = self._moved_alike(item, motions, _CLOSES if settled else _NEAR)
+            for explanation in (trial for trial in trials if trial.differs):
+                several[words] = min(several.get(words, explanation), explanation, key=lambda trial: trial.after)
+                if self._settles(explanation):
+                    enough = min(enough, _ALIKE * item.left)
+        if not self._time.over and not any(map(self._settles, several.values())):
+            poses = self._other_poses(motions, screen)
+            several |= {item.mistake.words: item for item in sorted(poses, key=lambda item: item.after)[:1]}
+        return sorted(several.values(), key=lambda item: item.rank / (_CLOSES if item.mistake.numbers else 1.0))
+
+    def _moved_alike(self, item: Screened, motions: LawMotions, near: float) -> Iterator[MistakeExplanation]:
+        """Explanations by a mistake, with the schemes of a treatment with which its motion comes near.
+
+        ``near``: part of the distance without a mistake that is left with the size in the screen.
+        """
+        mistake, size = item.mistake, item.size
+
+        def sized(sizes: Array) -> ControlLaw:
+            return mistake.changed(self.law, max(0.0, float(sizes[0])))
+
+        for scheme in motions.schemes_of(item.treatment):
+            distance = motions.distance(mistake.changed(self.law, size), scheme, near * self.before)
+            if math.isfinite(distance) and mistake.sized:
+                size = max(0.0, float(motions.fit(sized, np.array([size]), scheme, rounds=3)[0]))
+                distance = motions.distance(mistake.changed(self.law, size), scheme)
+            if distance <= _CLOSES * self.before:
+                yield MistakeExplanation(mistake, size, distance)
+                if distance <= self.seen.bar:
+                    break
+
+    def _other_poses(self, motions: LawMotions, screen: MistakeScreen) -> Iterator[MistakeExplanation]:
+        """Explanations by another default pose, one number for each joint."""
+        law = self.law
+        if law.policy is None and not all(isinstance(item, float) for item in law.targets):
+            return
+        moved = partial(_moved, law)
+        offsets_near = {treatment: screen.offsets(treatment) for treatment in TREATMENTS}
+        left = {name: float(np.square(screen.left([moved(near)], name)).mean()) for name, near in offsets_near.items()}
+        for treatment, near in sorted(offsets_near.items(), key=lambda item: left[item[0]]):
+            for scheme in motions.schemes_of(treatment):
+                if self._time.over:
+                    return
+                if math.isinf(motions.distance(moved(near), scheme, _NEAR * self.before)):
+                    continue
+                offsets = motions.fit(moved, near, scheme, rounds=4)
+                distance = motions.distance(moved(offsets), scheme, _CLOSES * self.before)
+                if math.isfinite(distance):
+                    told = offsets_told(law.joints, offsets, self._clamped(motions, offsets, scheme, distance))
+                    item = Mistake("pose", told, "target", partial(_moved_by, offsets), numbers=len(offsets))
+                    explanation = MistakeExplanation(item, 1.0, distance)
+                    yield explanation
+                    if self._settles(explanation):
+                        return
+
+    def _clamped(self, motions: LawMotions, offsets: Array, scheme: Scheme, distance: float) -> list[int]:
+        """Joints for which half of the offset explains a motion as well as all of it."""
+        halved = [_moved(self.law, offsets * (1 - 0.5 * row)) for row in np.eye(len(offsets))]
+        bound = max(2 * distance, self.seen.bar)
+        return [k for k, law in enumerate(halved) if math.isfinite(motions.distance(law, scheme, bound))]
 
 
 def _divides(step: float, period: float) -> bool:
@@ -168,8 +265,10 @@ def _divides(step: float, period: float) -> bool:
     return abs(period / step - round(period / step)) <= 1e-6 * period / step
 
 
-def explained_start(mechanism: Mechanism, law: ControlLaw, acceleration: Array) -> MistakeSearch:
-    """Mistakes that explain accelerations (nv) at the start of a mechanism; distances are in 1/s².
+def explained_start(
+    mechanism: Mechanism, law: ControlLaw, acceleration: Array
+) -> tuple[float, Sequence[MistakeExplanation]]:
+    """Distance from accelerations (nv) at the start of a mechanism without a mistake [1/s²], and what explains them.
 
     They tell nothing of what shows later, as targets that come late after the first.
     """
@@ -187,114 +286,7 @@ def explained_start(mechanism: Mechanism, law: ControlLaw, acceleration: Array) 
         item = MistakeExplanation(mistake, size, left)
         return item if left <= _CLOSES_AT_START * distance and item.differs else None
 
-    several, count = explanations(mistakes(law), explanation, SearchTime())
-    return MistakeSearch(distance, several, tried=count)
-
-
-class _Trial:
-    """Mistakes tried by motions of their own, those that promise most first.
-
-    Attributes:
-        motions: under laws.
-        before: distance without a mistake.
-        time: of the search.
-        screen: of mistakes.
-        window: number of the first samples in which a good part of the distance shows.
-        plain: distance in the window without a mistake.
-        tried: words of the mistakes that were tried.
-    """
-
-    def __init__(self, motions: LawMotions, distance: float, scheme: Scheme, time: SearchTime) -> None:
-        self.motions, self.before, seen, self.time = motions, distance, motions.seen, time
-        self.screen = MistakeScreen(motions.mechanism, motions.law, seen.q, seen.v, motions.step, motions.stride)
-        count = len(seen.time)
-        sizes = [float(np.abs(item).max()) for item in motions.differences(motions.law, scheme, count)]
-        shows = next((row for row, size in enumerate(sizes) if size >= _SHOWS * distance), count - 1)
-        self.window = min(count, max(_LEAST, shows + 2))
-        self.plain = max(sizes[: self.window], default=distance)
-        self.tried: set[str] = set()
-
-    def explanations(self) -> tuple[MistakeExplanation, ...]:
-        """Explanations, the best first; another pose is tried where a mistake leaves something to explain."""
-        law, step = self.motions.law, self.motions.step
-        candidates = [
-            item for item in mistakes(law) if item.id != "rate" or _divides(step, 1 / item.changed(law, 1.0).rate)
-        ]
-        several = self._of_one_number(candidates)
-        if not self.time.over and not any(map(self._settles, several)):
-            several += sorted(self._other_pose(), key=lambda item: item.after)[:1]
-        return tuple(sorted(several, key=lambda item: item.rank / (_CLOSES if item.mistake.numbers else 1.0)))
-
-    def _settles(self, explanation: MistakeExplanation) -> bool:
-        """True if an explanation leaves nothing to explain."""
-        return explanation.after <= max(EXACT * self.before, self.motions.seen.bar)
-
-    def _of_one_number(self, candidates: Sequence[Mistake]) -> list[MistakeExplanation]:
-        """Explanations by mistakes of one size or none, until nothing is left to explain."""
-        several: dict[str, MistakeExplanation] = {}
-        enough = math.inf
-        for item in self.screen.best(candidates):
-            if item.left > enough or self.time.over:
-                break
-            self.tried.add(item.mistake.words)
-            explanation = min(self._tried(item), key=lambda trial: trial.after, default=None)
-            if explanation is not None and explanation.differs:
-                rival = several.get(item.mistake.words, explanation)
-                several[item.mistake.words] = min(rival, explanation, key=lambda trial: trial.after)
-                if self._settles(explanation):
-                    enough = min(enough, _ALIKE * item.left)
-        return [*several.values()]
-
-    def _tried(self, item: Screened) -> Iterator[MistakeExplanation]:
-        """Explanations by a mistake, with the schemes of a treatment with which it comes near in the window."""
-        motions, mistake, most = self.motions, item.mistake, _NEAR * self.plain
-        near = []
-
-        def sized(sizes: Array) -> ControlLaw:
-            return mistake.changed(motions.law, max(0.0, float(sizes[0])))
-
-        for scheme in motions.schemes_of(item.treatment):
-            left = motions.left(mistake.changed(motions.law, item.size), scheme, self.window, most)
-            near += [(largest(left), scheme)] if np.isfinite(left).all() else []
-        for _, scheme in sorted(near):
-            size = item.size
-            for count in (self.window, len(motions.seen.time)) if mistake.sized else ():
-                size = max(0.0, float(motions.fit(sized, np.array([size]), scheme, count, rounds=3)[0]))
-            distance = motions.distance(mistake.changed(motions.law, size), scheme, _CLOSES * self.before)
-            if math.isfinite(distance):
-                yield MistakeExplanation(mistake, size, distance)
-                if distance <= motions.seen.bar:
-                    break
-
-    def _other_pose(self) -> Iterator[MistakeExplanation]:
-        """Explanations by another default pose, one number for each joint."""
-        motions, law = self.motions, self.motions.law
-        if law.policy is None and not all(isinstance(item, float) for item in law.targets):
-            return
-        moved = partial(_moved, law)
-        fits = [(*self.screen.numbers(moved, len(law.joints), treatment), treatment) for treatment in TREATMENTS]
-        for near, _, treatment in sorted(fits, key=lambda fit: fit[1]):
-            for scheme in motions.schemes_of(treatment):
-                if self.time.over:
-                    return
-                if math.isinf(motions.distance(moved(near), scheme, _NEAR * self.before)):
-                    continue
-                offsets = motions.fit(moved, near, scheme, len(motions.seen.time), rounds=4)
-                distance = motions.distance(moved(offsets), scheme, _CLOSES * self.before)
-                if math.isfinite(distance):
-                    told = offsets_told(law.joints, offsets, self._clamped(offsets, scheme, distance))
-                    item = Mistake("pose", told, "target", partial(_moved_by, offsets), numbers=len(offsets))
-                    explanation = MistakeExplanation(item, 1.0, distance)
-                    yield explanation
-                    if self._settles(explanation):
-                        return
-
-    def _clamped(self, offsets: Array, scheme: Scheme, distance: float) -> list[int]:
-        """Joints for which half of the offset explains a motion as well as all of it."""
-        motions, law = self.motions, self.motions.law
-        halved = [offsets * (1 - 0.5 * row) for row in np.eye(len(law.joints))]
-        bound = max(2 * distance, motions.seen.bar)
-        return [k for k, less in enumerate(halved) if math.isfinite(motions.distance(_moved(law, less), scheme, bound))]
+    return distance, explanations(mistakes(law), explanation, SearchTime())[0]
 
 
 def _moved(law: ControlLaw, offsets: Array) -> ControlLaw:

@@ -101,8 +101,9 @@ class LawMotions:
             off[place] = 2 * (q[place] * np.sign(q[place] @ self.seen.q[row][place]) - self.seen.q[row][place])
         return np.concatenate([off, _RATES * (v - self.seen.v[row])])
 
-    def differences(self, law: ControlLaw, scheme: Scheme, count: int, bound: float = math.inf) -> list[Array]:
-        """Differences at the first samples, until one exceeds the bound or the motion blows up."""
+    def differences(self, law: ControlLaw, scheme: Scheme, bound: float = math.inf) -> list[Array]:
+        """Differences at the samples, until one exceeds the bound or the motion blows up."""
+        count = len(self.seen.time)
         differences: list[Array] = []
         start = (self.seen.q[0].copy(), self.seen.v[0].copy())
         steps = steps_in_air(self.robot(law), law, start, self.step, scheme)
@@ -115,24 +116,17 @@ class LawMotions:
             pass
         return differences
 
-    def left(self, law: ControlLaw, scheme: Scheme, count: int | None = None, bound: float = math.inf) -> Array:
-        """Differences at the first ``count`` samples, by default at all, one after another; NaN beyond the bound."""
-        count = count or len(self.seen.time)
-        differences = self.differences(law, scheme, count, bound)
-        if len(differences) < count or not np.abs(differences[-1]).max() <= bound:
+    def left(self, law: ControlLaw, scheme: Scheme, bound: float = math.inf) -> Array:
+        """Differences at all samples, one after another; NaN if one exceeds the bound or is lacking."""
+        differences = self.differences(law, scheme, bound)
+        if len(differences) < len(self.seen.time) or not np.abs(differences[-1]).max() <= bound:
             return np.array(np.nan)
         return np.concatenate(differences)
 
     def spread(self) -> float:
-        """Distance between motions under the law by explicit and by implicit steps."""
-        differences_a, differences_b = (
-            np.array(self.differences(self.law, name, len(self.seen.time))) for name in _OPPOSITE
-        )
-        return (
-            float(np.abs(differences_a - differences_b).max())
-            if differences_a.shape == differences_b.shape
-            else math.inf
-        )
+        """Distance between motions under the law by explicit and by implicit steps; infinite if one blows up."""
+        apart = float(np.abs(np.subtract(*(self.left(self.law, name) for name in _OPPOSITE))).max())
+        return apart if math.isfinite(apart) else math.inf
 
     def imitated(self, scheme: Scheme) -> bool:
         """True if explicit kd with an armature of h kd more moves as implicit kd does."""
@@ -143,14 +137,14 @@ class LawMotions:
 
     def distance(self, law: ControlLaw, scheme: Scheme, bound: float = math.inf) -> float:
         """Largest difference at all samples; infinite if it exceeds the bound."""
-        largest = float(np.abs(self.left(law, scheme, bound=bound)).max())
+        largest = float(np.abs(self.left(law, scheme, bound)).max())
         return largest if math.isfinite(largest) else math.inf
 
-    def fit(self, law: Callable[[Array], ControlLaw], start: Array, scheme: Scheme, count: int, rounds: int) -> Array:
-        """Numbers of a law with which the first samples fit best."""
+    def fit(self, law: Callable[[Array], ControlLaw], start: Array, scheme: Scheme, rounds: int) -> Array:
+        """Numbers of a law with which the samples fit best."""
         scale = np.maximum(np.abs(start), _SMALL)
 
         def left(parts: Array) -> Array:
-            return self.left(law(scale * parts), scheme, count)
+            return self.left(law(scale * parts), scheme)
 
         return np.asarray(scale * least_squares_parameters(left, start / scale, 1.0, rounds))
