@@ -1,4 +1,4 @@
-"""Truth of a robot at given states, by two formulations that share nothing but the robot's data.
+"""Truth of a robot at given states, by two formulations that share nothing but the robot's data and its armatures.
 
 A, here: Jacobians in world axes of the tree of scenes, M = Σ Jᵀ I J, and h from the accelerations that remain at zero
 joint accelerations.
