@@ -63,7 +63,7 @@ def run(
     from proofroll.running.engine_questions import prepare
     from proofroll.running.idle_workers import Workers
 
-    scene = options.controlled(scene, control)
+    question, scene = scene, options.controlled(scene, control)
     if matrices:
         _show_matrices(scene, engine, options.assignments(settings), as_json)
         return
@@ -118,11 +118,21 @@ def run(
         for told in content.diagnosis:
             options.complain(f"{told.sentence}: {told.cause.remedy}")
     if as_json or done or content.final:
-        judged = f"proofroll compare {scene} --engine {shlex.quote(engine)}" if engine != "truth" else ""
+        judged = _comparison(question, engine, settings, control, until) if engine != "truth" else ""
         parts = partial(run_lines, content, forces=forces, everything=everything, checked=judged)
         options.show(content, as_json, parts, widest=WIDTH)
     if not done or content.ends is not None:
         raise typer.Exit(options.ENGINE)
+
+
+def _comparison(scene: str, engine: str, settings: list[str] | None, control: Path | None, until: float | None) -> str:
+    """Command that compares the same run with the truth."""
+    words = ["proofroll", "compare", scene, "--engine", engine]
+    for text in settings or ():
+        words += ["--set", text]
+    words += ["--control", str(control)] if control else []
+    words += ["--until", f"{until:g}"] if until is not None else []
+    return shlex.join(words)
 
 
 def _show_matrices(scene: str, engine: str, settings: dict[str, str], as_json: bool) -> None:

@@ -118,6 +118,9 @@ def test_loops_of_an_mjcf_are_told(tmp_path: Path) -> None:
     path.write_text(mjcf().replace("</mujoco>", f"<equality>{held}</equality></mujoco>"))
     found = [item for item in lint(open_robot(path), Robot("", {}, ())) if item.where == "equality"]
     assert [(item.level, item.what.partition(":")[0]) for item in found] == [("warning", "1 <connect>, 1 <weld>")]
+    idle = '<connect body1="upper" body2="lower" anchor="0 0 1" active="false"/>'
+    path.write_text(mjcf().replace("</mujoco>", f"<equality>{idle}</equality></mujoco>"))
+    assert not [item for item in lint(open_robot(path), Robot("", {}, ())) if item.where == "equality"]
 
 
 def test_trees_in_frames(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, orders
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.layers import record_layers
+from proofroll.robots.control.record import _roundings
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ROBOT = legged()
@@ -203,3 +205,21 @@ def test_on_the_ground_accelerations_are_left_out() -> None:
     assert layers[-1].residual is None
     assert "ground" in layers[-1].reason
     assert np.isfinite([layer.residual for layer in layers[:-1]]).all()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("digits", [4, 7])
+def test_digits_of_a_stream_are_rounding(digits: int) -> None:
+    """Numbers that are written with so many digits, small ones too, are known to half a unit of their last one."""
+    values = np.array([123.456789, 1.23456789e-4, -9.87654321, 0.0])
+    written = np.array([float(f"{value:.{digits}g}") for value in values])
+    bars = _roundings({"q.a": written})["q.a"]
+    assert np.all(np.abs(written - values) <= bars)
+    assert bars[[0, 2]] == pytest.approx(0.5 * 10.0 ** np.array([3.0 - digits, 1.0 - digits]), rel=1e-9)
+
+
+def test_what_no_cause_explains_is_not_called_rounding() -> None:
+    """Rows of a robot whose thighs are heavier hold in no layer of accelerations."""
+    bodies = [replace(body, mass=(1.5 if body.name.endswith("HFE") else 1.0) * body.mass) for body in ROBOT.bodies]
+    heavy = replace(ROBOT, bodies=tuple(bodies))
+    layer = record_layers(recorded(heavy, LAW, LAW, scheme="rk4"), LAW, ROBOT, grounded=False)[-1]
+    assert layer.residual is None or not layer.holds

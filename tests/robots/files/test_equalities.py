@@ -80,6 +80,16 @@ def test_the_truth_keeps_what_mujoco_holds(tmp_path: Path, text: str) -> None:
     assert np.abs(run.p_WB.to_numpy() - truth.record.p_WB).max() < 1e-4
 
 
+@pytest.mark.parametrize("flag", ["equality", "constraint"])
+def test_constraints_that_the_file_switches_off_do_not_act(tmp_path: Path, flag: str) -> None:
+    """With a flag of the file that disables them, joints that an equality would couple and loops move freely."""
+    held = '<joint joint1="h_coupler" joint2="h_crank" polycoef="0 1 0 0 0"/><connect body1="rocker" anchor="0 0 -2"/>'
+    off = f'<option><flag {flag}="disable"/></option><equality>'
+    scene = load_scene(written(tmp_path, FOUR_BAR.format(held=held).replace("<equality>", off)))
+    mechanism = scene.elements[0].mechanism  # type: ignore[attr-defined]  # of a mechanism
+    assert (mechanism.loops, mechanism.couplings) == ((), ())
+
+
 def test_a_weld_is_a_fixed_loop(tmp_path: Path) -> None:
     """A weld with a given pose holds place and orientation of two bodies as MuJoCo evaluates them."""
     weld = '<weld body1="crank" body2="rocker" relpose="0 0 0 0 0 0 0" anchor="0.1 0 0.2"/>'

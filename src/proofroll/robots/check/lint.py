@@ -124,7 +124,8 @@ def _urdf_joint(joint: Element) -> Iterator[_Noticed]:
 
 def _closed(file: RobotFile) -> Iterator[_Noticed]:
     """Constraints other than coupled joints."""
-    closing = Counter(item.tag for part in file.root.iter("equality") for item in part if item.tag != "joint")
+    parts = [item for part in file.root.iter("equality") for item in part if item.get("active") != "false"]
+    closing = Counter(item.tag for item in parts if item.tag != "joint")
     if closing:
         kinds = ", ".join(f"{number} <{tag}>" for tag, number in closing.items())
         yield (

@@ -54,6 +54,7 @@ class AirFit:
         imitated: True if the record fits kd at the velocity after a step h, and explicit kd with an armature of h kd
             more as well.
         tried: number of numbers and bodies that were tried.
+        between: True if more than rounding is left, which no cause explains and steps between the rows may.
     """
 
     off: float
@@ -61,6 +62,7 @@ class AirFit:
     causes: tuple[LayerCause, ...] = ()
     imitated: bool = False
     tried: int = 0
+    between: bool = False
 
 
 @dataclass(frozen=True)
@@ -169,9 +171,10 @@ def _judged(trials: Sequence[tuple[bool, _Rows]], law: ControlLaw, robot: AirRob
                 causes[cause.id] = cause
     named = sorted(causes.values(), key=lambda cause: cause.after)
     bar = _SAFETY * best.rounding
-    if not named:  # the steps of the program may be no rows
-        bar = max(bar, min(rows.unknown for _, rows in trials))
-    return AirFit(best.off * scale, bar * scale, tuple(named), tried=len(_NUMBERS) + len(best.added))
+    # The steps of the program may be no rows.
+    between = not named and bar < best.off <= min(rows.unknown for _, rows in trials)
+    tried = len(_NUMBERS) + len(best.added)
+    return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between)
 
 
 def _rms(values: Array) -> float:

@@ -16,7 +16,7 @@ from proofroll.elements.mechanism.run.step_limits import servo_steps
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
 from proofroll.robots.control.controlled import ControlledScenes
-from proofroll.robots.control.layers import record_layers
+from proofroll.robots.control.layers import BETWEEN, record_layers
 from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
@@ -95,7 +95,8 @@ def _found(layer: Layer) -> str:
     place = "" if layer.holds else f", most in {layer.column}"
     place += f" at {layer.time:.4g} s" if place and np.isfinite(layer.time) else ""
     remark = f"; {layer.reason}" if layer.reason else ""
-    return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{place}{remark}"
+    rounding = "" if layer.reason == BETWEEN else f", rounding {error(layer.bar)}"
+    return f"off by {error(layer.residual)}{rounding}{place}{remark}"
 
 
 def judge_record(

@@ -21,6 +21,7 @@ BASE: Mapping[str, str] = {"p_WB": "xyz", "q_WB": "wxyz", "v_WB": "xyz", "w_WB":
 OBSERVED = "observed"
 _SINGLE = 2.0**-24  # relative rounding of single precision
 _DOUBLE = 2.0**-53
+_DIGITS = 9  # decimal digits that single precision needs; a file of fewer was rounded to them
 _DECIMALS = 8  # most decimals of a file that is written with a fixed number of them
 
 
@@ -156,16 +157,29 @@ def _in_world(record: ControlRecord) -> ControlRecord:
 
 
 def _roundings(columns: Mapping[str, Array]) -> dict[str, Array]:
-    """Largest rounding error of each value: of the decimals or of the precision in which the file is written."""
+    """Largest rounding error of each value: of the decimals, digits or precision in which the file is written."""
     values = np.concatenate([*columns.values(), np.zeros(1)])
-    places = max(-int(Decimal(repr(value)).normalize().as_tuple().exponent) for value in values.tolist())
+    written = [Decimal(repr(value)).normalize().as_tuple() for value in values.tolist()]
+    places = max(-int(number.exponent) for number in written)
+    digits = max(len(number.digits) for number in written)
     with np.errstate(over="ignore"):
         single = values.astype(np.float32)
     texts = np.array([float(str(value)) for value in single])
-    if places <= _DECIMALS:
-        return {name: np.full(item.shape, 0.5 * 10.0**-places) for name, item in columns.items()}
-    relative = _SINGLE if np.all((values == single) | (values == texts)) else _DOUBLE
-    return {name: relative * np.abs(item) for name, item in columns.items()}
+    is_single = bool(np.all((values == single) | (values == texts)))
+    decimals = 0.5 * 10.0**-places if places <= _DECIMALS else 0.0
+
+    def rounding(column: Array) -> Array:
+        sizes = np.abs(column)
+        if digits < _DIGITS:
+            first = np.floor(np.log10(np.where(sizes > 0, sizes, 1.0)))
+            relative = np.where(sizes > 0, 0.5 * 10.0 ** (first - digits + 1), 0.0)
+        elif decimals:
+            relative = np.zeros(column.shape)
+        else:
+            relative = (_SINGLE if is_single else _DOUBLE) * sizes
+        return np.maximum(decimals, relative)
+
+    return {name: rounding(column) for name, column in columns.items()}
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,8 @@ def scene_actuators(
     Raises:
         InputError: there are more or fewer controls than actuators.
     """
+    if any(flag.get("actuation") == "disable" for flag in root.iter("flag")):
+        return [], []
     elements = [item for part in root.findall("actuator") for item in part]
     if controls and len(controls) != len(elements):
         advice = f"this keyframe has {counted(len(controls), 'controls')}, and the file {len(elements)} actuators"

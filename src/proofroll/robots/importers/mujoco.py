@@ -252,7 +252,8 @@ def robot_of(model: Any) -> Robot:
         further=(*further, *laws_of_tendons),
     )
     laws = {"SPRING": "stiffness", "DAMPER": "damping", "FRICTIONLOSS": "friction"}
-    return robot.with_joints(**{law: 0.0 for flag, law in laws.items() if _off(model, flag)})
+    off = {law: 0.0 for flag, law in laws.items() if _off(model, flag)}
+    return robot.with_joints(**off | ({"friction": 0.0} if _off(model, "CONSTRAINT") else {}))
 
 
 def body_of(model: Any, index: int, name: str) -> RobotBody:
@@ -310,13 +311,20 @@ def _joint(
     )  # fmt: skip
 
 
+def _equalities(model: Any) -> list[int]:
+    """Numbers of the equality constraints that act."""
+    if _off(model, "EQUALITY") or _off(model, "CONSTRAINT"):
+        return []
+    return [index for index in range(model.neq) if model.eq_active0[index]]
+
+
 def _mimics(model: Any) -> tuple[Mimic, ...]:
     """Linear couplings of joints; the comparison leaves out other constraints."""
     mimics, coupling = [], int(mujoco.mjtEq.mjEQ_JOINT)
-    for index in range(model.neq):
+    for index in _equalities(model):
         joint_1, joint_2 = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
         factors = model.eq_data[index][:5]
-        if model.eq_type[index] == coupling and joint_2 >= 0 and model.eq_active0[index] and not np.any(factors[2:]):
+        if model.eq_type[index] == coupling and joint_2 >= 0 and not np.any(factors[2:]):
             mimics.append(
                 Mimic(model.joint(joint_1).name, model.joint(joint_2).name, float(factors[1]), float(factors[0]))
             )
@@ -332,13 +340,11 @@ def _constraints(model: Any, names: Sequence[str]) -> tuple[tuple[RobotLoop, ...
     loops: list[RobotLoop] = []
     ties: list[Tie] = []
     further: list[str] = []
-    for index in range(model.neq):
+    for index in _equalities(model):
         kind, data = int(model.eq_type[index]), np.array(model.eq_data[index])
         a, b = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
         word = kinds(kind).name.removeprefix("mjEQ_").lower()
         name = model.equality(index).name or f"{word}{index}"
-        if not model.eq_active0[index]:
-            continue
         if kind in {int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)}:
             if model.eq_objtype[index] == mujoco.mjtObj.mjOBJ_SITE:
                 (a, at_a, R_a), (b, at_b, R_b) = (_site(model, site) for site in (a, b))

@@ -81,7 +81,8 @@ def causes_of(variables: Mapping[str, GivenVariable], times: FloatArray, falling
         hypotheses = (*_scaled(item), *_combined(name, variables), *(_damped(item, times) if name in falling else ()))
         for says, values in hypotheses:
             left = float(np.max(np.abs(item.values - values), initial=0.0))
-            if left <= CLOSES * item.off and name not in sentences:
+            size = float(np.max(np.abs(values), initial=0.0))  # a column of zeros is no part of the truth
+            if left <= CLOSES * min(item.off, size) and name not in sentences:
                 unit = spaced(item.unit)
                 sentences[name] = (
                     f"{name} is {says} (off by {number(item.off)}{unit}, by {number(left, 1)}{unit} with that)"
@@ -118,6 +119,9 @@ def mapping(cause: str, units: Mapping[str, str], columns: Mapping[str, str]) ->
 def _scaled(item: GivenVariable) -> Iterator[tuple[str, FloatArray]]:
     for factor, words, _ in _FACTORS.get(item.unit, (_SIGN,)):
         yield words, factor * item.true
+    if item.unit == "rad":
+        turns = np.round((item.true - item.values) / (2 * np.pi))
+        yield "less by whole turns: wrapped to one turn?", item.true - 2 * np.pi * turns
 
 
 def _combined(name: str, variables: Mapping[str, GivenVariable]) -> Iterator[tuple[str, FloatArray]]:

@@ -34,10 +34,11 @@ def said(one: Any, two: Any, unit: str = "rad") -> list[str]:
         (ONE * 180 / np.pi, TWO, "q.a is 57.3 times the truth: degrees?"),
         (-ONE, TWO, "q.a is the opposite of the truth: its sign?"),
         (ONE, ONE + TWO, "q.b is its sum with q.a: an absolute angle"),
+        (ONE - 2 * np.pi * (ONE > 0.8), TWO, "q.a is less by whole turns: wrapped to one turn?"),
         (TWO, ONE, "q.a and q.b are each the other: swapped columns?"),
         (ONE + 0.2 * np.exp(-TIMES), TWO, "the first row is not the scene's start: q.a 0.5 instead of 0.3 rad"),
     ],
-    ids=["degrees", "sign", "absolute", "swapped", "start"],
+    ids=["degrees", "sign", "absolute", "wrapped", "swapped", "start"],
 )
 def test_a_mistake_is_named_alone(one: Any, two: Any, words: str) -> None:
     """One clause, with the difference that it closes."""
@@ -49,6 +50,12 @@ def test_a_motion_that_differs_otherwise_has_no_cause() -> None:
     """A wrong amplitude, a slow clock of one coordinate and the truth itself are no mistake of this kind."""
     for one in (1.1 * (ONE - 0.3) + 0.3, np.sin(3 * TIMES - 0.3 * TIMES) + 0.3, ONE):
         assert said(one, TWO) == []
+
+
+@pytest.mark.parametrize("unit", ["rad", "m"])
+def test_a_column_of_zeros_is_no_other_unit(unit: str) -> None:
+    """A column of zeros lies near a small part of the truth, and is told neither as degrees nor as millimetres."""
+    assert [cause for cause in said(0 * ONE, TWO, unit) if cause.startswith("q.a is")] == []
 
 
 def test_round_off_has_no_cause() -> None:

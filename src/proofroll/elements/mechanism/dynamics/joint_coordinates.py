@@ -135,7 +135,7 @@ class JointCoordinates:
         if not rank:
             return Solution(
                 acceleration=into @ free,
-                multipliers=np.zeros(0),
+                multipliers=np.zeros(len(rows.residual)),
                 motion=motion,
                 rows=rows,
                 split=None,

@@ -268,7 +268,7 @@ class MujocoMechanism(SteppedModel):
                 continue
             for point in range(2):
                 equality = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_EQUALITY, f"loop{number}.{point}")
-                if equality < 0:
+                if equality not in rows:  # MuJoCo leaves out rows without a part along any velocity
                     continue
                 on_b = -data.efc_force[rows[equality] : rows[equality] + 3]  # it acts on the first site's body
                 force[count + number] += on_b

@@ -307,7 +307,7 @@ class DependentCoordinates:
             forces -= self.applied.pulls(bodies)
         ends = self.connections.ends(bodies)
         force, torque = np.zeros((2, len(ends.d), 3))
-        if self.loop_rows:
+        if self.loop_rows and solved.multipliers.size:  # there are none where loops take no freedom
             rows = self._loop_rows.at(self.connections.ends(bodies, self._loops_at))
             of_loops = solved.multipliers[: self.loop_rows, None]
             np.add.at(force, self._joints + self._loop_rows.owner, of_loops * rows.force)
