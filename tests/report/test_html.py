@@ -81,7 +81,18 @@ def test_json_file_is_the_content_and_has_no_nan(written: tuple[dict[str, Any], 
 
     content, out = written
     assert json.loads((out / "report.json").read_text(encoding="utf-8"), parse_constant=refuse) == content
-    parts = {"findings", "comparisons", "replay", "figures", "regimes", "tradeoffs", "stability", "awaited", "left_out"}
+    parts = {
+        "answers",
+        "findings",
+        "comparisons",
+        "replay",
+        "figures",
+        "regimes",
+        "tradeoffs",
+        "stability",
+        "awaited",
+        "left_out",
+    }
     assert set(content) == {*parts, "engine_findings", "environment", "date", "format", "table", "names", "provides"}
     assert content["environment"]["command"] == COMMAND
     assert len(content["comparisons"][0]["truths"]) == 2

@@ -39,7 +39,7 @@ def off(row: ReportedRow, verdict: Verdict, error: float, **changes: Any) -> dic
     """Changes of a row: its quantity z has this verdict and error, a millimetre is allowed."""
     item = dataclasses.replace(row.observables["z"], verdict=verdict, error=error, tolerance=1e-3, **changes)
     verdicts = dict.fromkeys(row.verdicts, 0) | {verdict: 2}
-    return {"verdict": verdict, "verdicts": verdicts, "observables": {"z": item}}
+    return {"verdict": verdict, "verdicts": verdicts, "observables": {"z": item}, "worst": "z"}
 
 
 def test_the_answer_comes_first(content: ReportedComparison) -> None:

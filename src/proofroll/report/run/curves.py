@@ -125,7 +125,13 @@ def _panel(title: str, times: FloatArray, run: FloatArray, true: FloatArray | No
         y = _HEIGHT * (top - values[shown]) / (top - bottom)
         return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
 
-    return CurvePanel(title, number(low, 3), number(high, 3), line(run), "" if true is None else line(true))
+    return CurvePanel(
+        title=title,
+        low=number(low, 3),
+        high=number(high, 3),
+        run=line(run),
+        true="" if true is None else line(true),
+    )
 
 
 def _peaks(values: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

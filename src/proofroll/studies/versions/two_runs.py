@@ -33,7 +33,7 @@ class TwoRuns:
         old, new: paths of the runs.
         scene: of both.
         instants: number of instants at which both have samples.
-        about: what was asked for and differs, as ``settings.dt`` -> both values, None where a run has none.
+        about: engine, settings, parameters, versions that differ, as ``settings.dt`` -> both values, None where a run has none.
         numbers: observables that differ, the largest difference first.
         events: number of events of each run.
         event_time: largest difference of the times of events in the same order [s]; None if kinds or numbers differ.
@@ -69,7 +69,7 @@ class TwoRuns:
 
     @property
     def lines(self) -> Iterator[str]:
-        """What was asked for and differs, events, and the further quantities, a line each."""
+        """Differences of what was asked for, of events and of quantities, a line each."""
         for name, (old, new) in self.about.items():
             yield f"{name}: {'–' if old is None else old} → {'–' if new is None else new}"
         if self.event_time is None:
@@ -137,7 +137,7 @@ def _object(data: xr.Dataset, name: str) -> Mapping[str, Any]:
 
 
 def _about(data: xr.Dataset, new_data: xr.Dataset) -> dict[str, tuple[Any, Any]]:
-    """What was asked for and differs, by name; settings and versions of one engine alone."""
+    """Differences of what was asked for, by name; settings and versions of one engine alone."""
     one_engine = data.attrs.get("engine") == new_data.attrs.get("engine")
     objects = ("parameters", "settings", "versions") if one_engine else ("parameters",)
     values = [
