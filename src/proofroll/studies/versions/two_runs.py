@@ -33,7 +33,7 @@ class TwoRuns:
         old, new: paths of the runs.
         scene: of both.
         instants: number of instants at which both have samples.
-        about: engine, settings, parameters, versions that differ, as ``settings.dt`` -> both values, None where a run has none.
+        about: engine, settings, parameters and versions that differ, as ``settings.dt`` -> both values, or None.
         numbers: observables that differ, the largest difference first.
         events: number of events of each run.
         event_time: largest difference of the times of events in the same order [s]; None if kinds or numbers differ.
