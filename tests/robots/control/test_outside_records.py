@@ -37,8 +37,9 @@ QUICK = {
     ("mujoco", "3", "damping"),
     ("pinocchio", "3", "dry friction"),
 }
+_DRILL = (pytest.mark.drill, pytest.mark.slow)
 ALL = [
-    pytest.param(*case, marks=() if case in QUICK else (pytest.mark.drill, pytest.mark.slow))
+    pytest.param(*case, marks=() if case in QUICK else (*_DRILL, pytest.mark.nightly) if case[1] else _DRILL)
     for case in ((program, digits, name) for program in PROGRAMS for digits in ("", "single", "3") for name in MISTAKES)
     if case[1] != "3" or case[2] not in FINE
 ]
