@@ -68,6 +68,7 @@ def test_events_of_two_engines_are_compared(proofroll: Proofroll, run: Callable[
         ("run.nc", "report.json", "new = 'report.json': is of another kind than {run}; name two reports or two runs"),
         ("run.nc", "{ball}", "is a run of bouncing_ball, and {run} one of pendulum; name two runs of one scene"),
         ("run.nc", "absent.nc", "new = 'absent.nc': cannot be read as a run:"),
+        ("run.csv", "run.nc", "run = 'run.csv': names no scene; write it as .nc or .npz, or judge it"),
         ("absent", "run", "old = 'absent': cannot be read: No such file"),
         ("mujoco@1", "exudyn@1", "new = 'exudyn@1': is no version of mujoco; name two of one engine"),
     ],

@@ -24,7 +24,7 @@ def diff(
     cases, as `proofroll versions` does, which has more options.
     """
     from proofroll.core.plugins import place_of, plain_name
-    from proofroll.files.trajectory_file import NETCDF, STORED
+    from proofroll.files.trajectory_file import CSV, NETCDF, STORED
     from proofroll.report.changes import EarlierReport
     from proofroll.report.terminal.screen import WIDTH
 
@@ -38,6 +38,9 @@ def diff(
             raise InputError("--comment", comment, "it is for reports and runs; versions have a page of their own")
         versions(engine, place_of(old) or engine, place_of(new) or engine, as_json=as_json)
     are_runs = [Path(text).suffix in (NETCDF, STORED) for text in (old, new)]
+    for text in (old, new):
+        if Path(text).suffix == CSV:
+            raise InputError("run", text, f"names no scene; write it as {NETCDF} or {STORED}, or judge it")
     if any(are_runs) != all(are_runs):
         raise InputError("new", new, f"is of another kind than {old}; name two reports or two runs")
     if comment is not None:

@@ -68,13 +68,13 @@ def breaches(folder: Path, point: ComparedPoint, name: str, relation: Relation, 
     if point.result.status is not Status.DONE or reference is None or reference.ended or reference.ill_posed:
         return
     tables = tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8"))
-    changed = deepcopy(tables)
+    partner_tables = deepcopy(tables)
     try:
-        relation.change(changed, reference.dataset)
+        relation.change(partner_tables, reference.dataset)
     except LookupError:
         return
     place = folder / name.replace(" ", "_")
-    write_scene(place, changed)
+    write_scene(place, partner_tables)
 
     def breach(quantity: str, size: float, message: str) -> Surprise:
         return Surprise(SurpriseKind(TRUTH, f"{RELATION}{name}", quantity), size, message)
@@ -89,8 +89,8 @@ def breaches(folder: Path, point: ComparedPoint, name: str, relation: Relation, 
         scene.fully_asked,
         (),
         point.case.engine,
-        changed["duration"],
-        changed["every"],
+        partner_tables["duration"],
+        partner_tables["every"],
         time_limit=point.case.time_limit,
     )
     result = runner.run([case])[case.key]
@@ -108,7 +108,7 @@ def _worst(
     reference: Reference, partner: xr.Dataset, values: Mapping[str, Any], breach: Callable[[str, float, str], Surprise]
 ) -> Iterator[Surprise]:
     """Breach of the variable that differs by the most error bars, if it differs by too many."""
-    found: list[tuple[float, str, str]] = []
+    broken: list[tuple[float, str, str]] = []
     for name, curve in values.items():
         if name not in reference.dataset or (reference.events and name.startswith("v")):
             continue  # a speed jumps at an event, and a sample may be on either side
@@ -121,9 +121,9 @@ def _worst(
             index = np.unravel_index(np.argmax(difference), difference.shape)[0]
             time, unit = reference.dataset["time"].to_numpy()[index], variable.attrs.get("units", "")
             words = f"{name} is off by {difference.max():.3g} {unit} at {time:.6g} s, {difference.max() / bar:.2g} bars"
-            found.append((math.log10(difference.max() / allowed), name.partition(".")[0], words))
-    if found:
-        size, quantity, words = max(found)
+            broken.append((math.log10(difference.max() / allowed), name.partition(".")[0], words))
+    if broken:
+        size, quantity, words = max(broken)
         yield breach(quantity, size, words)
 
 

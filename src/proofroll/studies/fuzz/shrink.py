@@ -260,11 +260,11 @@ def _rows(tables: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
                 yield f"{table}.{row['name']}", row
 
 
-def _difference(tables: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+def _difference(tables: Mapping[str, Any], rival: Mapping[str, Any]) -> str:
     """Clause on the difference of another scene, e.g. ``joints.joi1.v0 = 3 instead of -3``."""
     former = dict(_rows(tables))
     clauses = []
-    for name, row in _rows(other):
+    for name, row in _rows(rival):
         for key, value in row.items():
             former_value = former.get(name, {}).get(key)
             if value != former_value:

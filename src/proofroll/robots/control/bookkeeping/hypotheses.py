@@ -57,8 +57,8 @@ def of_bookkeeping(evidence: Evidence) -> Iterator[Cause]:
 def _of_start(evidence: Evidence, law: ControlLaw) -> Iterator[Cause]:
     """Mistakes that explain the accelerations of the certificate, if it has them."""
     if (start := of_start(evidence)) is not None:
-        before, several = explained_start(evidence.asked.mechanism, law, start.v_rates[0])
-        yield from (_cause(item, before, of_run=False) for item in several[:2])
+        difference, explanations = explained_start(evidence.asked.mechanism, law, start.v_rates[0])
+        yield from (_cause(item, difference, of_run=False) for item in explanations[:2])
 
 
 def _of_run(evidence: Evidence, law: ControlLaw) -> MotionSearch | None:
