@@ -136,8 +136,8 @@ def new_cluster(scheduler: str | None) -> Cluster | None:
 def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
     """Context manager with a progress bar on standard error.
 
-    It yields a function to be called with a description and, if not 1, a count. If standard error is no terminal, or
-    nothing may move there, it prints a line every few seconds instead.
+    It yields a function to be called with a description and, if not 1, a count, and a total that has changed. If
+    standard error is no terminal, or nothing may move there, it prints a line every few seconds instead.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TextColumn, TimeElapsedColumn
     from rich.text import Text
@@ -156,7 +156,9 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
             return f"{now.description}: {now.completed:g}{'' if now.total is None else f' of {now.total:g}'}"
 
         with nullcontext() if moves else _now_and_then(line):
-            yield lambda description, count=1: progress.update(task, advance=count, description=description)
+            yield lambda description, count=1, total=None: progress.update(
+                task, advance=count, description=description, total=total
+            )
 
 
 @contextmanager

@@ -133,4 +133,8 @@ def measure(
 
     seconds = extent.budget or (None if claims or extent.engines or runner.cluster else BUDGET)
     with options.progress_bar("runs and timings") as advance:
-        return make_tradeoff(question, runner, out, replace(extent, budget=seconds), claims, advance)
+
+        def tell(text: str, total: int) -> None:
+            advance(text, total=total)
+
+        return make_tradeoff(question, runner, out, replace(extent, budget=seconds), claims, tell)

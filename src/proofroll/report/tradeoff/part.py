@@ -99,7 +99,7 @@ class TradeoffPart(Part):
             out,
             Extent(self.engines, brief=True),
             self.asked,
-            progress=lambda text: tell(text, 1),
+            progress=lambda text, _: tell(text, 1),
         )
 
     @override

@@ -1,7 +1,7 @@
 """Summary of a trade-off for storage: points, error budgets, Pareto fronts and conclusions."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,15 @@ from proofroll.studies.tradeoff.records import (
     TruthCost,
 )
 from proofroll.studies.tradeoff.sweep import BROKEN, too_long
-from proofroll.studies.tradeoff.tradeoff import BRIEF_LONGEST, Extent, Tradeoff, pareto_entries, study_path, tradeoff
+from proofroll.studies.tradeoff.tradeoff import (
+    BRIEF_LONGEST,
+    Extent,
+    Progress,
+    Tradeoff,
+    pareto_entries,
+    study_path,
+    tradeoff,
+)
 
 
 def make_tradeoff(
@@ -41,7 +49,7 @@ def make_tradeoff(
     folder: Path,
     extent: Extent,
     claims: TradeoffClaims | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[TradeoffStudy, Path]:
     """Measures a trade-off (:func:`tradeoff`), and stores it with all its timings in pyperf's format.
 
@@ -53,7 +61,7 @@ def make_tradeoff(
         folder: of all results.
         extent: engines, range of parameters, and thoroughness.
         claims: of a file, or None.
-        progress: called with short texts.
+        progress: see :class:`~proofroll.studies.tradeoff.tradeoff.StudyProgress`.
 
     Returns:
         The study with its judged claims, and its file.

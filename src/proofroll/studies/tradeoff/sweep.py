@@ -116,6 +116,7 @@ def sweep(
     gain: float = GAIN,
     budget: TimeBudget | None = None,
     longest: float | None = None,
+    announce: Callable[[int], None] = lambda _: None,
 ) -> dict[float, Reference]:
     """Fills the curves with points, and returns sampling interval [s] -> truth.
 
@@ -132,6 +133,7 @@ def sweep(
         gain: see above.
         budget: processor time of all runs, or None.
         longest: processor time of a run but the first two of its curve [s], or None.
+        announce: called with the number of runs that are asked next, before they begin.
     """
     references: dict[float, Reference] = {}
     for is_first in (True, False, False, False):
@@ -144,7 +146,7 @@ def sweep(
         ]
         if not asked:
             break
-        _run(question, asked, runner, references, progress, budget, longest)
+        _run(question, asked, runner, references, progress, budget, longest, announce)
         for curve in curves:
             curve.points.sort(key=lambda point: -(point.step or 0.0))
     return references
@@ -204,6 +206,7 @@ def _run(
     progress: Progress | None,
     budget: TimeBudget | None,
     longest: float | None,
+    announce: Callable[[int], None],
 ) -> None:
     """Runs curves with these steps or tolerances, and the truths that are still missing."""
     options: list[tuple[str, dict[str, Any]]] = []
@@ -223,6 +226,7 @@ def _run(
             curve.dropped[value] = str(error)
     runs = [case for _, both in cases for case in both]
     pending = [] if references else [question.truth(truth_facts, runs)]
+    announce(len(pending) + len(runs))
     for stage in _stages(cases) if budget or longest else [cases]:
         kept = [(curve, both) for curve, both in stage if _affordable(curve, both[0], budget, longest, len(stage))]
         cases_now = [*pending, *(case for _, both in kept for case in both)]

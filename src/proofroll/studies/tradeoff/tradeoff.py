@@ -105,7 +105,33 @@ class Tradeoff:
         return [name for name in self.reference.curves if self.reference.scene.observables[name].asked_for]
 
 
-Progress = Callable[[str], None]
+Progress = Callable[[str, int], None]
+
+
+@dataclass
+class StudyProgress:
+    """Progress of a study whose runs decide which runs follow.
+
+    Attributes:
+        tell: called after each run and each measurement with a short text, and the number of both that are known by now
+            to be asked in the whole study.
+        total: that number.
+    """
+
+    tell: Progress
+    total: int = 0
+
+    def announce(self, count: int) -> None:
+        """Adds runs or measurements that are asked next."""
+        self.total += count
+
+    def arrived(self, case: Case, _: Result) -> None:
+        """Tells that a run has ended."""
+        self.tell(case.engine.name, self.total)
+
+    def timed(self, case: Case) -> None:
+        """Tells that a measurement has ended."""
+        self.tell(f"timing {case.engine.name}", self.total)
 
 
 def tradeoff(question: Question, runner: Runner, extent: Extent, progress: Progress | None = None) -> Tradeoff:
@@ -115,7 +141,7 @@ def tradeoff(question: Question, runner: Runner, extent: Extent, progress: Progr
         question: the scene, the length of runs, and the quantity that decides how far each curve goes.
         runner: runs the cases.
         extent: engines, range of parameters, and thoroughness.
-        progress: called with a short text after every run and every measurement.
+        progress: called after every run and every measurement, see :class:`StudyProgress`.
 
     Raises:
         InputError: an unknown scene, parameter, quantity or engine.
@@ -128,19 +154,15 @@ def tradeoff(question: Question, runner: Runner, extent: Extent, progress: Progr
     if not curves:
         raise Missing("there is no engine to measure: " + "; ".join(f"{name}: {why}" for name, why in absent.items()))
     question = question.sampled_for(curves)
-    tell = progress or (lambda _: None)
-
-    def arrived(case: Case, _: Result) -> None:
-        tell(case.engine.name)
-
+    told = StudyProgress(progress or (lambda *_: None))
     finer, gain = (partial(_briefly, extent.claimed), BRIEF_GAIN) if extent.is_brief else (lambda _: FINER, GAIN)
     longest = BRIEF_LONGEST if extent.is_brief else None
-    references = sweep(question, curves, runner, arrived, finer, gain, limit, longest)
+    references = sweep(question, curves, runner, told.arrived, finer, gain, limit, longest, told.announce)
     study = Tradeoff(question=question, curves=curves, absent=absent, references=references, extent=extent)
     _, truth = resolve_with_truth([], runner.workers)
-    _time(study, question.case(truth, question.every), runner.workers, tell, limit)
+    _time(study, question.case(truth, question.every), runner.workers, told, limit)
     if extent.over:
-        _check(study, truth, runner, arrived)
+        _check(study, truth, runner, told)
     return study
 
 
@@ -150,18 +172,20 @@ def _briefly(claimed: Sequence[str], curve: Curve) -> list[float]:
     return [part for part in FINER if part >= (BRIEF_CLAIMED if named else BRIEF_FINER)]
 
 
-def _time(tradeoff: Tradeoff, truth: Case, workers: Workers, tell: Progress, budget: TimeBudget | None) -> None:
+def _time(tradeoff: Tradeoff, truth: Case, workers: Workers, told: StudyProgress, budget: TimeBudget | None) -> None:
     """Measures the speed of every point that reached the end, and of the truth."""
     cases = {point.case.key: point.case for point in tradeoff.points if point.result.status == Status.DONE}
     cases[truth.key] = truth
     rounds, brief = tradeoff.extent.rounds, tradeoff.extent.is_brief
+    rounds = min(rounds, BRIEF_ROUNDS) if brief else rounds
     seconds = BRIEF_SECONDS if brief else None
+    told.announce(len(cases) * (rounds + 1))
     with Stopwatch(workers) as stopwatch:
         timings = time_in_rounds(
             {key: partial(stopwatch, case, seconds) for key, case in cases.items()},
-            min(rounds, BRIEF_ROUNDS) if brief else rounds,
+            rounds,
             once_above=BRIEF_ONCE if brief else ONCE,
-            progress=lambda key: tell(f"timing {cases[key].engine.name}"),
+            progress=lambda key: told.timed(cases[key]),
             enough=lambda: budget is not None and not budget.left,
         )
     tradeoff.truth_timing = timings.get(truth.key)
@@ -169,7 +193,7 @@ def _time(tradeoff: Tradeoff, truth: Case, workers: Workers, tell: Progress, bud
         point.timing = timings.get(point.case.key)
 
 
-def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, arrived: Callable[[Case, Result], None]) -> None:
+def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, told: StudyProgress) -> None:
     """Runs the best points at every corner of the range.
 
     These are the points on the Pareto front of each formulation, for each quantity: a question about one kind of model
@@ -192,7 +216,8 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, arrived: Call
         true = question.truth(truth, [case for both in runs.values() for case in both])
         asked.append((corner, question, true, runs))
     cases = [case for _, _, true, runs in asked for case in (true, *itertools.chain(*runs.values()))]
-    results = runner.run(cases, arrived)
+    told.announce(len(cases))
+    results = runner.run(cases, told.arrived)
     corners: dict[str, list[Corner]] = {key: [] for key in chosen}
     for corner, question, true, runs in asked:
         if results[true.key].status != Status.DONE:

@@ -368,10 +368,11 @@ class ContactBodies(ContactStretches):
         if not size_f:
             return np.inf
         if acting.kind == "stick":
+            if not np.isfinite(mu):
+                return normal / size_f
             force = solution.force[k]
             friction = float(np.linalg.norm(force - touch.normal * (touch.normal @ force)))
-            most = bound or self.equations.static[k] * normal
-            return min(normal, most - friction if np.isfinite(mu) else np.inf) / size_f
+            return min(normal, (bound or self.equations.static[k] * normal) - friction) / size_f
         if not at_rest or not (mu or bound):
             return normal / size_f
         assert acting.heading is not None  # known by now

@@ -237,3 +237,21 @@ def test_a_coarser_truth_is_that_of_fewer_samples() -> None:
     coarse = question.reference(fine, 0.1)
     assert np.array_equal(coarse.dataset["p_WB"], fine["p_WB"][::10])
     assert BETWEEN not in coarse.dataset.dims
+
+
+@pytest.mark.drill
+def test_runs_are_announced_before_they_end(tmp_path: Path) -> None:
+    """A sweep announces each run before it ends, and no others: what has ended is never more than the total."""
+    curves, _ = curves_of(["projection[formulation=rotating_frame,preset=default]"])
+    total, totals = 0, []
+
+    def announce(count: int) -> None:
+        nonlocal total
+        total += count
+
+    def arrived(_: Case, __: Result) -> None:
+        totals.append(total)
+
+    sweep(QUESTION, curves, Runner(Store(tmp_path), jobs=1), arrived, announce=announce)
+    assert len(totals) == total
+    assert all(known >= ended for ended, known in enumerate(totals, 1))

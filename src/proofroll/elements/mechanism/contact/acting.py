@@ -88,11 +88,11 @@ def forbidding_rows(mode: ContactMode, touching: Sequence[Touching], J: Array, p
 def heading_of(acting: Acting, touch: Touching) -> Array:
     """Unit direction of a slip, shape (3,); friction acts against it.
 
-    Of a slip in the plane below FAINT it is the first one, unless the surface has turned since.
+    Of a slip in the plane that round-off would turn it is the first one, unless the surface has turned since.
     """
     slip = slip_velocity(touch)
     speed = float(np.linalg.norm(slip))
-    if acting.along is None and not acting.leads and speed > FAINT / 2:
+    if acting.along is None and not acting.leads and speed > 5 * REST:
         return np.asarray(slip / speed)
     heading = np.array(acting.heading if acting.along is None else acting.along)
     heading = heading - touch.normal * (touch.normal @ heading)
