@@ -11,12 +11,13 @@ from pathlib import Path
 import pytest
 
 from proofroll.core import plugins
-from proofroll.elements.balls import kind, reader
+from proofroll.elements.balls import reader
 from proofroll.elements.balls.surfaces import surface_kinds
 from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball import kind
 
 PLUGINS = Path(__file__).parent / "plugins"
 Proofroll = Callable[..., tuple[int, str, str]]

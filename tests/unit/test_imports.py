@@ -296,14 +296,14 @@ def test_no_engine_knows_what_is_added_to_it(engine: str) -> None:
 
 
 def test_only_their_reader_knows_balls_on_surfaces() -> None:
-    """Of the elements nobody but the vocabulary, which lists its tables, imports the reader of balls on surfaces."""
+    """Nobody imports the reader of balls on surfaces but their kind, the article and the list of the vocabulary."""
     knowing = {
         file.relative_to(ROOT).parts[0] + "/" + file.stem
         for file in ROOT.rglob("*.py")
         for _, name in _imported(file)
         if name.startswith("proofroll.elements.balls") and ROOT / "elements" / "balls" not in file.parents
     }
-    assert knowing == {"papers/cylinder", "vocabulary/document"}
+    assert knowing == {"papers/cylinder", "papers/kind", "vocabulary/document"}
 
 
 def test_no_folders_of_studies_import_each_other() -> None:

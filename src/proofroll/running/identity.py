@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import proofroll
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError
 from proofroll.core.formulations import added_by
-from proofroll.core.plugins import place_of
+from proofroll.core.plugins import ELEMENTS, place_of
 from proofroll.core.source_code import OWN, hash_of, package_of, with_imports
 from proofroll.core.truth import load_truths
 from proofroll.files.json_data import plain
@@ -133,7 +134,14 @@ def digest(sources: Iterable[Path]) -> str:
 
     Code that only shows results (:data:`ASIDE`) is left out.
     """
-    return hash_of([*(OWN / name for name in FOUNDATION), *sources], ASIDE)
+    return hash_of([*(OWN / name for name in FOUNDATION), *_folders_of_elements(), *sources], ASIDE)
+
+
+def _folders_of_elements() -> list[Path]:
+    """Folders of this package outside the foundation that hold kinds of elements, sorted."""
+    modules = [point.value.partition(":")[0].split(".") for point in announced(ELEMENTS)]
+    inside = [names for names in modules if names[0] == OWN.name and names[1] not in FOUNDATION]
+    return sorted({OWN.joinpath(*names[1:-1]) for names in inside})
 
 
 def _code_of(*kinds: Any) -> str:

@@ -9,10 +9,11 @@ import numpy as np
 
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.balls.reader import PlacedBall, ball_as_body
+from proofroll.elements.balls.reader import PlacedBall
 from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.elements.mechanism.scene.balls import InitialMotion
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.kind import ball_element
 
 
 def placed(scene: Scene) -> PlacedBall:
@@ -39,5 +40,5 @@ def gravity_of(scene: Scene) -> Gravity:
 
 def scene_with(scene: Scene, gravity: Gravity | None = None, **parts: Any) -> Scene:
     """Copy of a scene with another ``ball``, ``surface``, ``contact``, ``start`` or ``gravity``."""
-    element = ball_as_body(placed(scene)._replace(**parts), gravity or gravity_of(scene), "scene")
+    element = ball_element(placed(scene)._replace(**parts), gravity or gravity_of(scene), "scene")
     return dataclasses.replace(scene, elements=(element,))

@@ -16,12 +16,12 @@ from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
-from proofroll.elements.balls.kind import BallOnSurfaceKind
 from proofroll.files import scene_file
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
 from proofroll.files.toml import read_toml
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
+from proofroll.papers.blajer_2006.ball.kind import BallOnSurfaceKind
 
 CYLINDER = "sphere_in_cylinder"
 

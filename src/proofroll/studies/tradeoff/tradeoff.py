@@ -113,9 +113,8 @@ class StudyProgress:
     """Progress of a study whose runs decide which runs follow.
 
     Attributes:
-        tell: called after each run and each measurement with a short text, and the number of both that are known by now
-            to be asked in the whole study.
-        total: that number.
+        tell: called after each run and each measurement with a short text and the total.
+        total: number of runs and measurements of the whole study, as far as they are known by now.
     """
 
     tell: Progress

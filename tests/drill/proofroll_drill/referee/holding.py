@@ -12,12 +12,13 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.events import JUMPS, events_of
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.balls.reader import PlacedBall, ball_as_body
+from proofroll.elements.balls.reader import PlacedBall
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.run.assembly import check_start
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.papers.blajer_2006.ball.kind import ball_element
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.smooth_truth import find_truth
 from proofroll.truth.switched_truth import truth_of
@@ -128,7 +129,7 @@ def hold_ball(seed: int, until: float = UNTIL_OF_BALLS) -> Held:
 def as_body(element: RandomBall) -> Scene:
     """Scene of a ball as a body with a sphere that touches a wall."""
     placed = PlacedBall(element.ball, element.surface, element.contact, element.start)
-    return Scene("random_ball", "", (ball_as_body(placed, element.gravity, "random"),))
+    return Scene("random_ball", "", (ball_element(placed, element.gravity, "random"),))
 
 
 def hold_contacts(seed: int) -> Held:

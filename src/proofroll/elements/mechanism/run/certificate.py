@@ -35,25 +35,12 @@ _COMPOSED = "composed along the tree by the engine's own arithmetic"
 _MARGIN = 10.0
 _NOISY = "round-off of the scene's own accelerations, which many bodies in a row magnify"
 _FORCES = ("forces", "torques", "couplings", "drives", "forces of contact")
-_FROM_ACCELERATIONS = ("acceleration", "angular acceleration", *_FORCES)
+FROM_ACCELERATIONS = ("acceleration", "angular acceleration", *_FORCES)
 # Quantities that a model may soften -> largest relative difference that is accepted for any reason, and why.
 CAPS: Mapping[str, Regularised] = {
     # with a tolerance of 1, a mechanism that does not set off at all would pass
     name: Regularised(0.5, "a loop that is held by a stiff spring pulls in proportion to its opening")
-    for name in _FROM_ACCELERATIONS
-}
-_DEEP = "a ball that is sunk in by its radius has its centre in the wall"
-_LEVER = "a soft contact rolls about a point midway in its depth, and the depth is at most the radius"
-# Further quantities that a model of a ball that rolls evenly may soften.
-ROLLING_CAPS: Mapping[str, Regularised] = {
-    **CAPS,
-    **dict.fromkeys(
-        (*_FROM_ACCELERATIONS,), Regularised(1.0, "a contact that is not loaded yet lacks the whole force")
-    ),
-    **dict.fromkeys(("gaps", "position", "places of contact"), Regularised(1.0, _DEEP)),
-    **dict.fromkeys(("spin", "velocity"), Regularised(0.5, _LEVER)),
-    "rolling resistance": Regularised(1e-6, "its moment is read back through a normal force, which a solver finds"),
-    "inverse friction": Regularised(float("inf"), "a finite number stands for unbounded friction"),
+    for name in FROM_ACCELERATIONS
 }
 # Quantities with a tolerance of their own, and why.
 _ROUGH = {"inverse friction": (0.02, "no engine's cone is unbounded; a coefficient of 50 or more stands for it")}
@@ -109,9 +96,9 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         soft = built.regularised.get(quantity.replace(" ", "_"))
         if soft is None and quantity in _FORCES:  # as soft as what they accelerate
             soft = max(built.regularised.values(), key=lambda softness: softness.tolerance, default=None)
-        tolerance, because = tolerated(soft, _caps(element).get(quantity), *_ROUGH.get(quantity, (COMPOSED, _COMPOSED)))
+        tolerance, because = tolerated(soft, element.caps.get(quantity), *_ROUGH.get(quantity, (COMPOSED, _COMPOSED)))
         unit_scale = scale if "acceleration" in quantity else motion.scale
-        noise = _MARGIN * element.noise / unit_scale if quantity in _FROM_ACCELERATIONS else 0.0
+        noise = _MARGIN * element.noise / unit_scale if quantity in FROM_ACCELERATIONS else 0.0
         tolerance, because = max((tolerance, because), (noise, _NOISY))
         roundings = max(ROUNDINGS, noise / EPSILON["double"])
         expected, numbers = tuple(np.ravel(want).tolist()), tuple(np.ravel(got).tolist())
@@ -157,10 +144,6 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     compare("angular acceleration", "rad/s^2", *rates, turning)
     _compare_reactions(element, built, sample, compare)
     return lines
-
-
-def _caps(element: MechanismElement) -> Mapping[str, Regularised]:
-    return ROLLING_CAPS if element.rolls_evenly else CAPS
 
 
 def _compare_matrices(element: MechanismElement, built: MechanismBuilt, compare: _Compare) -> None:

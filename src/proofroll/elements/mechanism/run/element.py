@@ -14,6 +14,7 @@ from proofroll.core.arrays import FloatArray, longest, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
+from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.core.observable import Observable, Role
@@ -30,14 +31,13 @@ from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.switches import first_change
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.run.certificate import CAPS, certify
-from proofroll.elements.mechanism.run.contacts import rolling_failure, rolling_program, rolling_scales
 from proofroll.elements.mechanism.run.contacts.local_frame import local_observables, local_sizes, observe_locally
 from proofroll.elements.mechanism.run.contacts.observables import contact_observables, event_observables
-from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, LocalStart, body_on_wall
+from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, LocalStart, body_on_wall, exceeds_grip
 from proofroll.elements.mechanism.run.contacts.stretches import held_in_flight
 from proofroll.elements.mechanism.run.dataset import from_samples
 from proofroll.elements.mechanism.run.failure_program import program
-from proofroll.elements.mechanism.run.optional_terms import RESISTANCE, optional_terms
+from proofroll.elements.mechanism.run.optional_terms import optional_terms
 from proofroll.elements.mechanism.run.plausibility import implausible
 from proofroll.elements.mechanism.run.sampling import MechanismSample
 from proofroll.elements.mechanism.run.scales import scales
@@ -68,8 +68,6 @@ _PART = 1e-4
 # Rate of a freedom on springs and servos of joints, relative to the fastest, below which they do not hold it.
 _HELD = 1e-7
 _AXES = "xyz"
-# Rolling resistance [radii] that a scene without any gets to see the cost of the term (Blajer 2006, figure 5).
-_RESISTANCE = 0.02
 
 
 @dataclass(frozen=True)
@@ -78,6 +76,7 @@ class MechanismElement:
 
     Attributes:
         mechanism: its data.
+        caps: quantities that a model may soften, with the largest difference that is accepted for any reason.
         local: ball whose motion and force are described in the local frame of its wall, see
             :mod:`proofroll.elements.mechanism.run.contacts.local_frame`; None: none.
     """
@@ -86,8 +85,9 @@ class MechanismElement:
     local: LocalStart | None = None
 
     sample_type: ClassVar[type[MechanismSample]] = MechanismSample
-    softened: ClassVar[frozenset[str]] = frozenset(CAPS)
+    caps: ClassVar[Mapping[str, Regularised]] = CAPS
     failing_events: ClassVar[Mapping[str, str]] = {}
+    askable: ClassVar[Mapping[str, str]] = {}
 
     @property
     def name(self) -> str:
@@ -105,10 +105,13 @@ class MechanismElement:
         return read_only(analyse(self.mechanism))
 
     @property
+    def softened(self) -> frozenset[str]:
+        """See the protocol."""
+        return frozenset(self.caps)
+
+    @property
     def failures(self) -> Mapping[str, str]:
         """See the protocol."""
-        if self.rolls_evenly:
-            return rolling_failure.MEANINGS
         return {
             OPENED: f"joints or loops opened by more than {OPEN:.0%} of the mechanism's size",
             ENERGY_GAIN: f"the energy grew by more than {GAIN:.0%} of what its weight or speed can make",
@@ -118,24 +121,7 @@ class MechanismElement:
     def requires(self) -> frozenset[str]:
         """See the protocol."""
         capability = MechanismCapability
-        needs = required(self.mechanism) | ({capability.REDUNDANT} if self.analysis.redundant else set())
-        # A formulation of a ball that rolls in a cylinder has no other free bodies.
-        return frozenset(needs - ({capability.FREE} if self.rolls_evenly else set()))
-
-    @property
-    def rolls_evenly(self) -> bool:
-        """True for one ball that rolls in an upright cylinder and never slips, see :class:`.BodyOnWall`."""
-        return self.on_wall is not None and self.on_wall.rolls_evenly and len(self.bodies) == 1
-
-    @property
-    def askable(self) -> Mapping[str, str]:
-        """See the protocol: a ball that rolls evenly is followed with or without its orientation."""
-        return {"orientation": MechanismCapability.ORIENTATION} if self.rolls_evenly else {}
-
-    @property
-    def optional(self) -> frozenset[str]:
-        """See :class:`proofroll.core.element_abilities.HasOptionalCapabilities`."""
-        return frozenset({MechanismCapability.TURNING_FRICTION, *self.askable.values()} if self.rolls_evenly else ())
+        return frozenset(required(self.mechanism) | ({capability.REDUNDANT} if self.analysis.redundant else set()))
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
         """See :class:`proofroll.core.element_abilities.KnowsAnotherScene`.
@@ -145,7 +131,7 @@ class MechanismElement:
         """
         if self.on_wall is None or not np.isinf(self.on_wall.contact.mu_static):
             return None
-        return rolling_failure.exceeds_grip(lines, truth["needed_friction"].to_numpy())
+        return exceeds_grip(lines, truth["needed_friction"].to_numpy())
 
     def commands(self) -> Commands | None:
         """See :class:`proofroll.core.element_abilities.HoldsTargets`."""
@@ -248,8 +234,6 @@ class MechanismElement:
 
         Without these: of its mass on the stiffest spring between points, else the time of a turn, else 1 s.
         """
-        if self.on_wall is not None and self.rolls_evenly:
-            return rolling_scales.natural_time(self.on_wall)
         gravity, rates = float(np.linalg.norm(self.mechanism.gravity)), self.law_rates[1]
         slowest = float(rates.min(initial=np.inf))
         slowest = slowest if slowest > _HELD * float(rates.max(initial=0.0)) and np.isfinite(slowest) else 0.0
@@ -355,8 +339,6 @@ class MechanismElement:
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
         """See the protocol."""
-        if self.on_wall is not None and self.rolls_evenly:
-            return rolling_scales.step_numbers(self.on_wall, h, truth)
         return step_numbers(self, h, truth)
 
     @property
@@ -365,18 +347,14 @@ class MechanismElement:
         motion = self._solution.motion
         rates = self._solution.acceleration if self._pressed is None else self._pressed.acceleration
         acceleration = (motion.J @ rates + motion.bias)[:-1]
-        pull, fastest = float(np.linalg.norm(self.mechanism.gravity)), longest(acceleration[:, :3])
-        scale = max(fastest, self.speed**2 / self.length)
-        if self.rolls_evenly:
-            scale = max(fastest, pull) or 1.0  # the wall turns it, whatever its own length
+        scale = max(longest(acceleration[:, :3]), self.speed**2 / self.length)
         lasts = first_change(self._equations.switched, *self.mechanism.start(), rates)
         if self._pressed is not None and self._touching is not None:
             lasts = min(lasts, self._pressed.lasts(self._touching[1]))
         elif self.mechanism.contacts:
             acceleration, lasts = np.full_like(acceleration, np.nan), 0.0
         moment = _PART * min(self.natural_time, lasts or np.inf)
-        unit = pull or None if self.rolls_evenly else None
-        return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, moment, pull=unit, lasts=lasts)
+        return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, moment, lasts=lasts)
 
     @cached_property
     def first_wrench(self) -> FloatArray:
@@ -407,10 +385,9 @@ class MechanismElement:
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.run.dataset`."""
         return from_samples(self, times, samples)
 
-    def lacks(self, samples: Sequence[MechanismSample], asks: Sequence[str]) -> str | None:
+    def lacks(self, samples: Sequence[MechanismSample], asks: Sequence[str]) -> str | None:  # noqa: ARG002 -- the protocol's
         """See the protocol."""
-        asked = not self.rolls_evenly or "orientation" in asks
-        lacking = asked and any(sample.q_WB is None for sample in samples)
+        lacking = any(sample.q_WB is None for sample in samples)
         return "the engine does not give the orientation of the bodies" if lacking else None
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
@@ -452,40 +429,22 @@ class MechanismElement:
         """See the protocol."""
         return certify(self, built, sample)
 
-    def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
+    def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:  # noqa: ARG002 -- the protocol's
         """See the protocol."""
-        if self.on_wall is not None and self.rolls_evenly:
-            return rolling_failure.signs(self.on_wall, dataset, truth)
         shown = [Sign(OPENED, dataset["drift"].to_numpy() > OPEN * self.length)]
         if self.conservative:
             energy = dataset["energy"].to_numpy()
             shown.append(Sign(ENERGY_GAIN, energy - energy[0] > GAIN * self.force * self.length))
         return shown
 
-    def cause(self, dataset: xr.Dataset, error: float) -> str | None:
-        """See :class:`proofroll.core.element_abilities.ExplainsErrors`."""
-        if self.on_wall is None or not self.rolls_evenly:
-            return None
-        return rolling_failure.cause(self.on_wall, dataset, error)
-
     def failure_program(self, failed: FailedRun, engine: str | None) -> str:
         """See :class:`proofroll.core.element_abilities.WritesPrograms`."""
-        if self.on_wall is not None and self.rolls_evenly:
-            return rolling_program.program(self.on_wall, failed, engine)
         gain = GAIN * self.force * self.length if self.conservative else 0.0
         return program(self, failed, engine, gain, OPEN * self.length)
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:  # noqa: ARG002 -- the protocol's
         """See the protocol."""
-        terms = optional_terms(self.mechanism, parameters)
-        if not self.rolls_evenly:
-            return terms
-        if parameters.get("rolling_resistance") == 0.0 and self.on_wall is not None:
-            f = _RESISTANCE * self.on_wall.ball.radius
-            put, taken = {"rolling_resistance": f}, {"rolling_resistance": 0.0}
-            terms.append(OptionalTerm(RESISTANCE, f"the scene has none; here with f = {f:g} m", put, taken))
-        because, need = "nothing else depends on it", MechanismCapability.ORIENTATION
-        return [*terms, OptionalTerm("orientation asked", because, asks=("orientation",), capability=need)]
+        return optional_terms(self.mechanism, parameters)
 
 
 def the_mechanism(scene: Scene) -> MechanismElement:

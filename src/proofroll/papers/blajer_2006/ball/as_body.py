@@ -7,17 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross, longest
 from proofroll.core.element import Element
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
+from proofroll.elements.mechanism.scene.shapes.walls.of_revolution import Bore
 from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 
+_SAME = 1e-12  # relative difference of directions that is round-off
 __tracebackhide__ = True  # whatever goes wrong goes wrong in the run of the ball
 # What a ball's certificate calls a quantity that a body's calls otherwise.
 _NAMES: Mapping[str, tuple[str, ...]] = {
@@ -31,10 +33,20 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 }
 
 
+def in_upright_bore(body: BodyOnWall) -> bool:
+    """True if it moves in a cylinder at rest about a line through the world's origin along gravity."""
+    place, gravity = body.surface, body.gravity
+    wall = getattr(getattr(place, "chart", None), "wall", None)
+    if body.flies or body.wall_rate is not None or not isinstance(wall, Bore):
+        return False
+    off_axis, leaning = (longest(cross(vector, place.axis)) for vector in (place.origin, gravity))
+    return off_axis <= _SAME * wall.radius and leaning <= _SAME * longest(gravity)
+
+
 def ball_of(element: Element) -> RollingBall | None:
     """Ball in a cylinder at rest about a line through the world's origin along gravity; None: it is another element."""
     on_wall = element.on_wall if isinstance(element, MechanismElement) and len(element.bodies) == 1 else None
-    if on_wall is None or not on_wall.upright_bore or on_wall.surface.axis[1]:
+    if on_wall is None or not in_upright_bore(on_wall) or on_wall.surface.axis[1]:
         return None
     place = on_wall.surface
     x, _, z = place.axis.tolist()

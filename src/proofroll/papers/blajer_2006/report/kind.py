@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.papers.blajer_2006.ball.as_body import ball_of, rolling_ball
+from proofroll.papers.blajer_2006.ball.element import EvenRolling
 from proofroll.papers.blajer_2006.report import onsets
 from proofroll.report.kinds import ReportKind
 
@@ -41,7 +41,7 @@ class BallReport(ReportKind):
     def group(scene: Scene) -> str:
         """Group of the ball's contact with the wall: slipping or rolling."""
         (element,) = scene.elements
-        return "ball rolling" if isinstance(element, MechanismElement) and element.rolls_evenly else "ball slipping"
+        return "ball rolling" if isinstance(element, EvenRolling) else "ball slipping"
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:

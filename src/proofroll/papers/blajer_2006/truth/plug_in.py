@@ -20,6 +20,7 @@ from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.dataset import columns, unturned
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.papers.blajer_2006.ball.as_body import ball_of
+from proofroll.papers.blajer_2006.ball.element import EvenRolling
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.motion import BallMotion
 from proofroll.papers.blajer_2006.ball.rolling_equations import closed_form
@@ -65,7 +66,7 @@ class BallOnSurfaceTruth:
         assert isinstance(element, MechanismElement)  # by ``covers``
         body, instants = ball_of(element), np.asarray(times, dtype=np.float64)
         assert body is not None
-        if not element.rolls_evenly:
+        if not isinstance(element, EvenRolling):
             return _with_onset(body, MechanismTruth.truth(element, times, asks))
         by_series = available() and (not body.contact.rolling_resistance or bool(body.udot0[0]))
         first_route, second_route = (series.reduced, series.unreduced) if by_series else (reduced, unreduced)

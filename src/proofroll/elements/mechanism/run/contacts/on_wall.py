@@ -5,15 +5,14 @@ The contact point is at ``p_WB + a e1``; array arguments may carry leading dimen
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray, cross, longest
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.mechanism.dynamics.commands import placed_start
 from proofroll.elements.mechanism.scene.balls import Ball, Contact
 from proofroll.elements.mechanism.scene.checks import WORLD, ZERO
@@ -22,7 +21,6 @@ from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, Declared
 from proofroll.elements.mechanism.scene.shapes.walls.charts import WallCoordinates, wall_coordinates
-from proofroll.elements.mechanism.scene.shapes.walls.of_revolution import Bore
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,21 +105,6 @@ class BodyOnWall:
     index: int
     contact_index: int
     sign: float
-
-    @cached_property
-    def upright_bore(self) -> bool:
-        """True if it moves in a cylinder at rest about a line through the world's origin along gravity."""
-        place, gravity = self.surface, self.gravity
-        wall = getattr(getattr(place, "chart", None), "wall", None)
-        if self.flies or self.wall_rate is not None or not isinstance(wall, Bore):
-            return False
-        off_axis, leaning = (longest(cross(vector, place.axis)) for vector in (place.origin, gravity))
-        return off_axis <= _SAME * wall.radius and leaning <= _SAME * longest(gravity)
-
-    @property
-    def rolls_evenly(self) -> bool:
-        """True if it rolls in such a cylinder and never slips."""
-        return self.upright_bore and math.isinf(self.contact.mu_static)
 
     def own(self, dataset: xr.Dataset, name: str) -> FloatArray:
         """A variable of all bodies, for the ball alone, shape (time, ...)."""
@@ -240,3 +223,20 @@ def energy(body: BodyOnWall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArra
     m, J = body.ball.mass, body.ball.inertia
     kinetic = 0.5 * m * np.sum(v_WB**2, axis=-1) + 0.5 * J * np.sum(w_WB**2, axis=-1)
     return np.asarray(kinetic - m * p_WB @ body.gravity)
+
+
+def exceeds_grip(lines: Sequence[Mapping[str, Any]], friction: FloatArray) -> str | None:
+    """Reason why an engine whose friction is bounded moves another ball than one that never slips; None: it does not.
+
+    Args:
+        lines: of a stored certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
+        friction: friction over normal force of the true motion [1], shape (time,); NaN without contact.
+    """
+    needed = float(np.max(friction[np.isfinite(friction)], initial=0.0))
+    for line in lines:
+        largest = max(line["found"], default=0.0) if line["quantity"] == "inverse friction" else 0.0
+        if largest * needed > 1:
+            return (
+                f"another scene: a friction of {1 / largest:.4g}, where the scene has no bound and needs {needed:.4g}"
+            )
+    return None

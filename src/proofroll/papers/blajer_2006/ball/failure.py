@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -82,20 +81,3 @@ def heading(v: FloatArray) -> FloatArray:
 def cause(body: BodyOnWall, dataset: xr.Dataset, error: float) -> str | None:
     """Creep, if the distance slipped while rolling explains the ``error`` of the last coordinate; else None."""
     return CREEP if creep(dataset) >= SLIPPED * error * body.surface.scales(*body.u0.tolist())[-1] else None
-
-
-def exceeds_grip(lines: Sequence[Mapping[str, Any]], friction: FloatArray) -> str | None:
-    """Reason why an engine whose friction is bounded moves another ball than one that never slips; None: it does not.
-
-    Args:
-        lines: of a stored certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
-        friction: friction over normal force of the true motion [1], shape (time,); NaN without contact.
-    """
-    needed = float(np.max(friction[np.isfinite(friction)], initial=0.0))
-    for line in lines:
-        largest = max(line["found"], default=0.0) if line["quantity"] == "inverse friction" else 0.0
-        if largest * needed > 1:
-            return (
-                f"another scene: a friction of {1 / largest:.4g}, where the scene has no bound and needs {needed:.4g}"
-            )
-    return None

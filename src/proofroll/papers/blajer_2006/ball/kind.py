@@ -1,5 +1,6 @@
 """Tables of a ball on a surface in a scene file, and the scenes on which engines are checked."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -9,7 +10,10 @@ from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.elements.balls.reader import UNITS, PlacedBall, ball_as_body, placed_balls
 from proofroll.elements.balls.surfaces import Cylinder
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
+from proofroll.papers.blajer_2006.ball.as_body import in_upright_bore
+from proofroll.papers.blajer_2006.ball.element import EvenRolling
 
 
 class BallOnSurfaceKind:
@@ -21,8 +25,8 @@ class BallOnSurfaceKind:
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[Element]:
-        """See :func:`proofroll.elements.balls.reader.ball_as_body`: a mechanism for each contact."""
-        return [ball_as_body(placed, gravity, where) for placed in placed_balls(tables, numbers, where)]
+        """See :func:`ball_element`: a mechanism for each contact."""
+        return [ball_element(placed, gravity, where) for placed in placed_balls(tables, numbers, where)]
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
@@ -37,6 +41,19 @@ class BallOnSurfaceKind:
         return {"slow": _rolling(slow, 5e-4), "fast": _rolling(fast, 0.0)}
 
 
+def ball_element(placed: PlacedBall, gravity: Gravity, file: str) -> MechanismElement:
+    """Mechanism of a ball on its wall, see :func:`proofroll.elements.balls.reader.ball_as_body`.
+
+    Raises:
+        InputError: no body has such a wall or law of contact, or the ball cannot start so.
+    """
+    element = ball_as_body(placed, gravity, file)
+    body = element.on_wall
+    if body is None or len(element.bodies) > 1 or not in_upright_bore(body) or not math.isinf(body.contact.mu_static):
+        return element
+    return EvenRolling(element.mechanism, local=element.local)
+
+
 def _rolling(start: InitialMotion, rolling_resistance: float) -> Scene:
     """Scene of a ball that rolls in an upright cylinder [SI]."""
     placed = PlacedBall(
@@ -45,4 +62,4 @@ def _rolling(start: InitialMotion, rolling_resistance: float) -> Scene:
         Contact("ball", "wall", rolling_resistance=rolling_resistance),
         start,
     )
-    return Scene("rolling_ball", "", (ball_as_body(placed, Gravity(9.81), "scene"),))
+    return Scene("rolling_ball", "", (ball_element(placed, Gravity(9.81), "scene"),))

@@ -5,7 +5,7 @@ import numpy as np
 from proofroll.core import program_text
 from proofroll.core.program_text import FailedRun, asking, assignment
 from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall
-from proofroll.elements.mechanism.run.contacts.rolling_failure import (
+from proofroll.papers.blajer_2006.ball.failure import (
     BACKWARDS,
     GAIN,
     SLIPPED,
