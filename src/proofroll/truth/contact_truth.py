@@ -41,7 +41,7 @@ from proofroll.truth.followed_paths import (
     times_known,
     two_route_motion,
 )
-from proofroll.truth.law_verdict import held_to_laws, work_along
+from proofroll.truth.law_verdict import cut_at, held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
 from proofroll.truth.standing_ends import Face, RollingLanding, standing_ends
@@ -92,7 +92,13 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     tree.faces = bodies.faces = faces
     until, breaking, kinds = float(times[-1]), breaks(scaled.signals), partial(_kinds, dynamics)
     paths, routes = _followed(tree, bodies, held, until, breaking)
-    paths, laws, work_paths = held_to_laws(mechanism, units, (tree, bodies), paths, second, held)
+    recorded = [
+        of_tree(mechanism, units, tree, paths[0], held[0] if held else None),
+        of_bodies(mechanism, units, bodies, second, paths[1], held[1] if held else None),
+    ]
+    (broken, text), laws, work_paths = held_to_laws(mechanism, units, recorded)
+    if np.isfinite(broken):
+        paths = cut_at(paths[0], broken, text), cut_at(paths[1], broken, text)
     asked = times_known(paths, times)
     times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
     stretches = stretches_at(paths, times)

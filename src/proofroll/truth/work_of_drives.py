@@ -1,4 +1,4 @@
-"""Work of drives along the record of a route: integrals of power over its pieces, and impulses times rates at impacts.
+"""Work of drives along a route: integrals of power over its pieces or steps, and impulses times rates at impacts.
 
 It is a property of the motion: the samples of a user have no part in it.
 """
