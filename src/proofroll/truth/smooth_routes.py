@@ -34,6 +34,7 @@ _CONSTANTS = 600
 _FASTER = 30.0  # ratio to the fastest swing, which any method has to resolve
 _NEAR = 1e-7  # step of finite differences for Jacobians: m, 1, and per s, in natural units
 _FURTHER = 1.5  # how much longer a step may be for the last step's polynomial to be its first guess
+_EXPLICIT = 1e-15  # tolerance of the first route by DOP853
 _IMPLICIT = 1e-12, 1e-14  # tolerances of implicit steps; Python computes those of the first route, the dearer one
 
 _Rates = Callable[[Array], Array]  # of states with the time as last column
@@ -46,9 +47,9 @@ class SmoothTree(ContactTree):
     """
 
     def __init__(self, dynamics: ContactDynamics, implicit: bool) -> None:
-        super().__init__(dynamics, TOLERANCES[0], 1.0)
+        super().__init__(dynamics, _EXPLICIT, 1.0)
         self._implicit = implicit
-        self._tolerance = np.append(dynamics.equations.least(TOLERANCES[0]), TOLERANCES[0])
+        self._tolerance = np.append(dynamics.equations.least(_EXPLICIT), _EXPLICIT)
 
     def _law(self, state: Array, mode: ContactMode, signs: tuple[int, ...] | None = None) -> StretchLaw:  # noqa: ARG002 -- nothing switches
         equations, none = self.dynamics.equations, np.zeros(0)
