@@ -24,7 +24,7 @@ from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.bodies.maximal_taylor import MaximalTaylor, Visited, compiled_rates
 from proofroll.truth.followed_paths import TOLERANCES
 from proofroll.truth.numerics.collocation import Step, System, by_states, next_length, nodes, take
-from proofroll.truth.numerics.hybrid import DenseStep, Stretch, StretchLaw
+from proofroll.truth.numerics.hybrid import DenseStep, Stretch, StretchLaw, Transition
 from proofroll.truth.numerics.scalars import Scalar
 from proofroll.truth.tree.contact_tree import ContactTree
 
@@ -50,6 +50,10 @@ class SmoothTree(ContactTree):
         super().__init__(dynamics, _EXPLICIT, 1.0)
         self._implicit = implicit
         self._tolerance = np.append(dynamics.equations.least(_EXPLICIT), _EXPLICIT)
+
+    def begin(self) -> Transition[ContactMode]:
+        """See the protocol; the start is as given, without the round-off of a projection."""
+        return Transition(self.start, (), ())
 
     def _law(self, state: Array, mode: ContactMode, signs: tuple[int, ...] | None = None) -> StretchLaw:  # noqa: ARG002 -- nothing switches
         equations, none = self.dynamics.equations, np.zeros(0)
@@ -86,6 +90,10 @@ class SmoothBodies(ContactBodies):
     def __init__(self, equations: ContactEquations, second: MaximalCoordinates, implicit: bool) -> None:
         super().__init__(equations, TOLERANCES[1], 1.0)
         self._second, self._implicit = second, implicit
+
+    def begin(self) -> Transition[ContactMode]:
+        """See the protocol; the start is as given, without the round-off of a projection."""
+        return Transition(self.start, (), ())
 
     def _symbols(self) -> None:
         return None  # series in long doubles have their own
