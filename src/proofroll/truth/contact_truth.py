@@ -108,8 +108,10 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         values.finish()
     seconds = times * units.time
     known_until = _works_known(tree, paths[0])
-    unknown = times[:, None] > known_until
-    works = np.where(unknown, np.nan, work_paths[0].at(seconds, stretches)), work_paths[1].at(seconds, others)
+    unknown, along = times[:, None] > known_until, list(zip(work_paths, (stretches, others), strict=True))
+    work_of_tree, work_of_bodies = (work.at(seconds, numbers) for work, numbers in along)
+    works = np.where(unknown, np.nan, work_of_tree), work_of_bodies
+    unresolved = [work.unresolved(seconds, numbers)[:, np.isinf(known_until)] for work, numbers in along]
     tree_states = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
     by_tree = tree_states.record
     cut = None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
@@ -138,7 +140,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         _reason(dynamics, paths),
         units,
         works,
-        unresolved=max(float(work.unresolved[np.isinf(known_until)].max(initial=0.0)) for work in work_paths),
+        unresolved=np.max([rest.max(axis=1, initial=0.0) for rest in unresolved], axis=0),
         kinds=kinds,
         pressed=(tree_states.pressed * units.force, forces_of_bodies * units.force) if scaled.contacts else None,
         sums=(tree_states.sums * units.force, others_sums) if scaled.contacts else None,

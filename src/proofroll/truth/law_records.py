@@ -230,8 +230,8 @@ class LawRecorder:
             for start, end, inside_step in stretch.by.steps_of(stretch):
                 yield from self._parts(start, end, inside_step, recorded, paced=True)
         elif stretch.exact:
-            whole = [step for step in stretch.dense if min(step[1], stretch.end) > step[0]]
-            yield from map(self._window, self._looked_at(whole, most))
+            whole = [[step] for step in stretch.dense if min(step[1], stretch.end) > step[0]]
+            yield from (self._window(step) for (step,) in self._looked_at(whole, most))
         elif stretch.dense:
             groups = [stretch.dense[first : first + _TOGETHER] for first in range(0, len(stretch.dense), _TOGETHER)]
             for steps in self._looked_at(groups, most):
@@ -244,11 +244,16 @@ class LawRecorder:
             states = np.repeat(stretch.first[None], len(POINTS), 0)
             yield _Piece((stretch.start + stretch.end) / 2 + half * POINTS, np.full(len(POINTS), half), states)
 
-    def _looked_at(self, steps: Sequence[_T], most: int | None) -> Sequence[_T]:
-        """Steps of which there are pieces; where whole turns are known, not the last: forces may grow to an end."""
-        if most is None or self._turns_at is None:
-            return steps if most is None else _spread(steps, most)
-        return [steps[number] for number in sorted({len(steps) * k // most for k in range(most)})] if steps else ()
+    def _looked_at(self, groups: Sequence[Sequence[DenseStep]], most: int | None) -> Sequence[Sequence[DenseStep]]:
+        """Groups of steps of which there are pieces; where whole turns are known, at even times, and not at the end.
+
+        Before an end at a singular pose forces grow, and steps crowd.
+        """
+        if most is None or self._turns_at is None or not groups:
+            return groups if most is None else _spread(groups, most)
+        starts = [group[0][0] for group in groups]
+        times = np.linspace(starts[0], groups[-1][-1][1], most, endpoint=False)
+        return [groups[number] for number in np.unique(np.searchsorted(starts, times, side="right") - 1)]
 
     def _window(self, step: DenseStep) -> _Piece:
         """Piece at the start of a step that is as exact inside as at its ends, short enough that its points resolve it.

@@ -337,7 +337,7 @@ class _SmoothTruth:
         works, unresolved = works_of_steps(mechanism, path.stretches[0].dense, powers_at, times, units.time)
         values = [powers(record.placed(mechanism), record.named) for record in records]
         lasting = np.maximum.accumulate(SAFETY * largest(values[1] - values[0])) * np.diff(times, prepend=0.0)
-        return works, np.cumsum(lasting) + float(unresolved.max(initial=0.0))
+        return works, np.cumsum(lasting) + unresolved.max(axis=1, initial=0.0)
 
     def _check_energy(self, record: Record, route: str, early: EarlyEnd) -> None:
         """Ends the truth where a route changes the energy of a conservative mechanism, for then it has failed."""

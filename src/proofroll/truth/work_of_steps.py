@@ -38,10 +38,10 @@ class _Window(NamedTuple):
 def works_of_steps(
     mechanism: Mechanism, steps: Sequence[DenseStep], powers: Callable[[Array], Array], times: Array, unit: float = 1.0
 ) -> tuple[Array, Array]:
-    """Work of drives along steps at times [s], (times, drives), and what is not resolved of it [J], (drives).
+    """Work of drives along steps at times [s], and what is not resolved of it [J], each (times, drives).
 
-    It is integrated over all steps, halved until their points resolve the powers, or a half does it no better than the
-    whole: then the rest is round-off.
+    It is integrated over all steps before the last time, halved until their points resolve the powers, or a half does
+    it no better than the whole: then the rest is round-off.
 
     Args:
         mechanism: in SI units.
@@ -52,7 +52,7 @@ def works_of_steps(
     """
     scale = natural_scale(mechanism)
     works = WorkAlong(mechanism, scale.length, scale.rate)
-    windows, parts = [_Window(step, *step[:2]) for step in steps], list[_Powers]()
+    windows, parts = [_Window(step, *step[:2]) for step in steps if unit * step[0] < times[-1]], list[_Powers]()
     for last in [False] * _HALVINGS + [True]:
         if not windows or not working(mechanism):
             break
@@ -70,4 +70,5 @@ def works_of_steps(
         parts.sort(key=lambda part: float(part[0][0]))
         time, power = unit * np.array([moments for moments, _ in parts]), np.array([values for _, values in parts])
         works.add(0, time, np.broadcast_to((time[:, -1:] - time[:, :1]) / 2, time.shape), power)
-    return works.at(times, [0] * len(times)), works.unresolved
+    stretches = [0] * len(times)
+    return works.at(times, stretches), works.unresolved(times, stretches)
