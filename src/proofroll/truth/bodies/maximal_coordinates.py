@@ -132,8 +132,12 @@ class NumericEquations:
         if not self.rank:
             into, back = np.zeros((len(half), 0)), np.zeros((0, len(C)))
             return Solved(constrained, half @ free, np.zeros(len(C)), C, residual=residual, into=into, back=back)
-        U, S, Vt = np.linalg.svd(C @ half, full_matrices=False)
-        locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None]
+        weighted = C @ half
+        sizes = np.linalg.norm(weighted, axis=1)
+        # rows of light rotors and of heavy frames alike; rows that are round-off stay so
+        even = 1 / np.where(sizes > RANK * sizes.max(), sizes, 1.0)
+        U, S, Vt = np.linalg.svd(even[:, None] * weighted, full_matrices=False)
+        locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None] * even
         normal = -back @ np.array([row.bias for row in constrained.rows], dtype=float) - locked @ free
         into = half @ locked.T
         acceleration = half @ free + into @ normal
