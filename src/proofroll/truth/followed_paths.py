@@ -156,8 +156,8 @@ def two_route_motion(
         sums: their sums by both routes [N], (times, sums, 3).
         until: last time asked for [s].
         cut: motion of the first route with rebounds cut early, and at which times it counts.
-        left: what a difference of the routes leaves out, in each field at each time; None: that of ``cut``, and what
-            the tolerance of a step allows.
+        left: errors that a difference of the routes leaves out, in each field at each time; None: those of ``cut``, and
+            of the tolerance of a step.
         chaotic_from: time from which the motion is known to be chaotic [s].
     """
     parted = min(_parted(*paths, kinds) * units.time, chaotic_from)

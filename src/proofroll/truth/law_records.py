@@ -245,7 +245,7 @@ class LawRecorder:
             yield _Piece((stretch.start + stretch.end) / 2 + half * POINTS, np.full(len(POINTS), half), states)
 
     def _looked_at(self, groups: Sequence[Sequence[DenseStep]], most: int | None) -> Sequence[Sequence[DenseStep]]:
-        """Groups of steps of which there are pieces; where whole turns are known, at even times, and not at the end.
+        """Groups of steps to take pieces from; where whole turns are known, at even times, and not at the end.
 
         Before an end at a singular pose forces grow, and steps crowd.
         """

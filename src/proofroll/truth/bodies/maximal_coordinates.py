@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -263,22 +262,19 @@ class MaximalCoordinates:
             Missing: heyoka is not installed.
             Diverged: the integration stops before the last time.
         """
-        rows = self.lean.independent_rows()
-        taylor = self.taylor(rows)
-        if not self.lean.redundant:
-            return taylor.run(times, start, visited)
+        rows, redundant = self.lean.independent_rows(), self.lean.redundant
         time, states = 0.0, list[Array]()
-        state = taylor.start() if start is None else start
+        state = self.taylor(rows).start() if start is None else start
+
+        def sound(state: Array) -> bool:
+            return not redundant or self.lean.independence(rows, state) > WEAKEST
+
         while len(states) < len(times):
-            sound = partial(self._sound, rows)
             left = times[len(states) :].tolist()
             time, state, passed = self.taylor(rows).run_while(sound, time, state, left, visited)
             states += passed
-            rows = self.lean.independent_rows(np.asarray(state, dtype=float))
+            rows = self.lean.independent_rows(np.asarray(state, dtype=float)) if redundant else rows
         return np.array(states)
-
-    def _sound(self, rows: Sequence[int], state: Array) -> bool:
-        return self.lean.independence(rows, state) > WEAKEST
 
     def at_start(self) -> Record:
         """Poses of this route at time 0."""

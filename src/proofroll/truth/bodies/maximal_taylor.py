@@ -54,17 +54,6 @@ class MaximalTaylor:
         """State at the start."""
         return self._start.copy()
 
-    def run(self, times: Array, start: Array | None = None, visited: Visited | None = None) -> Array:
-        """States at the given times, s, (times, state), from the mechanism's own start or another.
-
-        ``visited``: see :meth:`run_while`.
-
-        Raises:
-            Diverged: the integration stops before the last time.
-        """
-        begun: Any = self._start if start is None else start
-        return np.array(self.run_while(lambda _: True, np.longdouble(0), begun, times.tolist(), visited)[2])
-
     def run_while(
         self,
         sound: Callable[[Array], bool],

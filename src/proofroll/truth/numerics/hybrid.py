@@ -6,8 +6,9 @@ Two routes may share this module and its root finder of guards, and nothing else
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -148,7 +149,7 @@ class Transition(Generic[ModeT]):
 
 
 class StoppedWithin(Diverged):
-    """Failure of a walk at its ``time``; ``stretch``: what it is before, None: nothing."""
+    """Failure of a walk at its ``time``; ``stretch``: the path before it; None: there is none."""
 
     def __init__(self, text: str, time: float | None = None, stretch: Any = None) -> None:
         super().__init__(text, time)
@@ -381,7 +382,7 @@ def integrate_to_guard(
             continue
         visited.append(begun)
         count.took(solver.t)
-        dense.append((float(solver.t_old), float(solver.t), solver.dense_output()))
+        dense.append((float(solver.t_old), float(solver.t), _lazy_dense(solver)))
         if len(law.noise) and (
             rise := locate_rise(
                 solver, law.guards, law.noise, solver.t_old == time, law.near, grazes, dense=dense[-1][2]
@@ -417,6 +418,14 @@ def integrate_to_guard(
         grazes=grazes,
         dense=dense,
     )
+
+
+def _lazy_dense(solver: Any) -> Callable[[FloatArray], FloatArray]:
+    """Dense output of the last step of DOP853, (state, times); its three further rates wait for the first call."""
+    step = copy(solver)
+    step.K_extended = solver.K_extended.copy()
+    output = cache(step.dense_output)
+    return lambda times: np.asarray(output()(times))
 
 
 def states_at(
