@@ -4,6 +4,7 @@ import dataclasses
 import functools
 
 import numpy as np
+from lone_routes import by_joints
 
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Tree
@@ -33,7 +34,7 @@ def model(name, **parameters):
 def true(mechanism, until):
     """Route 1 at six times from 0, and which components of reactions are determinate."""
     found = analyse(mechanism)
-    return JointCoordinates(mechanism, found.rank).run(np.linspace(0, until, 6), 1e-13), found.determinate
+    return by_joints(mechanism, np.linspace(0, until, 6), 1e-13), found.determinate
 
 
 def settings(formulation, **options):

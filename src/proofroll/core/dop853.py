@@ -118,7 +118,6 @@ def integrate(
     corrected: Callable[[FloatArray], FloatArray] | None = None,
     least: FloatArray | None = None,
     first_step: float | None = None,
-    visited: list[tuple[float, FloatArray]] | None = None,
 ) -> Iterator[FloatArray]:
     """States at the times by DOP853; the solver steps exactly onto each time, for its interpolation is of lower order.
 
@@ -133,7 +132,6 @@ def integrate(
         corrected: puts a state back on its constraints; applied after every step; None: it stays.
         least: absolute tolerance of each component; None: ``tolerance``.
         first_step: length of the first attempt [s]; None: chosen from the rates.
-        visited: takes time [s] and state at the start of each step; None: they are not kept.
 
     Raises:
         Diverged: the steps become too small or too many, or the rates fail, at its ``time``.
@@ -152,8 +150,6 @@ def integrate(
     for time in times.tolist():
         while solver.t < time:
             begun = solver.t
-            if visited is not None:
-                visited.append((begun, solver.y))
             try:
                 controlled_step(solver, accept, time, longest)
                 watch.took(solver.t, solver.step_size, solver.t == time)
@@ -161,8 +157,6 @@ def integrate(
             except Diverged as stopped:
                 if solver.t > begun:  # the step itself succeeded
                     raise Diverged(str(stopped), solver.t) from None
-                if visited is not None:
-                    visited.pop()
                 longest = min(solver.h_abs, longest, time - begun) / 2
                 if longest <= NEAREST * begun or begun == 0.0:
                     raise Diverged(str(stopped), begun) from None

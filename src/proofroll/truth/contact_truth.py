@@ -41,7 +41,7 @@ from proofroll.truth.followed_paths import (
     times_known,
     two_route_motion,
 )
-from proofroll.truth.law_verdict import held_to_laws, work_along
+from proofroll.truth.law_verdict import cut_at, held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
 from proofroll.truth.standing_ends import Face, RollingLanding, standing_ends
@@ -92,7 +92,13 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     tree.faces = bodies.faces = faces
     until, breaking, kinds = float(times[-1]), breaks(scaled.signals), partial(_kinds, dynamics)
     paths, routes = _followed(tree, bodies, held, until, breaking)
-    paths, laws, work_paths = held_to_laws(mechanism, units, (tree, bodies), paths, second, held)
+    recorded = [
+        of_tree(mechanism, units, tree, paths[0], held[0] if held else None),
+        of_bodies(mechanism, units, bodies, second, paths[1], held[1] if held else None),
+    ]
+    (broken, text), laws, work_paths = held_to_laws(mechanism, units, recorded)
+    if np.isfinite(broken):
+        paths = cut_at(paths[0], broken, text), cut_at(paths[1], broken, text)
     asked = times_known(paths, times)
     times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
     stretches = stretches_at(paths, times)
@@ -102,8 +108,10 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         values.finish()
     seconds = times * units.time
     known_until = _works_known(tree, paths[0])
-    unknown = times[:, None] > known_until
-    works = np.where(unknown, np.nan, work_paths[0].at(seconds, stretches)), work_paths[1].at(seconds, others)
+    unknown, along = times[:, None] > known_until, list(zip(work_paths, (stretches, others), strict=True))
+    work_of_tree, work_of_bodies = (work.at(seconds, numbers) for work, numbers in along)
+    works = np.where(unknown, np.nan, work_of_tree), work_of_bodies
+    unresolved = [work.unresolved(seconds, numbers)[:, np.isinf(known_until)] for work, numbers in along]
     tree_states = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
     by_tree = tree_states.record
     cut = None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
@@ -132,7 +140,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         _reason(dynamics, paths),
         units,
         works,
-        unresolved=max(float(work.unresolved[np.isinf(known_until)].max(initial=0.0)) for work in work_paths),
+        unresolved=np.max([rest.max(axis=1, initial=0.0) for rest in unresolved], axis=0),
         kinds=kinds,
         pressed=(tree_states.pressed * units.force, forces_of_bodies * units.force) if scaled.contacts else None,
         sums=(tree_states.sums * units.force, others_sums) if scaled.contacts else None,

@@ -125,17 +125,19 @@ def two_route_motion(
     paths: tuple[FollowedPath, FollowedPath],
     by_tree: Record,
     by_bodies: Record,
-    routes: tuple[str, str],
+    routes: tuple[str, ...],
     reason: str,
     units: Units,
     works: tuple[Array, Array],
     *,
-    unresolved: float = 0.0,
+    unresolved: float | Array = 0.0,
     kinds: Callable[[Any], Any] = lambda mode: mode,
     pressed: tuple[Array, Array] | None = None,
     sums: tuple[Array, Array] | None = None,
     until: float = np.inf,
     cut: tuple[Routed, NDArray[np.bool_]] | None = None,
+    left: Mapping[str, Array] | None = None,
+    chaotic_from: float = np.inf,
 ) -> TwoRouteMotion:
     """Motion with error bars, from the paths and records of two routes.
 
@@ -148,14 +150,18 @@ def two_route_motion(
         reason: cause why the question is ill-posed from the horizon on.
         units: natural units of the paths.
         works: work of drives along both [J], (times, drives).
-        unresolved: part of it that its quadrature does not resolve [J].
+        unresolved: part of it that is not known better [J], of all times or of each.
         kinds: part of a mode in which both routes must agree.
         pressed: contact forces by both routes [N], (times, contacts, 3).
         sums: their sums by both routes [N], (times, sums, 3).
         until: last time asked for [s].
         cut: motion of the first route with rebounds cut early, and at which times it counts.
+        left: errors that a difference of the routes leaves out, in each field at each time; None: those of ``cut``, and
+            of the tolerance of a step.
+        chaotic_from: time from which the motion is known to be chaotic [s].
     """
-    parted, determinate = _parted(*paths, kinds) * units.time, analyse(mechanism).determinate
+    parted = min(_parted(*paths, kinds) * units.time, chaotic_from)
+    determinate = analyse(mechanism).determinate
     masked = replace(by_tree, wrench=np.where(determinate, by_tree.wrench, np.nan))
     fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, by_bodies)
     fields["work"], others["work"] = works
@@ -163,17 +169,19 @@ def two_route_motion(
         fields["pressed"], others["pressed"] = pressed
     if sums is not None:
         fields["sums"], others["sums"] = sums
-    left = _left_by_a_cut(mechanism, fields, cut, determinate)
     placed = masked.placed(mechanism)
-    bars, differences, least, step = {}, {}, round_off(fields, placed), _of_a_step(mechanism, masked, units)
+    bars, differences, least, step = {}, {}, round_off(fields, placed), dict.fromkeys(fields, 0.0)
+    alone = _FORCES if left is None else set()
+    if left is None:
+        left, step = _left_by_a_cut(mechanism, fields, cut, determinate), _of_a_step(mechanism, masked, units)
     for field, values in fields.items():
         difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
         size = left[field] + least[field]
-        lasting = np.minimum(difference, [*difference[:1], *difference[:-1]]) if field in _FORCES else difference
+        lasting = np.minimum(difference, [*difference[:1], *difference[:-1]]) if field in alone else difference
         errors = np.maximum.accumulate(SAFETY * lasting + size)
         bars[field] = np.maximum(SAFETY * difference + size, errors) + step[field]
         differences[field] = float(difference[by_tree.time < parted].max(initial=0.0))
-    bars["work"] += unresolved
+    bars["work"] = bars["work"] + unresolved
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
     horizon = min(parted, first_close(paths, CLOSE) * units.time)

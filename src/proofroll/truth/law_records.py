@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -22,15 +22,17 @@ from proofroll.truth.law_states import stated_named
 from proofroll.truth.laws.integrals import POINTS, TO_SERIES
 from proofroll.truth.laws.record import Modes, Passage, Pieces
 from proofroll.truth.natural_units import Units
-from proofroll.truth.numerics.hybrid import HybridPath, Stretch
+from proofroll.truth.numerics.hybrid import DenseStep, HybridPath, Stretch, states_inside
 from proofroll.truth.switching.contact_taylor import CompiledStretch
 from proofroll.truth.switching.planar_slip import BegunSlip
 from proofroll.truth.switching.stopping_slip import StoppingSlip
 from proofroll.truth.tree.contact_tree import ContactTree
 
+_T = TypeVar("_T")
 _RESOLVED = 1e-13  # last coefficients of states on a piece, relative to their sizes, that are round-off
 _TURN = 1.0  # rad, by which bodies turn in a piece at most: more is not resolved by its points
 _HALVINGS = 7  # of a step into pieces at most
+_SHORTER = 20  # halvings of a step at most of which one piece is looked at
 _TOGETHER = 3  # steps of DOP853 that the points of a piece resolve
 _PARTS = 8  # into which the first instants of a slip are cut: a force that jumps inside is located to one of them
 
@@ -51,6 +53,9 @@ class LawRecorder:
     A record at a state is a flat array: of each body place, rotation by rows, velocity, angular velocity; of each
     contact force, place, normal; efforts, drives, couplings; force and moment of each loop. Compiled modes give it by
     :func:`.stated_symbols`; ``state_of`` gives it at a state in a mode, in numbers.
+
+    ``turns_at``: times -> coordinates of joints for their whole turns, (times, joints, 2); None: angles go on from one
+    point to the next.
     """
 
     def __init__(
@@ -59,8 +64,10 @@ class LawRecorder:
         units: Units,
         route: ContactTree | ContactBodies,
         state_of: Callable[[Array, ContactMode], Array],
+        turns_at: Callable[[Array], Array] | None = None,
     ) -> None:
         self._mechanism, self._units, self._route, self._state_of = mechanism, units, route, state_of
+        self._turns_at = turns_at
         named, moment = named_forces(mechanism), units.force * units.length
         self._named_units = stated_named(
             mechanism, np.array([units.force if item.unit == "N" else moment for item in named])
@@ -74,8 +81,7 @@ class LawRecorder:
         cut, found = list(self._cut(stretch, most)), []
         numeric = [piece for piece in cut if piece.record is None]
         if most is not None and len(numeric) > most:
-            chosen = {int(k) for k in np.linspace(0, len(numeric) - 1, most)}
-            kept = {id(piece) for k, piece in enumerate(numeric) if k in chosen}
+            kept = set(map(id, _spread(numeric, most)))
             cut = [piece for piece in cut if piece.record is not None or id(piece) in kept]
         for coarse in (False, True):
             pieces = [piece for piece in cut if piece.coarse is coarse]
@@ -182,6 +188,7 @@ class LawRecorder:
             spinning=turning[True],
             modes=self._modes(mode),
             coarse=coarse,
+            turns=None if self._turns_at is None else self._turns_at(time.ravel()).reshape(*shape, joints, 2),
         )
 
     def _modes(self, mode: ContactMode) -> Modes:
@@ -222,18 +229,49 @@ class LawRecorder:
             recorded = stretch.by.record_of(stretch.mode, stretch.start)
             for start, end, inside_step in stretch.by.steps_of(stretch):
                 yield from self._parts(start, end, inside_step, recorded, paced=True)
+        elif stretch.exact:
+            whole = [[step] for step in stretch.dense if min(step[1], stretch.end) > step[0]]
+            yield from (self._window(step) for (step,) in self._looked_at(whole, most))
         elif stretch.dense:
-            together = 1 if most else _TOGETHER
-            for first in range(0, len(stretch.dense), together):
-                steps = stretch.dense[first : first + together]
+            groups = [stretch.dense[first : first + _TOGETHER] for first in range(0, len(stretch.dense), _TOGETHER)]
+            for steps in self._looked_at(groups, most):
                 start, last = steps[0][0], min(steps[-1][1], stretch.end)
-                inside = steps[0][2] if len(steps) == 1 else partial(_inside, steps)
+                inside = steps[0][2] if len(steps) == 1 else partial(states_inside, steps)
                 if last > start:
                     yield from (piece._replace(coarse=True) for piece in self._parts(start, last, inside, None))
         elif stretch.end > stretch.start:  # nothing moves
             half = (stretch.end - stretch.start) / 2
             states = np.repeat(stretch.first[None], len(POINTS), 0)
             yield _Piece((stretch.start + stretch.end) / 2 + half * POINTS, np.full(len(POINTS), half), states)
+
+    def _looked_at(self, groups: Sequence[Sequence[DenseStep]], most: int | None) -> Sequence[Sequence[DenseStep]]:
+        """Groups of steps to take pieces from; where whole turns are known, at even times, and not at the end.
+
+        Before an end at a singular pose forces grow, and steps crowd.
+        """
+        if most is None or self._turns_at is None or not groups:
+            return groups if most is None else _spread(groups, most)
+        starts = [group[0][0] for group in groups]
+        times = np.linspace(starts[0], groups[-1][-1][1], most, endpoint=False)
+        return [groups[number] for number in np.unique(np.searchsorted(starts, times, side="right") - 1)]
+
+    def _window(self, step: DenseStep) -> _Piece:
+        """Piece at the start of a step that is as exact inside as at its ends, short enough that its points resolve it.
+
+        A law that is wrong is wrong at all times: what a long step has behind is not looked at.
+        """
+        start, end, inside = step
+        length = end - start
+        for _ in range(_SHORTER):
+            times = start + length * (POINTS + 1) / 2
+            states = inside(times)
+            sizes = np.abs(TO_SERIES @ states.T)
+            turned = length * max(float(np.abs(self._route.bodies(y)[3]).max()) for y in states.T[[0, -1]])
+            resolved = sizes[-2:] <= _RESOLVED * np.maximum(sizes.max(0), sizes.max() * _RESOLVED)
+            if turned <= _TURN and resolved.all():
+                break
+            length /= 2
+        return _Piece(times, np.full(len(POINTS), length / 2), states.T)
 
     def _parts(
         self,
@@ -270,7 +308,7 @@ class LawRecorder:
         yield _Piece(time, rate, states.T, record.T if len(record) else None)
 
 
-def _inside(steps: Sequence[tuple[float, float, Callable[[Array], Array]]], times: Array) -> Array:
-    """States at rising times [s] within successive steps, (state, times)."""
-    numbers = np.searchsorted([end for _, end, _ in steps[:-1]], times)
-    return np.concatenate([steps[k][2](times[numbers == k]) for k in np.unique(numbers)], axis=1)
+def _spread(items: Sequence[_T], most: int) -> list[_T]:
+    """Items, or so many of them in even places, the first and last among them."""
+    chosen = sorted({int(k) for k in np.linspace(0, len(items) - 1, most)})
+    return list(items) if len(items) <= most else [items[k] for k in chosen]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.acting import ContactMode
 from proofroll.elements.mechanism.dynamics.link_forces import working
+from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.followed_paths import CLOSE
@@ -33,72 +35,100 @@ _MOST = 3
 _Path = HybridPath[Stretch[ContactMode]]
 
 
-def held_to_laws(
+class Recorded(NamedTuple):
+    """A route whose path is held to the laws.
+
+    Attributes:
+        name: for a person.
+        recorder: of its statements.
+        path: in natural units.
+        held: held values along it; None: there are none.
+    """
+
+    name: str
+    recorder: LawRecorder
+    path: _Path
+    held: HeldPath | None = None
+
+
+def of_tree(
     mechanism: Mechanism,
     units: Units,
-    routes: tuple[ContactTree, ContactBodies],
-    paths: tuple[_Path, _Path],
-    second: MaximalCoordinates,
-    held: Sequence[HeldPath],
-) -> tuple[tuple[_Path, _Path], str, list[WorkAlong]]:
-    """Paths up to the first violation of a law by either, the outcome of the check and the work of drives along both.
+    tree: ContactTree,
+    path: _Path,
+    held: HeldPath | None = None,
+    turns_at: Callable[[Array], Array] | None = None,
+    name: str = "joint coordinates",
+) -> Recorded:
+    """A path of the first route; ``mechanism`` in SI units, ``turns_at``: see :class:`LawRecorder`."""
+    return Recorded(name, LawRecorder(mechanism, units, tree, partial(by_the_tree, tree), turns_at), path, held)
 
-    The outcome is empty after a violation.
+
+def of_bodies(
+    mechanism: Mechanism,
+    units: Units,
+    bodies: ContactBodies,
+    second: MaximalCoordinates,
+    path: _Path,
+    held: HeldPath | None = None,
+    turns_at: Callable[[Array], Array] | None = None,
+) -> Recorded:
+    """A path of the second route; ``second``: its equations of all joints."""
+    recorder = LawRecorder(mechanism, units, bodies, partial(by_the_bodies, bodies, second), turns_at)
+    return Recorded("bodies", recorder, path, held)
+
+
+def held_to_laws(
+    mechanism: Mechanism, units: Units, routes: Sequence[Recorded], most: int | None = None
+) -> tuple[tuple[float, str], str, list[WorkAlong]]:
+    """End of the paths by the first violation of a law, the outcome of the check, and the work of drives along each.
+
+    The end is a time in natural units, inf if there is none, and its reason; then the outcome is empty.
 
     Args:
         mechanism: in SI units.
         units: natural units of the routes and paths.
-        routes: both.
-        paths: of both.
-        second: equations of all joints of the second route.
-        held: held values of both; empty: there are none.
+        routes: all.
+        most: pieces of a stretch that are looked at where forces are found in numbers; then recorders know whole turns,
+            and the work of drives is not asked for; None: as many as turns and work take.
 
     Raises:
         Refused: a law is violated from the start.
     """
-    tree, bodies = routes
-    recorders = {
-        "joint coordinates": _recorder_of(mechanism, units, tree),
-        "bodies": LawRecorder(mechanism, units, bodies, partial(by_the_bodies, bodies, second)),
-    }
     # beyond an early end of one path the other may be on another branch, and beyond a close decision all is open
+    paths = [route.path for route in routes]
     early = min((path.stretches[-1].end for path in paths if not path.known), default=np.inf)
     end = min(early, first_close(paths, CLOSE))
-    values: Sequence[HeldPath | None] = held or (None, None)
-    works = list[WorkAlong]()
+    works = most is None and bool(working(mechanism))
+    alongs = list[WorkAlong]()
 
     def outcome(most: int | None) -> LawVerdict:
         checked = {}
-        works.clear()
-        for (name, recorder), path, value in zip(recorders.items(), paths, values, strict=True):
-            walk = _Walk(mechanism, units, recorder, path, value)
-            checked[name] = walk.through(end * (1 - CLOSE), most)
-            works.append(walk.work)
+        alongs.clear()
+        for route in routes:
+            walk = _Walk(mechanism, units, route, works)
+            checked[route.name] = walk.through(end * (1 - CLOSE), most)
+            alongs.append(walk.work)
         return verdict(checked)
 
-    result = outcome(None if working(mechanism) else _MOST)
-    if result.violation is not None and not working(mechanism):
+    result = outcome(None if works else most or _MOST)
+    if result.violation is not None and most is None and not works:
         # The first violation may lie in a piece that was left out, and a joint may have turned around meanwhile.
         result = outcome(None)
+    text = sentence(result, len(routes))
     if result.violation is None:
-        return paths, sentence(result, len(recorders)), works
-    text = sentence(result, len(recorders))
+        return (np.inf, ""), text, alongs
     if not result.violation.time > 0:
         raise Refused(text)
-    cut = result.violation.time / units.time
-    return (_cut(paths[0], cut, text), _cut(paths[1], cut, text)), "", works
+    return (result.violation.time / units.time, text), "", alongs
 
 
 def work_along(mechanism: Mechanism, units: Units, tree: ContactTree, path: _Path) -> WorkAlong:
     """Work of drives along another path of the first route; ``mechanism`` in SI units."""
-    walk = _Walk(mechanism, units, _recorder_of(mechanism, units, tree), path, None)
+    walk = _Walk(mechanism, units, of_tree(mechanism, units, tree, path), bool(working(mechanism)))
     if working(mechanism):
         walk.through(0.0, None)
     return walk.work
-
-
-def _recorder_of(mechanism: Mechanism, units: Units, tree: ContactTree) -> LawRecorder:
-    return LawRecorder(mechanism, units, tree, partial(by_the_tree, tree))
 
 
 class _Walk:
@@ -108,12 +138,10 @@ class _Walk:
         work: of drives so far.
     """
 
-    def __init__(
-        self, mechanism: Mechanism, units: Units, recorder: LawRecorder, path: _Path, held: HeldPath | None
-    ) -> None:
-        self._recorder, self._path, self._held = recorder, path, held
+    def __init__(self, mechanism: Mechanism, units: Units, route: Recorded, works: bool) -> None:
+        self._recorder, self._path, self._held = route.recorder, route.path, route.held
         self._check = LawCheck(mechanism, units.length, 1 / units.time)
-        self.work, self._working = WorkAlong(mechanism, units.length, 1 / units.time), bool(working(mechanism))
+        self.work, self._working = WorkAlong(mechanism, units.length, 1 / units.time), works
         self._waiting = list[Pieces]()  # of stretches in one mode, which are checked together
 
     def through(self, end: float, most: int | None) -> LawResiduals:
@@ -155,7 +183,7 @@ class _Walk:
             self._waiting.clear()
 
 
-def _cut(path: _Path, end: float, text: str) -> _Path:
+def cut_at(path: _Path, end: float, text: str) -> _Path:
     """Path up to a time, and the reason why it ends there."""
     kept = [stretch for stretch in path.stretches if stretch.start < end]
     last = kept[-1]

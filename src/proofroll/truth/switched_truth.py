@@ -98,8 +98,10 @@ def _inside(joint: Joint) -> bool:
 
 
 def _unlimited(mechanism: Mechanism) -> Mechanism:
-    """Mechanism without effort limits."""
-    return replace(mechanism, actuators=tuple(replace(actuator, limit=None) for actuator in mechanism.actuators))
+    """Mechanism without stops and effort limits."""
+    joints = tuple(replace(joint, limits=None) for joint in mechanism.joints)
+    actuators = tuple(replace(actuator, limit=None) for actuator in mechanism.actuators)
+    return replace(mechanism, joints=joints, actuators=actuators)
 
 
 def _narrower(mechanism: Mechanism) -> Mechanism:

@@ -1,4 +1,4 @@
-"""Work of drives along the record of a route: integrals of power over its pieces, and impulses times rates at impacts.
+"""Work of drives along a route: integrals of power over its pieces or steps, and impulses times rates at impacts.
 
 It is a property of the motion: the samples of a user have no part in it.
 """
@@ -24,13 +24,17 @@ _CORRECTIONS = 8  # of Newton's method for the place of a time in a piece, at mo
 
 
 class _Part(NamedTuple):
-    """Work on a part of a stretch: series of time [s] and work [J] by a variable from -1 to 1."""
+    """Work on a part of a stretch: series of time [s] and work [J] by a variable from -1 to 1.
+
+    ``unresolved``: part of the work up to the end that points do not resolve [J], (drives).
+    """
 
     stretch: int
     start: float
     end: float
     time: Array
     work: Array
+    unresolved: Array
 
     def at(self, time: float) -> Array:
         """Work of each drive at a time [s]."""
@@ -50,18 +54,14 @@ class _Part(NamedTuple):
 
 
 class WorkAlong:
-    """Work of each of :func:`.working` along one route since the start [J].
-
-    Attributes:
-        unresolved: part of it that the points of pieces do not resolve, so far [J], (drives).
-    """
+    """Work of each of :func:`.working` along one route since the start [J]."""
 
     def __init__(self, mechanism: Mechanism, length: float, rate: float) -> None:
         """Takes a mechanism in SI units with its natural length [m] and rate [1/s]."""
         self._scene, self._drives = LawScene(mechanism, length, rate), [item for _, item in working(mechanism)]
         self._joints = [mechanism.joint_index[name] for name in working_joints(mechanism)]
         self._total, self._parts = np.zeros(len(self._drives)), list[_Part]()
-        self.unresolved = np.zeros(len(self._drives))
+        self._unresolved = np.zeros(len(self._drives))
         self._last: tuple[float, Array] | None = None  # time and power of the last point
 
     def take(self, stretch: int, parts: Sequence[Pieces]) -> None:
@@ -76,9 +76,9 @@ class WorkAlong:
             start, end = float(moments[0]), float(moments[-1])
             self._over_a_gap(stretch, start, powers[0])
             series = TO_SERIES @ moments, TO_SERIES @ (self._total + work)
-            self._parts.append(_Part(stretch, start, end, time=series[0], work=series[1]))
             self._total = self._total + work[-1]
-            self.unresolved = self.unresolved + rest
+            self._unresolved = self._unresolved + rest
+            self._parts.append(_Part(stretch, start, end, *series, self._unresolved))
             self._last = end, powers[-1]
 
     def passes(self, passage: Passage, impulses: Mapping[int, float]) -> None:
@@ -98,13 +98,26 @@ class WorkAlong:
 
     def at(self, times: Array, stretches: Sequence[int]) -> Array:
         """Work at times [s] in stretches, (times, drives)."""
-        works = []
+        parts = zip(times.tolist(), self._parts_at(times, stretches), strict=True)
+        works = [np.zeros(len(self._drives)) if part is None else part.at(time) for time, part in parts]
+        return np.array(works).reshape(len(times), len(self._drives))
+
+    def unresolved(self, times: Array, stretches: Sequence[int]) -> Array:
+        """Part of the work at times [s] in stretches that the points of pieces do not resolve [J], (times, drives)."""
+        rests = [
+            np.zeros(len(self._drives)) if part is None else part.unresolved
+            for part in self._parts_at(times, stretches)
+        ]
+        return np.array(rests).reshape(len(times), len(self._drives))
+
+    def _parts_at(self, times: Array, stretches: Sequence[int]) -> list[_Part | None]:
+        """Part that holds each time [s] in a stretch, or the nearest; None: there is none."""
+        parts = list[_Part | None]()
         for time, stretch in zip(times.tolist(), stretches, strict=True):
             last = [part for part in self._parts if part.stretch <= stretch]
             inside = [part for part in last if part.stretch == stretch] or last
-            part = next((part for part in reversed(inside) if part.start <= time), inside[0] if inside else None)
-            works.append(np.zeros(len(self._drives)) if part is None else part.at(time))
-        return np.array(works).reshape(len(times), len(self._drives))
+            parts.append(next((part for part in reversed(inside) if part.start <= time), inside[0] if inside else None))
+        return parts
 
     def _over_a_gap(self, stretch: int, time: float, power: Array) -> None:
         """Adds the mean of the powers on both sides of a gap, as in the last instants of a slip."""
@@ -113,10 +126,10 @@ class WorkAlong:
         (begun, last_power), ended = self._last, self._total
         span = time - begun
         self._total = ended + span * (last_power + power) / 2
-        self.unresolved = self.unresolved + span * np.abs(last_power - power) / 2
+        self._unresolved = self._unresolved + span * np.abs(last_power - power) / 2
         line = np.array([[1.0, 1.0], [-1.0, 1.0]]) / 2
         series = np.array([(begun + time) / 2, span / 2]), line @ np.array([ended, self._total])
-        self._parts.append(_Part(stretch, begun, time, *series))
+        self._parts.append(_Part(stretch, begun, time, *series, self._unresolved))
         self._last = time, power
 
     def _power(self, pieces: Pieces) -> Array:

@@ -24,6 +24,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.elements.mechanism.scene.spring_law import SpringLaw
 from proofroll.files.scene_file import load_scene
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.switched_truth import truth_of
@@ -306,3 +307,13 @@ def test_a_loop_closes_by_the_size_of_its_mechanism(size: float) -> None:
     apart = replace(loop, position_a=tuple(x + 1e-9 * size for x in loop.position_a))
     with pytest.raises(InputError, match="does not close"):
         check_start(replace(mechanism, loops=(apart, *others)))
+
+
+@pytest.mark.parametrize("units", [Units(1.0, 1.0, 1.0), Units(0.25, 1.0, 1.0), Units(2.0, 2.0, 1.0)])
+def test_reactions_beside_a_light_rotor_keep_their_digits_in_any_unit(units: Units) -> None:
+    """At the start of a geared arm, bodies in any units have the reactions of the tree up to round-off."""
+    mechanism = mechanism_of("arm_rotor")
+    tree, start = JointCoordinates(mechanism), np.concatenate(mechanism.start())
+    by_tree = tree.recorded(np.zeros(1), start[None]).wrench
+    by_bodies = units.record(mechanism, MaximalCoordinates(units.mechanism(mechanism)).at_start()).wrench
+    assert np.abs(by_bodies - by_tree).max() < 2e-14 * np.abs(by_tree).max()

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
+from lone_routes import by_bodies, by_series
 from placed_balls import run_of
 from rolling_rows import rolling_equations
 from rolling_scenes import rolling_scene
@@ -36,10 +37,10 @@ def outside(true: xr.Dataset, witness: xr.Dataset, names: dict[str, str]) -> dic
     return found
 
 
-def witnessed(scene: Scene, element: MechanismElement, method: str = "run_taylor") -> xr.Dataset:
+def witnessed(scene: Scene, element: MechanismElement) -> xr.Dataset:
     """The ball of a scene by rows of rolling, with all other elements in the same equations."""
     mechanism, rolling = rolling_scene(scene)
-    record = getattr(MaximalCoordinates(mechanism, rolling_equations(rolling)), method)(TIMES)
+    record = by_series(MaximalCoordinates(mechanism, rolling_equations(rolling)), TIMES)
     ball = mechanism.body_index[element.name]
     contact = len(mechanism.joints) + len(mechanism.loops) + [one.body for one in rolling].index(element.name)
     motion = record.p_WB[:, ball], record.v_WB[:, ball], record.w_WB[:, ball]
@@ -62,7 +63,7 @@ def test_numbers_and_series_agree() -> None:
     pytest.importorskip("heyoka")
     mechanism, rolling = rolling_scene(load_scene("sphere_in_cylinder"))
     route = MaximalCoordinates(mechanism, rolling_equations(rolling))
-    one, two = route.run_dop853(TIMES[:3], 1e-12), route.run_taylor(TIMES[:3])
+    one, two = by_bodies(route, TIMES[:3], 1e-12), by_series(route, TIMES[:3])
     assert np.abs(one.p_WB - two.p_WB).max() < 1e-12
     assert one.residual.max() < 1e-12
 
@@ -82,7 +83,7 @@ def test_truth_of_a_mixed_scene_agrees_with_rolling_rows() -> None:
     assert len(balls) > 10
     assert not outside(true, witness, balls)
     mechanism, rolling = rolling_scene(mixed)
-    record = MaximalCoordinates(mechanism, rolling_equations(rolling)).run_taylor(TIMES)
+    record = by_series(MaximalCoordinates(mechanism, rolling_equations(rolling)), TIMES)
     angle = next(name for name in true.data_vars if str(name).startswith("v.pivot"))
     assert np.abs(record.v[:, -1] - true[angle].to_numpy()).max() < true[angle].attrs["error_bar"] + 1e-12
 

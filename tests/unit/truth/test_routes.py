@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lone_routes import by_bodies, by_joints, by_series
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
 from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
@@ -41,7 +41,7 @@ def test_tracked_point_is_where_independent_programs_agree(scene, name):
     pytest.importorskip("heyoka")
     end, parameters, place, tolerance = AGREED[name]
     mechanism = scene(name, **parameters)
-    record = MaximalCoordinates(mechanism).run_taylor(np.array([end]))
+    record = by_series(MaximalCoordinates(mechanism), np.array([end]))
     assert placed(mechanism, record).points[0, 0] == pytest.approx(place, abs=tolerance)
 
 
@@ -76,8 +76,8 @@ def test_both_routes_agree(scene, name):
     end, of_forces = SHORT[name]
     mechanism = scene(name)
     times = np.array([0.0, end / 2, end])
-    one = JointCoordinates(mechanism).run(times)
-    two = MaximalCoordinates(mechanism).run_taylor(times)
+    one = by_joints(mechanism, times)
+    two = by_series(MaximalCoordinates(mechanism), times)
     place, attitude, wrench = apart(one, two, analyse(mechanism).determinate)
     assert place < 1e-11
     assert attitude < 1e-11
@@ -90,8 +90,8 @@ def test_maximal_coordinates_without_taylor_series(scene):
     """DOP853 with projection of the same rows gives the same motion, redundant rows included."""
     mechanism = scene("bricard")
     times = np.array([0.0, 0.05])
-    one = JointCoordinates(mechanism).run(times)
-    two = MaximalCoordinates(mechanism).run_dop853(times)
+    one = by_joints(mechanism, times)
+    two = by_bodies(MaximalCoordinates(mechanism), times)
     assert max(apart(one, two, analyse(mechanism).determinate)[:2]) < 1e-12
     assert two.residual.max() < 1e-13
 
@@ -100,7 +100,7 @@ def test_routes_agree_on_every_kind_of_joint():
     """A tree with planar, universal, prismatic, spherical, free and fixed joints moves alike by both routes."""
     mechanism = replace(mechanism_examples.every_kind(), loops=())
     times = np.array([0.0, 0.02])
-    one, two = JointCoordinates(mechanism).run(times), MaximalCoordinates(mechanism).run_dop853(times)
+    one, two = by_joints(mechanism, times), by_bodies(MaximalCoordinates(mechanism), times)
     place, attitude, wrench = apart(one, two, analyse(mechanism).determinate)
     assert max(place, attitude) < 1e-12
     assert wrench < 1e-10
@@ -130,7 +130,7 @@ def test_routes_agree_on_every_kind_of_loop(kind):
     mechanism = replace(still, loops=(loop,))
     check_start(mechanism)
     times = np.array([0.0, 0.005])
-    one, two = JointCoordinates(mechanism).run(times), MaximalCoordinates(mechanism).run_dop853(times)
+    one, two = by_joints(mechanism, times), by_bodies(MaximalCoordinates(mechanism), times)
     place, attitude, wrench = apart(one, two, analyse(mechanism).determinate)
     assert max(place, attitude) < 1e-12
     assert wrench < 1e-10 * max(1.0, np.abs(one.wrench).max())
@@ -233,7 +233,7 @@ def test_springs_and_dampers_along_joints_act_alike():
         ),
     )
     times = np.array([0.0, 0.1])
-    one, two = JointCoordinates(mechanism).run(times), MaximalCoordinates(mechanism).run_dop853(times)
+    one, two = by_joints(mechanism, times), by_bodies(MaximalCoordinates(mechanism), times)
     assert max(apart(one, two, analyse(mechanism).determinate)) < 1e-10
     energy = placed(mechanism, one).energy()
     assert energy == pytest.approx(placed(mechanism, two).energy(), abs=1e-11)
@@ -246,29 +246,17 @@ def test_energy_counts_the_springs_of_universal_joints():
     spring = {"stiffness": 3.0, "rest": 0.1}
     joint = Joint("u", "universal", "world", "a", axis=(1, 0, 1), q0=(0.3, 0.2), v0=(1, -2), **spring)
     mechanism = Mechanism(bodies=(body,), joints=(joint,))
-    energy = placed(mechanism, JointCoordinates(mechanism).run(np.linspace(0, 1, 11))).energy()
+    energy = placed(mechanism, by_joints(mechanism, np.linspace(0, 1, 11))).energy()
     assert np.ptp(energy) < 1e-12
 
 
-def test_long_doubles_keep_more_digits(scene):
-    """Energy drifts less in long doubles than in doubles, so they are computed in long doubles indeed."""
+def test_series_are_in_long_doubles(scene):
+    """Digits that doubles do not have come back where a step is taken again."""
     pytest.importorskip("heyoka")
     route = MaximalCoordinates(scene("double_pendulum"))
-    double, long = (route.taylor(flag).run(np.array([0.0, 2.0])) for flag in (False, True))
-    assert long.dtype == np.longdouble
-    assert 0 < np.abs(long.astype(float) - double).max() < 1e-12
-
-
-def test_dry_friction_is_refused():
-    """Neither route follows dry friction by one smooth integration."""
-    mechanism = Mechanism(
-        bodies=(Body("a", 1.0, (0, 0, -1), (1, 1, 1)),),
-        joints=(Joint("j", "revolute", "world", "a", axis=(1, 0, 0), friction=0.1),),
-    )
-    with pytest.raises(Refused, match="dry friction in joint j"):
-        JointCoordinates(mechanism).run(np.array([0.1]))
-    with pytest.raises(Refused, match="dry friction in joint j"):
-        MaximalCoordinates(mechanism).run_dop853(np.array([0.1]))
+    states = route.taylor_states(np.array([0.0, 2.0]))
+    assert states.dtype == np.longdouble
+    assert 0 < np.abs(states - states.astype(float)).max() < 1e-14
 
 
 def test_steps_of_many_bodies_do_not_chase_round_off(scene, monkeypatch):
@@ -276,5 +264,5 @@ def test_steps_of_many_bodies_do_not_chase_round_off(scene, monkeypatch):
     evaluations = count(1)
     rate = JointCoordinates.rate
     monkeypatch.setattr(JointCoordinates, "rate", lambda *args: (next(evaluations), rate(*args))[1])
-    JointCoordinates(scene("chain", links=20)).run(np.array([0.05]), 1e-15)
+    by_joints(scene("chain", links=20), np.array([0.05]), 1e-15)
     assert next(evaluations) < 1500

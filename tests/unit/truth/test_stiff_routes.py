@@ -6,7 +6,7 @@ import pytest
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.stiff_routes import stiff
+from proofroll.truth.smooth_routes import stiff
 from proofroll.truth.switched_truth import truth_of
 
 

@@ -56,7 +56,7 @@ class ContactBodies(ContactStretches):
         super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
         self._after_velocities = len(equations.equations.equations.angles)
 
-    def _symbols(self) -> ModeSymbols:
+    def _symbols(self) -> ModeSymbols | None:
         return BodySymbols(self.equations)
 
     @property

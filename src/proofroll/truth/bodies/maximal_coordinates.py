@@ -10,17 +10,14 @@ from collections.abc import Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Missing
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.dynamics.complementarity import refuse_switching
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.dynamics.named_forces import joint_force_shares, lengths, pick_named
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
@@ -134,8 +131,12 @@ class NumericEquations:
         if not self.rank:
             into, back = np.zeros((len(half), 0)), np.zeros((0, len(C)))
             return Solved(constrained, half @ free, np.zeros(len(C)), C, residual=residual, into=into, back=back)
-        U, S, Vt = np.linalg.svd(C @ half, full_matrices=False)
-        locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None]
+        weighted = C @ half
+        sizes = np.linalg.norm(weighted, axis=1)
+        # rows of light rotors and of heavy frames alike; rows that are round-off stay so
+        even = 1 / np.where(sizes > RANK * sizes.max(), sizes, 1.0)
+        U, S, Vt = np.linalg.svd(even[:, None] * weighted, full_matrices=False)
+        locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None] * even
         normal = -back @ np.array([row.bias for row in constrained.rows], dtype=float) - locked @ free
         into = half @ locked.T
         acceleration = half @ free + into @ normal
@@ -240,22 +241,19 @@ class MaximalCoordinates:
         self.mechanism = mechanism
         self.lean = NumericEquations(equations(mechanism, allow_planar=True))
         self._whole = NumericEquations(equations(mechanism, allow_planar=False))
-        self._compiled: dict[tuple[bool, tuple[int, ...]], MaximalTaylor] = {}
+        self._compiled: dict[tuple[int, ...], MaximalTaylor] = {}
 
-    def taylor(self, long_double: bool = False, rows: tuple[int, ...] | None = None) -> MaximalTaylor:
-        """Compiled integrator with some rows, or with those chosen at the start; a first call compiles, in seconds.
+    def taylor(self, rows: tuple[int, ...]) -> MaximalTaylor:
+        """Compiled integrator with some rows; a first call compiles, in seconds.
 
         Raises:
             Missing: heyoka is not installed.
         """
-        key = long_double, self.lean.independent_rows() if rows is None else rows
-        if key not in self._compiled:
-            self._compiled[key] = MaximalTaylor(self.lean.equations, key[1], long_double)
-        return self._compiled[key]
+        if rows not in self._compiled:
+            self._compiled[rows] = MaximalTaylor(self.lean.equations, rows)
+        return self._compiled[rows]
 
-    def taylor_states(
-        self, times: Array, long_double: bool = False, start: Array | None = None, visited: Visited | None = None
-    ) -> Array:
+    def taylor_states(self, times: Array, start: Array | None = None, visited: Visited | None = None) -> Array:
         """States at the given times, s, (times, state), by Taylor series, from the mechanism's own start or another.
 
         Of redundant rows others are chosen where the present ones come near to dependence.
@@ -264,72 +262,19 @@ class MaximalCoordinates:
             Missing: heyoka is not installed.
             Diverged: the integration stops before the last time.
         """
-        taylor = self.taylor(long_double)
-        if not self.lean.redundant:
-            return taylor.run(times, start, visited)
+        rows, redundant = self.lean.independent_rows(), self.lean.redundant
         time, states = 0.0, list[Array]()
-        state = taylor.start() if start is None else start
-        rows = self.lean.independent_rows()
+        state = self.taylor(rows).start() if start is None else start
+
+        def sound(state: Array) -> bool:
+            return not redundant or self.lean.independence(rows, state) > WEAKEST
+
         while len(states) < len(times):
-            sound = partial(self._sound, rows)
             left = times[len(states) :].tolist()
-            time, state, passed = self.taylor(long_double, rows).run_while(sound, time, state, left, visited)
+            time, state, passed = self.taylor(rows).run_while(sound, time, state, left, visited)
             states += passed
-            rows = self.lean.independent_rows(np.asarray(state, dtype=float))
+            rows = self.lean.independent_rows(np.asarray(state, dtype=float)) if redundant else rows
         return np.array(states)
-
-    def _sound(self, rows: Sequence[int], state: Array) -> bool:
-        return self.lean.independence(rows, state) > WEAKEST
-
-    def run_taylor(self, times: Array, long_double: bool = False, visited: Visited | None = None) -> Record:
-        """Motion at the given times, s, by Taylor series.
-
-        Raises:
-            Refused: the mechanism has dry friction, which switches.
-            Missing: heyoka is not installed.
-            Diverged: the integration stops.
-        """
-        refuse_switching(self.mechanism)
-        return self.recorded(times, np.asarray(self.taylor_states(times, long_double, None, visited), float))
-
-    def run_dop853(
-        self, times: Array, tolerance: float = 1e-14, visited: list[tuple[float, Array]] | None = None
-    ) -> Record:
-        """Motion at the given times, s, by DOP853 with projection.
-
-        Raises:
-            Refused: the mechanism has dry friction, which switches.
-            Diverged: the integration stops.
-        """
-        refuse_switching(self.mechanism)
-        return self.recorded(times, self._dop853(self.lean.equations.start(), times, tolerance, visited))
-
-    def growth(self, times: Array) -> Array:
-        """Growth of the distance to a neighbouring motion at the given times, s: multiple of the initial distance.
-
-        The start is perturbed in all directions that the rows allow, by far more than round-off.
-
-        Raises:
-            Diverged: an integration stops.
-        """
-        lean, start = self.lean, self.lean.equations.start()
-        starts = start, lean.beside(start, BESIDE)
-        try:
-            states, nearby = (self.taylor_states(times, start=start) for start in starts)
-        except Missing:
-            states, nearby = (self._dop853(start, times, BESIDE * 1e-4) for start in starts)
-        apart: Array = np.abs(nearby - states)[:, : lean.equations.nx].max(axis=1) / BESIDE
-        return apart
-
-    def _dop853(
-        self, start: Array, times: Array, tolerance: float, visited: list[tuple[float, Array]] | None = None
-    ) -> Array:
-        lean = self.lean
-        return np.array(list(integrate(lean.rate, start, times, tolerance, lean.eliminated, visited=visited)))
-
-    def spin(self, state: Array) -> float:
-        """Largest angular velocity of a body at a state [rad/s]."""
-        return float(np.abs(self.lean.poses(np.asarray(state, dtype=float))[3]).max())
 
     def at_start(self) -> Record:
         """Poses of this route at time 0."""

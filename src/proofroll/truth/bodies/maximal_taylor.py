@@ -27,45 +27,32 @@ Visited = list[tuple["MaximalTaylor", Scalar, Array]]
 
 
 class MaximalTaylor:
-    """Compiled integrator of a mechanism; every run starts anew.
+    """Compiled integrator of a mechanism, in long doubles; every run starts anew.
 
     Args:
         equations: of the mechanism.
         rows: indices of linearly independent constraint rows that imply all others.
-        long_double: compute in long doubles.
 
     Raises:
         Missing: heyoka is not installed.
     """
 
-    def __init__(self, equations: MaximalEquations, rows: Sequence[int], long_double: bool = False) -> None:
+    def __init__(self, equations: MaximalEquations, rows: Sequence[int]) -> None:
         if heyoka is None:
             raise Missing("Taylor series need heyoka: pip install 'proofroll[fast]'")
-        self.number = np.longdouble if long_double else float
         state, rates = _in_symbols(equations, rows, heyoka.time)
-        self._start = np.array([self.number(value) for value in equations.start()])
+        self._start = equations.start().astype(np.longdouble)
         self._integrator = heyoka.taylor_adaptive(
-            [(name, _expression(value, self.number)) for name, value in zip(state, rates, strict=True)],
+            [(name, _expression(value, np.longdouble)) for name, value in zip(state, rates, strict=True)],
             self._start,
-            fp_type=self.number,
+            fp_type=np.longdouble,
             compact_mode=True,
             opt_level=0,  # optimised code takes two to ten times as long to compile, which no run earns back
         )
 
-    def start(self) -> Array:
-        """State at the start, in this integrator's numbers."""
+    def start(self) -> Any:
+        """State at the start."""
         return self._start.copy()
-
-    def run(self, times: Array, start: Array | None = None, visited: Visited | None = None) -> Array:
-        """States at the given times, s, (times, state), from the mechanism's own start or another.
-
-        ``visited``: see :meth:`run_while`.
-
-        Raises:
-            Diverged: the integration stops before the last time.
-        """
-        begun = self._start if start is None else start
-        return np.array(self.run_while(lambda _: True, self.number(0), begun, times.tolist(), visited)[2])
 
     def run_while(
         self,
@@ -89,7 +76,7 @@ class MaximalTaylor:
         self._begin(time, state)
         states: list[Array] = []
         while len(states) < len(times):
-            begun, left = integrator.time, self.number(times[-1]) - integrator.time
+            begun, left = integrator.time, np.longdouble(times[-1]) - integrator.time
             if visited is not None:
                 visited.append((self, begun, integrator.state.copy()))
             _, step = integrator.step(max_delta_t=left, write_tc=True)
@@ -97,8 +84,8 @@ class MaximalTaylor:
                 text = f"Taylor series stop at t = {float(begun):.6g} s: the motion has no finite derivatives there"
                 raise Diverged(text, float(begun))
             last = step == left
-            while len(states) < len(times) and (last or self.number(times[len(states)]) <= integrator.time):
-                states.append(integrator.update_d_output(self.number(times[len(states)])).copy())
+            while len(states) < len(times) and (last or np.longdouble(times[len(states)]) <= integrator.time):
+                states.append(integrator.update_d_output(np.longdouble(times[len(states)])).copy())
             if not last and not sound(np.asarray(integrator.state, dtype=float)):
                 break
         return integrator.time, integrator.state.copy(), states
@@ -107,11 +94,11 @@ class MaximalTaylor:
         """States at times [s] within the step from a time and state to ``end`` [s], which is taken again."""
         self._begin(time, state)
         self._integrator.step(max_delta_t=end - time, write_tc=True)
-        return np.array([self._integrator.update_d_output(self.number(t)).copy() for t in times], dtype=float)
+        return np.array([self._integrator.update_d_output(np.longdouble(t)).copy() for t in times], dtype=float)
 
     def _begin(self, time: Scalar, state: Array) -> None:
         self._integrator.state[:] = state
-        self._integrator.time = self.number(time)
+        self._integrator.time = np.longdouble(time)
 
 
 def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable[[Array], Array]:

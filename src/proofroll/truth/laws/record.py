@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from proofroll.elements.mechanism import Mechanism
+    pass
 
 Array = NDArray[np.float64]
 
@@ -30,12 +30,6 @@ class Modes(NamedTuple):
     spinning: tuple[str, ...]
     friction: tuple[str, ...]
     stops: tuple[tuple[str, str], ...]
-
-    @classmethod
-    def smooth(cls, mechanism: Mechanism) -> Modes:
-        """Modes of a motion without contacts, stops and dry friction."""
-        joints = len(mechanism.joints)
-        return cls((), (), (), ("open",) * joints, (("open", "open"),) * joints)
 
 
 @dataclass(frozen=True)
@@ -126,22 +120,3 @@ class Passage:
     def happens(self) -> bool:
         """True if modes change or velocities may jump."""
         return bool(self.impacts or self.settles) or self.before.modes != self.after.modes
-
-
-def without_contacts(mechanism: Mechanism, time: Array, **stated: Any) -> Pieces:
-    """Pieces of a motion without contacts, stops and dry friction; what is not stated is zero.
-
-    ``stated``: fields of :class:`Pieces`.
-    """
-    shape, joints = time.shape, len(mechanism.joints)
-    sizes: dict[str, Sequence[int]] = {
-        "effort": (len(mechanism.actuators),),
-        "coupling": (len(mechanism.couplings),),
-        "drive": (joints,),
-        "loop": (len(mechanism.loops), 6),
-        "friction": (joints,),
-        "stops": (joints, 2),
-        **dict.fromkeys(("force", "place", "normal", "rolling", "spinning"), (0, 3)),
-    }
-    zeros = {name: np.zeros((*shape, *size)) for name, size in sizes.items()}
-    return Pieces(**{"time": time, "modes": Modes.smooth(mechanism), **zeros, **stated})

@@ -5,7 +5,10 @@ Two routes may share this module and its root finder of guards, and nothing else
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -20,6 +23,8 @@ from proofroll.core.stalling import StepCount
 State = FloatArray
 ModeT = TypeVar("ModeT")
 SpanT = TypeVar("SpanT", bound="Span")
+# Start and end of a step [s] and its states inside, (state, times).
+DenseStep = tuple[float, float, Callable[[FloatArray], FloatArray]]
 # Successive stretches of zero length after which a route makes no progress.
 _STUCK = 50
 # A route makes no progress either after _MANY successive stretches, each shorter than _SHORT times the elapsed time,
@@ -31,6 +36,8 @@ _SHORT, _MANY, _SHRUNK = 1e-6, 400, 0.9
 _LOOK, _MOST = 100, 1000
 # Stretches of a path at most after a close decision, for nothing is known there.
 _BEYOND = 50
+# Parts of the time of a failure before it at which a path may end, where it fails at an end that is nearer.
+_BEFORE = 1e-8, 1e-7, 1e-6, 1e-5, 1e-4
 
 
 @dataclass(frozen=True)
@@ -98,6 +105,7 @@ class Stretch(Generic[ModeT]):
         grazes: times [s] of crests of guards at zero: a small change decides whether they rise above it.
         blur: uncertainty of the end by the error of a step in its guard, however slowly that reaches zero [s].
         dense: start and end of each step [s] and its states inside, (state, times), of an integrator that has them.
+        exact: True if these have as many digits inside a step as at its ends.
     """
 
     start: float
@@ -109,7 +117,14 @@ class Stretch(Generic[ModeT]):
     visited: Sequence[tuple[float, State]] = ()
     grazes: Sequence[float] = ()
     blur: float = 0.0
-    dense: Sequence[tuple[float, float, Callable[[FloatArray], FloatArray]]] = ()
+    dense: Sequence[DenseStep] = ()
+    exact: bool = False
+
+
+def states_inside(steps: Sequence[DenseStep], times: FloatArray) -> FloatArray:
+    """States at rising times [s] within successive steps, (state, times)."""
+    numbers = np.searchsorted([end for _, end, _ in steps[:-1]], times)
+    return np.concatenate([steps[k][2](times[numbers == k]) for k in np.unique(numbers)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -131,6 +146,14 @@ class Transition(Generic[ModeT]):
     margin: float = np.inf
     delay: float = 0.0
     blur: float = 0.0
+
+
+class StoppedWithin(Diverged):
+    """Failure of a walk at its ``time``; ``stretch``: the path before it; None: there is none."""
+
+    def __init__(self, text: str, time: float | None = None, stretch: Any = None) -> None:
+        super().__init__(text, time)
+        self.stretch = stretch
 
 
 class SwitchingRoute(Protocol[ModeT, SpanT]):
@@ -223,9 +246,7 @@ def follow(
         try:
             stretch = route.walk(time, change.state, change.mode, end)
         except (Diverged, Refused) as error:
-            reached = error.time if isinstance(error, Diverged) else None
-            if reached is not None and time < reached < end:  # up to there it is known
-                stretches.append(route.walk(time, change.state, change.mode, reached * (1 - close)))
+            stretches += _known(error, partial(route.walk, time, change.state, change.mode), time, end, close)
             if not stretches:
                 raise
             return path(complete=False, ended=str(error))
@@ -253,6 +274,20 @@ def follow(
                 raise
             ended = "" if undecided else str(error)
             return path(complete=False, ended=ended)
+
+
+def _known(error: Exception, walk: Callable[[float], SpanT], time: float, end: float, close: float) -> list[SpanT]:
+    """Stretch from a time to just before the failure of a walk to an end [s]; none if nothing is known."""
+    reached = error.time if isinstance(error, Diverged) else None
+    if reached is None or not time < reached < end:
+        return []
+    if isinstance(error, StoppedWithin) and error.stretch is not None:
+        return [error.stretch]
+    for part in (close, *_BEFORE):
+        with suppress(Diverged):
+            if time < reached * (1 - part):
+                return [walk(reached * (1 - part))]
+    return []
 
 
 def _latest(happenings: Sequence[Happening]) -> str:
@@ -312,8 +347,27 @@ def integrate_to_guard(
     if not until > time:
         return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=None)
     solver = solver_from(lambda _, y: law.rates(y), time, state, float(np.min(tolerance)), tolerance)
-    back, count, visited, grazes = corrected_by(law.corrected), StepCount(time, until), [], list[float]()
+    back, count, grazes = corrected_by(law.corrected), StepCount(time, until), list[float]()
+    visited = list[tuple[float, State]]()
     dense = list[tuple[float, float, Callable[[FloatArray], FloatArray]]]()
+
+    def known(end: tuple[float, State]) -> Stretch[ModeT] | None:
+        """Stretch up to a step that fails."""
+        reached, last = end
+        if not reached > time:
+            return None
+        return Stretch(
+            start=time,
+            end=reached,
+            mode=mode,
+            first=state,
+            last=last,
+            guard=None,
+            visited=visited,
+            grazes=grazes,
+            dense=dense,
+        )
+
     if first_step is not None:
         solver.h_abs = min(solver.h_abs, max(first_step, 16 * float(np.spacing(time))))
     longest = np.inf
@@ -324,11 +378,11 @@ def integrate_to_guard(
         except Diverged as stopped:
             longest = min(solver.h_abs, longest, until - begun[0]) / 2
             if longest <= NEAREST * max(until - time, begun[0]):
-                raise Diverged(str(stopped), float(begun[0])) from None
+                raise StoppedWithin(str(stopped), float(begun[0]), known(begun)) from None
             continue
         visited.append(begun)
         count.took(solver.t)
-        dense.append((float(solver.t_old), float(solver.t), solver.dense_output()))
+        dense.append((float(solver.t_old), float(solver.t), _lazy_dense(solver)))
         if len(law.noise) and (
             rise := locate_rise(
                 solver, law.guards, law.noise, solver.t_old == time, law.near, grazes, dense=dense[-1][2]
@@ -345,7 +399,14 @@ def integrate_to_guard(
                 grazes=grazes,
                 dense=dense,
             )
-        go_on_from(solver, back(solver.t, solver.y))
+        try:
+            go_on_from(solver, back(solver.t, solver.y))
+        except Diverged as stopped:  # the step leads where the motion does not
+            longest = (solver.t - begun[0]) / 2
+            del visited[-1], dense[-1]
+            if longest <= NEAREST * max(until - time, begun[0]):
+                raise StoppedWithin(str(stopped), float(begun[0]), known(begun)) from None
+            solver = solver_from(lambda _, y: law.rates(y), *begun, float(np.min(tolerance)), tolerance, longest)
     return Stretch(
         start=time,
         end=until,
@@ -357,6 +418,14 @@ def integrate_to_guard(
         grazes=grazes,
         dense=dense,
     )
+
+
+def _lazy_dense(solver: Any) -> Callable[[FloatArray], FloatArray]:
+    """Dense output of the last step of DOP853, (state, times); its three further rates wait for the first call."""
+    step = copy(solver)
+    step.K_extended = solver.K_extended.copy()
+    output = cache(step.dense_output)
+    return lambda times: np.asarray(output()(times))
 
 
 def states_at(

@@ -32,7 +32,7 @@ from proofroll.elements.mechanism.scene.kinks import JUMP
 from proofroll.elements.mechanism.scene.rotations import Array, cross, from_quaternion
 from proofroll.elements.mechanism.scene.signal import varies
 from proofroll.truth.followed_paths import CLOSE, TOLERANCES
-from proofroll.truth.numerics.hybrid import Stretch, StretchLaw, integrate_to_guard, states_at
+from proofroll.truth.numerics.hybrid import Stretch, StretchLaw, integrate_to_guard, states_at, states_inside
 from proofroll.truth.switching.contact_guards import (
     ContactGuard,
     SolvedContacts,
@@ -329,6 +329,8 @@ class ContactWalks(ABC):
             return np.array([self._equations.eliminated(state, stretch.mode) for state in stretch.at(times)])
         if isinstance(stretch, CompiledStretch) and stretch.by is not None:
             return stretch.by.within(self._law(stretch.first, stretch.mode), stretch, times)
+        if stretch.exact:
+            return states_inside(stretch.dense, times).T
         if not stretch.visited:
             return np.array([stretch.first for _ in times])
         return states_at(self._law(stretch.first, stretch.mode), stretch.visited, times, self._tolerance)

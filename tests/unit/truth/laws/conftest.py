@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.laws.check import LawCheck
 from proofroll.truth.laws.integrals import POINTS
-from proofroll.truth.laws.record import Array, Modes, Passage, Pieces, without_contacts
+from proofroll.truth.laws.record import Array, Modes, Passage, Pieces
 from proofroll.truth.laws.residuals import LawResiduals
 
 GRAVITY = 9.81
@@ -52,6 +52,32 @@ class HandMade:
         """Law and part of the first violation; empty texts: there is none."""
         violation = self.residuals().first
         return ("", "") if violation is None else (violation.law, violation.part)
+
+
+def without_contacts(mechanism: Mechanism, time: Array, **stated: Any) -> Pieces:
+    """Pieces of a motion without contacts, stops and dry friction; what is not stated is zero.
+
+    ``stated``: fields of :class:`Pieces`.
+    """
+    shape, joints = time.shape, len(mechanism.joints)
+    sizes: dict[str, Sequence[int]] = {
+        "effort": (len(mechanism.actuators),),
+        "coupling": (len(mechanism.couplings),),
+        "drive": (joints,),
+        "loop": (len(mechanism.loops), 6),
+        "friction": (joints,),
+        "stops": (joints, 2),
+        **dict.fromkeys(("force", "place", "normal", "rolling", "spinning"), (0, 3)),
+    }
+    zeros = {name: np.zeros((*shape, *size)) for name, size in sizes.items()}
+    return Pieces(
+        **{
+            "time": time,
+            "modes": Modes((), (), (), ("open",) * joints, (("open", "open"),) * joints),
+            **zeros,
+            **stated,
+        }
+    )
 
 
 def times(start: float, end: float, count: int = 3) -> tuple[Array, Array]:

@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.dynamics.switches import REDUNDANT, Mode, SwitchedJoint, held_joints
-from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.elements.mechanism.scene.signal import breaks
 
 ROUND_OFF = 1e-12  # of accelerations, in parts of what they are the sum of: no pivot, or round-off alternates for ever
 _MOST_TRIED = 6  # largest number of joints at rest where some share one degree of freedom
@@ -147,19 +145,3 @@ def decided_mode(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses:
         if side:
             mode[number] = joints[number].moving(-side)
     return tuple(mode)
-
-
-def refuse_switching(mechanism: Mechanism) -> None:
-    """Refuses laws that switch, for an integration that cannot follow them.
-
-    Raises:
-        Refused: a joint has dry friction, an effort a limit, or a drive or a target is a table.
-    """
-    for joint in mechanism.joints:
-        if joint.friction:
-            raise Refused(f"dry friction in joint {joint.name} switches, which one smooth integration does not follow")
-    for actuator in mechanism.actuators:
-        if actuator.limit is not None:
-            raise Refused(f"the limit of {actuator.name} switches, which one smooth integration does not follow")
-    if breaks(mechanism.signals):
-        raise Refused("a table of a drive or a target has breaks, which one smooth integration does not follow")

@@ -7,6 +7,7 @@ spherical and free joints are states in the child's axes, which keeps digits whe
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import cross
-from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.dynamics.analysis import BRANCHES, NO_RESPONSE, RANK, RowSign, analyse, reactions
 from proofroll.elements.mechanism.dynamics.complementarity import (
@@ -22,7 +22,6 @@ from proofroll.elements.mechanism.dynamics.complementarity import (
     RestResponse,
     decided_mode,
     load_of,
-    refuse_switching,
 )
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.dynamics.light_joints import lacks_inertia
@@ -170,10 +169,6 @@ class JointCoordinates:
         weight = float(M.max()) / float(np.abs(C.T @ C).max())
         return M + weight * C.T @ C, b - weight * bias @ C
 
-    def spin(self, y: Array) -> float:
-        """Largest angular velocity of a body at a state (q, v) [rad/s]."""
-        return float(np.abs(self.tree.at(y[: self.mechanism.nq], y[self.mechanism.nq :]).w_WB).max())
-
     def rows(self, q: Array) -> Rows:
         """Constraints of loops and couplings for coordinates (nq), at rest."""
         return self.tree.loop_rows(self.tree.at(q, np.zeros(self.mechanism.nv)))
@@ -204,21 +199,6 @@ class JointCoordinates:
         moved, least = np.diag(W)[list(columns)] <= NO_RESPONSE * most, ROUND_OFF * np.sqrt(most) * strength
         return RestResponse(free=rates[list(columns)], by_force=W[np.ix_(columns, columns)], moved=moved, least=least)
 
-    def run(self, times: Array, tolerance: float = 1e-14, visited: list[tuple[float, Array]] | None = None) -> Record:
-        """Record of the motion at the given times [s], by DOP853; ``visited`` takes times and states before steps.
-
-        Raises:
-            Refused: a law switches, see
-                :func:`~proofroll.elements.mechanism.dynamics.complementarity.refuse_switching`.
-            Diverged: the integration stops, e.g. at a singular pose, or stepped over one.
-        """
-        refuse_switching(self.mechanism)
-        start = np.concatenate(self.mechanism.start())
-        least = self._least(tolerance)
-        return self.recorded(
-            times, integrate(self.rate, start, times, tolerance, self.followed(), least, None, visited)
-        )
-
     def recorded(self, times: Array, states: Iterable[Array]) -> Record:
         """Record of states (q, v) at times [s]."""
         nq = self.mechanism.nq
@@ -232,13 +212,17 @@ class JointCoordinates:
         return self.watching(lambda y: self.eliminated(y, mode))
 
     def watching(self, eliminated: Callable[[Array], Array]) -> Callable[[Array], Array]:
-        """A correction of the state that raises Diverged as :meth:`followed` does."""
+        """A correction of the state that raises Diverged as :meth:`followed` does; then the step may be taken anew."""
         sign = RowSign(self.rank)
 
         def corrected(y: Array) -> Array:
+            nonlocal sign
             y = eliminated(y)
-            if self.rank and (sign.changes(self.rows(y[: self.mechanism.nq]).C) or sign.least < BRANCHES):
-                raise Diverged("a step passes a singular pose of the loops, or one as near as lengths are known")
+            if self.rank:
+                tried = copy(sign)
+                if tried.changes(self.rows(y[: self.mechanism.nq]).C) or tried.least < BRANCHES:
+                    raise Diverged("a step passes a singular pose of the loops, or one as near as lengths are known")
+                sign = tried
             return y
 
         return corrected
@@ -273,7 +257,7 @@ class JointCoordinates:
             gains[:, column] += actuator.gear**2 * np.array([actuator.kd, actuator.kp])
         return gains[0], gains[1]
 
-    def _least(self, tolerance: float) -> Array:
+    def least(self, tolerance: float) -> Array:
         """Error tolerances of coordinates and velocities, (nq + nv): the level of the noise of accelerations.
 
         Noise enters the velocities in proportion to the step, not to its ninth power as the error of the method does.
