@@ -29,11 +29,12 @@ _FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for w
 
 
 # If these differ, the start itself differs, and so do its accelerations.
-_STATE = {"position", "orientation", "velocity", "spin"}
+STATE = {"position", "orientation", "velocity", "spin"}
 # Numbers that an engine is given; it may report them correctly and yet move with others.
+PLACED = ("gaps", "normals of contact", "places of contact")  # where bodies are placed as in the scene
 GIVEN = (
     "mass", "centre of mass", "inertia", "gravity", "joint positions", "joint axes",
-    "gaps", "normals of contact", "places of contact", "friction of contacts", "restitution of contacts",
+    *PLACED, "friction of contacts", "restitution of contacts",
 )  # fmt: skip
 # A run whose joints or loops open by more than this part of the mechanism's size is no motion of it with any numbers.
 _OPEN = 1e-2
@@ -55,16 +56,17 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
     if wrong & set(GIVEN):
         return
     start = of_start(evidence)
-    if start is not None and _FOLLOWS & wrong and not _STATE & wrong:
-        yield balanced_at_start(start)
+    if start is not None and start.consistent and _FOLLOWS & wrong and not STATE & wrong:
+        reported = any(line["found"] for line in evidence.lines if line["quantity"] == "acceleration")
+        yield replace(balanced_at_start(start), exact=reported)
     if evidence.run is None or evidence.truth is None or evidence.by_step:
         return
-    part = stretch(mechanism, evidence.run, evidence.truth)
+    part = stretch(evidence.element, evidence.run, evidence.truth)
     if float(np.max(evidence.run["drift"].to_numpy())) > _OPEN * evidence.element.length:
         return
     if part is None or not is_one_motion(evidence.run, evidence.truth, evidence.element.length):
         return
-    seen, true = of_run(mechanism, evidence.run, part), of_run(mechanism, evidence.truth, part)
+    seen, true = (of_run(evidence.element, data, part) for data in (evidence.run, evidence.truth))
     if not seen.consistent:
         return
     true_sizes = np.abs(true.left(plain))
