@@ -383,8 +383,11 @@ def _fit(part: slice) -> tuple[int, int] | None:
     return next(((degree, ends) for degree, ends in _FITS if part.stop - part.start > degree + 2 * ends), None)
 
 
-def of_run(element: Any, dataset: Any, part: slice) -> MechanismStates:
-    """States of a run of an element at some samples of a stretch, away from its ends."""
+def of_run(element: Any, dataset: Any, part: slice, ahead: float = 0.0) -> MechanismStates:
+    """States of a run of an element at some samples of a stretch, away from its ends.
+
+    ``ahead``: time by which the accelerations are those of later [s].
+    """
     mechanism = element.mechanism
     placed = placed_of(mechanism, dataset)
     twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
@@ -392,7 +395,8 @@ def of_run(element: Any, dataset: Any, part: slice) -> MechanismStates:
     time, fit = placed.time[part], _fit(part)
     assert fit is not None  # :func:`stretch` returns only stretches that are long enough
     degree, ends = fit
-    acceleration[part] = make_interp_spline(time, twists[part], k=degree).derivative()(time)
+    later = np.minimum(time + ahead, time[-1])
+    acceleration[part] = make_interp_spline(time, twists[part], k=degree).derivative()(later)
     which = np.unique(np.linspace(part.start + ends, part.stop - 1 - ends, _SAMPLES).astype(int))
     return MechanismStates(mechanism, placed, acceleration, which, limits_of(element))
 

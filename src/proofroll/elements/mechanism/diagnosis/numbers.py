@@ -15,9 +15,6 @@ from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordin
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
 
-# Damping by a scheme of first order at a step h and a stiffness k, in parts of k h: 0.5, and what a fit of it leaves.
-_FIRST_ORDER = 0.6
-
 
 def factor_of_all(
     name: str,
@@ -47,7 +44,7 @@ def factor_of_all(
             factor, fitted = best(residuals, lambda x: change(mechanism, x))
             other_model = change(mechanism, factor)
             told = possible(factor, signed) and in_doubt(evidence, residuals, line, fitted)
-            if told and not _by_scheme(evidence, other_model):
+            if told and not _by_scheme(residuals, other_model):
                 says = f"the engine moves it with {what} {factor_text(factor)}"
                 yield residuals.cause(name, says, other_model, remedy, fitted, change_by(factor))
 
@@ -289,28 +286,18 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
                 size = value * {"armature": 1.0, "damping": evidence.element.natural_time}[has]
                 remedy = f"set {has} of the joints yourself, also where it is zero"
                 change = Change(mechanism, **{key: value * which})
-                if _by_scheme(evidence, change):
+                if _by_scheme(residuals, change):
                     continue
                 part = abs(size) / float(np.min(inertia[which > 0]))
                 yield residuals.cause(f"{what} in {owner}", says, change, remedy, 1, part)
 
 
-def _by_scheme(evidence: Evidence, change: Change) -> bool:
-    """True if a change is damping alone, no more than a first-order scheme adds by itself at the engine's step.
-
-    Steps that are not known, as of an engine that adapts them, may be as long as the interval between samples. The
-    stiffness is that of springs and servos, or of a swing with the mechanism's natural time.
-    """
-    mechanism = evidence.element.mechanism
+def _by_scheme(residuals: Residuals[Change], change: Change) -> bool:
+    """True if a change is damping alone, and a first-order scheme leaves as much by itself at the engine's step."""
+    mechanism = change.mechanism
     damping = np.array([joint.damping for joint in mechanism.joints for _ in range(joint.nv)])
     added = (change.damping - 1.0) * damping + change.added_damping
-    step = evidence.step or (0.0 if evidence.run is None else float(np.diff(evidence.run["time"].to_numpy()).max()))
     if np.any(added < 0) or not np.any(added > 0):
         return False
-    equations = JointCoordinates(mechanism)
-    inertia = np.diag(equations.inertial(equations.tree.at(*mechanism.start()))[1])
-    stiffness = np.array([joint.stiffness for joint in mechanism.joints for _ in range(joint.nv)])
-    for actuator in mechanism.actuators:
-        stiffness[mechanism.place_of(actuator.joint)[1]] += actuator.gear**2 * actuator.kp
-    stiffness = np.maximum(stiffness, inertia / evidence.element.natural_time**2)
-    return bool(np.all(added <= _FIRST_ORDER * step * stiffness))
+    least = np.maximum(residuals.scheme, residuals.closes * residuals.before)
+    return bool(np.all(np.abs(residuals.left(residuals.plain)) <= least))
