@@ -45,6 +45,22 @@ def test_what_the_first_steps_or_the_end_of_a_run_tell_is_named(name: str) -> No
     assert found.named, found.said
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("FrictionSign", "MassTwice", "NoSpin", "Shifted", "GravityUp"),
+        *(
+            pytest.param(name, marks=pytest.mark.drill)
+            for name in ("InertiaTwice", "GravityAlongY", "AgainstSpin", "Damped", "StaleAxes", "LocalSpin")
+        ),
+    ],
+)
+def test_faults_of_a_body_that_rolls_on_a_wall_are_named(name: str) -> None:
+    """Numbers, laws, axes and times of a ball on its wall are told as those of any mechanism are."""
+    found = tried(mutant(name))
+    assert found.named, found.said
+
+
 class SilentBall(Mutant):
     """Ball with one per cent of inertia too much, which the engine does not report."""
 

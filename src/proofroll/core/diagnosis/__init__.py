@@ -170,7 +170,8 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
 
     A cause of a quantity that an earlier one explains already is kept only if it is as good, as an alternative, and
     only a few are. A cause with a fitted parameter is dropped if another fitted one is as good: neither proves
-    anything. A hypothesis ends where mechanics leaves open how its model would move; those before count.
+    anything, unless both leave round-off of more independent numbers than they fit, which no chance does. A hypothesis
+    ends where mechanics leaves open how its model would move; those before count.
     """
     proven: list[Cause] = []
     for item in hypotheses:
@@ -207,8 +208,9 @@ def _rivals(cause: Cause, rival: Cause) -> bool:
 
 
 def _unsure(cause: Cause, rival: Cause) -> bool:
-    """True if a fitted cause is one of several with equally good explanations."""
-    return cause.fitted > 0 and _rivals(rival, cause)
+    """True if a fitted cause is one of several with equally good explanations, which may be so by chance."""
+    by_count = all(item.explains is not None and item.left <= _LEAST for item in (cause, rival))
+    return cause.fitted > 0 and _rivals(rival, cause) and not by_count
 
 
 def hypotheses_of(element: Element) -> Sequence[Hypothesis]:

@@ -109,6 +109,9 @@ class Residuals(Generic[M]):
         others: models that differ from it in one number each; their changes of the residual span all that is
             distinguishable.
         contradicted: True for a model that contradicts a correct report of the engine.
+        exact: True if the engine's own accelerations leave nothing but round-off to its model. They show that numbers
+            read back are not those by which it moves; a run with the errors of its steps does not.
+        scheme: what a scheme of first order leaves by itself at the engine's step, as ``left``.
     """
 
     left: Callable[[M | None], FloatArray]
@@ -120,6 +123,8 @@ class Residuals(Generic[M]):
     plain: M
     others: Callable[[], Sequence[M]]
     contradicted: Callable[[M], bool] = lambda _: False
+    exact: bool = False
+    scheme: FloatArray | float = 0.0
 
     @cached_property
     def _changes(self) -> FloatArray:
@@ -176,6 +181,15 @@ class Residuals(Generic[M]):
         return Cause(name, says, *proof, explains=explains, change=change)
 
 
+def in_doubt(evidence: Evidence, residuals: Residuals[Any], quantity: str, fitted: int = 0) -> bool:
+    """True if a cause may say that the engine moves by other numbers of a quantity than the scene's.
+
+    Where the certificate reads the scene's numbers back, only exact accelerations and a known mistake (nothing
+    ``fitted``) are stronger.
+    """
+    return not evidence.read_back(quantity) or (residuals.exact and not fitted)
+
+
 def cached_on_evidence(residuals: Callable[[Evidence], Iterator[FactT]]) -> Callable[[Evidence], Sequence[FactT]]:
     """The residuals, computed once for each evidence and cached, since nearly every hypothesis needs them."""
 
@@ -200,19 +214,30 @@ def any_gravity(
         gravity_of: gravity of an element in the scene [m/s²].
         falling: model of an element with another vector of gravity.
     """
+    remedy = "look at the axes of gravity"
 
     @hypothesis("direction of gravity", "the equations are linear in gravity: one vector closes them at every state")
     def test(evidence: Evidence) -> Iterator[Cause]:
         element = evidence.element
         g = gravity_of(element)
-        for source in residuals(evidence) if not evidence.read_back("gravity") else ():
+        for source in residuals(evidence):
+            axes = [axis for axis in (*np.eye(3), *-np.eye(3)) if np.any(np.cross(axis, g))]
+            for along in axes if in_doubt(evidence, source, "gravity") else ():
+                gravity = float(np.linalg.norm(g)) * along
+                says = f"the engine's gravity is ({_shown(gravity)}) m/s^2, along another axis"
+                yield source.cause("direction of gravity", says, falling(element, gravity), remedy, 0)
+            if not in_doubt(evidence, source, "gravity", 3):
+                continue
             residual = source.left(falling(element, g))
             slopes = [source.left(falling(element, g + axis)) - residual for axis in np.eye(3)]
             gravity = g - np.linalg.lstsq(np.stack(slopes, axis=-1), residual, rcond=None)[0]
             gravity = np.where(np.abs(gravity) < 1e-6 * max(float(np.max(np.abs(gravity))), 1e-300), 0.0, gravity)
             off, size = (float(np.linalg.norm(x)) for x in (gravity - g, g))
-            says = f"the engine's gravity is ({', '.join(f'{x:.4g}' for x in gravity)}) m/s^2"
-            model, remedy = falling(element, gravity), "look at the axes of gravity"
+            says, model = f"the engine's gravity is ({_shown(gravity)}) m/s^2", falling(element, gravity)
             yield source.cause("direction of gravity", says, model, remedy, 3, off / size if size else np.inf)
 
     return test
+
+
+def _shown(gravity: FloatArray) -> str:
+    return ", ".join(f"{x:.4g}" for x in gravity + 0.0)  # not -0

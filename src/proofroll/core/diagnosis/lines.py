@@ -27,19 +27,25 @@ def scale_of(line: Mapping[str, Any]) -> float:
     return apart / line["difference"] if apart and line["difference"] else 1.0
 
 
-def built_otherwise(names: Collection[str], covers: tuple[str, ...]) -> Hypothesis:
+def built_otherwise(
+    names: Collection[str], covers: tuple[str, ...], places: Collection[str] = (), state: Collection[str] = ()
+) -> Hypothesis:
     """Hypothesis: the model was built with other numbers than the scene's, as its certificate shows.
 
     Args:
         names: quantities that the adapter hands to the engine.
         covers: quantities that follow from them.
+        places: those of ``names`` that are others, too, where the start is another.
+        state: quantities of the start.
     """
 
     @hypothesis(
         "built", "the engine's own model, read back, holds other numbers than the scene: its certificate says so"
     )
     def test(evidence: Evidence) -> Iterator[Cause]:
-        wrong = [line for line in differing(evidence.lines) if line["quantity"] in names]
+        lines = differing(evidence.lines)
+        moved = any(line["quantity"] in state for line in lines)
+        wrong = [line for line in lines if line["quantity"] in names and not (moved and line["quantity"] in places)]
         if not wrong or all(_is_single(line) for line in wrong):
             return
         worst = max(wrong, key=lambda line: float(line["difference"]))

@@ -94,7 +94,7 @@ FAULTS = (
     _told(
         "LocalForce",
         "force in the surface's axes",
-        "ball in the surface's axes",
+        "contact on its first body in the surface's axes",
         force=lambda self, sample: self.local(sample.p_WB).T @ sample.force,
     ),
     _told("FrictionSign", "friction with the wrong sign", "friction has the wrong sign", force=_mirrored),
@@ -102,7 +102,7 @@ FAULTS = (
     _told(
         "Impulse",
         "impulse instead of force",
-        "force is the wall's force on the ball",
+        "times the step, as an impulse",
         force=lambda _, sample: sample.force * STEP,
     ),
     _told("ContactPoint", "position of the contact point", "contact point", p_WB=_contact_point),

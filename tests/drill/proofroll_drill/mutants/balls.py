@@ -164,9 +164,9 @@ def _mean_force(self: Any, sample: BallSample) -> BallSample:
 _misread, _newton = partial(planted, Mutant), partial(planted, NewtonMutant)
 FAULTS = (
     _misread(
-        "ThinShell", "inertia of a thin shell, 2/3 m a^2", "moment of inertia", misread=_ball(inertia_ratio=2 / 3)
+        "ThinShell", "inertia of a thin shell, 2/3 m a^2", "all inertias 5/3 times", misread=_ball(inertia_ratio=2 / 3)
     ),
-    _misread("InertiaTwice", "inertia counted twice", "moment of inertia", misread=_ball(inertia_ratio=0.8)),
+    _misread("InertiaTwice", "inertia counted twice", "all inertias counted twice", misread=_ball(inertia_ratio=0.8)),
     ToldInertia,
     _misread("GravityHalved", "gravity halved", "gravity", misread=_gravity(0.5)),
     _misread("GravityUp", "gravity with the wrong sign", "gravity", misread=_gravity(-1.0)),

@@ -11,6 +11,7 @@ from proofroll.core.entry_points import loaded
 from proofroll.elements.mechanism.diagnosis import contacts
 from proofroll.elements.mechanism.diagnosis.applied_forces import of_applied_forces
 from proofroll.elements.mechanism.diagnosis.bushings import of_bushings
+from proofroll.elements.mechanism.diagnosis.contact_forces import REPORTED_FORCES
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import at_start
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.impacts import impacts, laws_of_impacts
@@ -18,13 +19,15 @@ from proofroll.elements.mechanism.diagnosis.joint_laws import of_actuators, of_c
 from proofroll.elements.mechanism.diagnosis.motions import of_motions
 from proofroll.elements.mechanism.diagnosis.numbers import (
     FACTORS_OF_ALL,
+    damped_motion,
     friction_of_each_joint,
     of_each_body,
     of_each_joint,
 )
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
 from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, residuals_of
+from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, PLACED, STATE, residuals_of
+from proofroll.elements.mechanism.diagnosis.resistance import rolling_resistance
 from proofroll.elements.mechanism.diagnosis.starts import start_not_taken
 from proofroll.elements.mechanism.diagnosis.structure import (
     axis_of_first_steps,
@@ -38,7 +41,7 @@ GRAVITY = any_gravity(
     lambda element: np.array(element.mechanism.gravity),
     lambda element, gravity: Change(element.mechanism, gravity=gravity),
 )
-BUILT = built_otherwise([name for name in GIVEN if name != "joint axes"], COVERED)
+BUILT = built_otherwise([name for name in GIVEN if name != "joint axes"], COVERED, PLACED, STATE)
 # Entry points of hypotheses about mechanisms that other packages test, each a :class:`Hypothesis`.
 GROUP = "proofroll.mechanism_hypotheses"
 _OF_WHOLE_RUNS: tuple[Hypothesis, ...] = (
@@ -47,6 +50,7 @@ _OF_WHOLE_RUNS: tuple[Hypothesis, ...] = (
     reactions,
     reactions_at_start,
     BUILT,
+    *REPORTED_FORCES,
     *contacts.HYPOTHESES,
     at_start,
     impacts,
@@ -54,6 +58,8 @@ _OF_WHOLE_RUNS: tuple[Hypothesis, ...] = (
     other_axis,
     axis_of_first_steps,
     *FACTORS_OF_ALL,
+    damped_motion,
+    rolling_resistance,
     of_motions,
     of_applied_forces,
     of_bushings,

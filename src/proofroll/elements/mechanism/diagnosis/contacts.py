@@ -11,7 +11,6 @@ from proofroll.core.arrays import FloatArray, longest
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.fitting import cached_on_evidence, change_by, factor_text
 from proofroll.core.diagnosis.samples import run_and_truth
-from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.observables import (
@@ -31,6 +30,7 @@ _FEW = 3  # samples of friction from which a square does not fit by chance
 _ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
 _UNCONVEX = "no step mends it: set cone_correction=true where the engine has it, or take Coulomb's own law"
 _HELD = 1e-6  # slip speed of the truth that counts as sticking, relative to the mechanism's speed
+FORCES_AT_START = "forces of contact"  # line of the certificate
 # A wrong contact changes all of the motion, so that no further cause of the motion is looked for.
 COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
 contact_cause = functools.partial(Cause, covers=COVERS)
@@ -132,28 +132,6 @@ def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
         true=true,
         true_force=truth["contact_forces"].to_numpy(),
     )
-
-
-@hypothesis("contact forces", "the engine reports the true forces with another sign, frame or time")
-def contact_forces(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: contact forces are reported on the other body, in other axes, or at another time."""
-    for touch in touch_of(evidence):
-        finite = np.isfinite(touch.true_force[1:]).all(axis=(0, 2))
-        if not touch.moves_as_true:
-            continue  # forces of another motion cannot be compared
-        reported, true = touch.force[1:, finite], touch.true_force[1:, finite]
-        if finite.any() and "contact_forces" not in evidence.settled:
-            what, least = "the force of a contact on its first body", evidence.element.force
-            yield from ReportedVector(
-                name="contact_forces",
-                what=what,
-                unit="N",
-                reported=reported,
-                true=true,
-                time=touch.time[1:],
-                frames={},
-                least=least,
-            ).causes(evidence.step)
 
 
 @hypothesis("friction of contacts", "sliding friction is one factor times its bound, against the slip, in every sample")
@@ -282,29 +260,13 @@ def _of_a_square(
     )
 
 
-@hypothesis(
-    "contact forces at time 0",
-    "the certificate's forces have another sign or other axes, or friction is bounded by a pyramid",
-)
-def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
-    """Hypotheses of contact forces at time 0: sign, axes, or a pyramid."""
-    element, name = evidence.element, "forces of contact"
-    lines = {str(line["quantity"]): line for line in evidence.lines}
-    line, shape = lines.get(name), (len(element.mechanism.contacts), 3)
-    if line is None or line["holds"] or np.size(line["found"]) != np.prod(shape):
+@hypothesis("friction pyramid at time 0", "friction of what slides at time 0 lies on the sides of a square")
+def pyramid_at_start(evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: friction at time 0 is bounded by a pyramid."""
+    element = evidence.element
+    if (pair := forces_of_lines(evidence)) is None:
         return
-    reported, true = np.reshape(line["found"], shape), np.reshape(line["expected"], shape)
-    finite = np.isfinite(reported).all(axis=-1) & np.isfinite(true).all(axis=-1)
-    if all(content["holds"] for key, content in lines.items() if key != name) and finite.any():
-        yield from ReportedVector(
-            name="contact_forces",
-            what="the force of a contact on its first body",
-            unit="N",
-            reported=reported[None, finite],
-            true=true[None, finite],
-            time=np.zeros(1),
-            least=element.force,
-        ).causes(evidence.step)
+    reported, _, finite = pair
     followed = follow_contacts(element.start)
     n, friction = followed.normal[0], np.array([contact.friction for contact in element.mechanism.contacts])
     friction = np.where(np.isinf(friction), 0.0, friction)
@@ -315,6 +277,16 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
         bound, T = (friction * N)[slides], (reported - N[:, None] * n)[slides]
         full = -u * (bound / followed.slip[0][slides])[:, None]
         yield from _of_a_square(n[slides], u, T, full, bound, element.force)
+
+
+def forces_of_lines(evidence: Evidence) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]] | None:
+    """Reported and true contact forces at time 0 [N], (contacts, 3), where they differ, and which are known."""
+    line = next((line for line in evidence.lines if line["quantity"] == FORCES_AT_START), None)
+    shape = (len(evidence.element.mechanism.contacts), 3)
+    if line is None or line["holds"] or np.size(line["found"]) != np.prod(shape):
+        return None
+    reported, true = np.reshape(line["found"], shape), np.reshape(line["expected"], shape)
+    return reported, true, np.asarray(np.isfinite(reported).all(axis=-1) & np.isfinite(true).all(axis=-1))
 
 
 @hypothesis(
@@ -340,11 +312,10 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
 
 
 HYPOTHESES = (
-    contact_forces,
-    forces_at_start,
     convex_cone,
     convex_cone_from_rest,
     pyramid,
+    pyramid_at_start,
     friction_factor,
     left_out,
     creep,

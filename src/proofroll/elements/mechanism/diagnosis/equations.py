@@ -19,10 +19,12 @@ from scipy.interpolate import make_interp_spline
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.first_steps import OF_FIRST_STEPS
+from proofroll.elements.mechanism.diagnosis.pressing import SCENES_LAW, ContactLimits, Pressing, Resisting, pressing
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.point_loads import PointLoad, applied_loads, bushing_loads, spring_loads
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
+from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.run.dataset import quaternions
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
@@ -66,12 +68,21 @@ class MechanismStates:
 
     Attributes:
         each: the states.
-        consistent: True if the tree allows the bodies' velocities in their poses. If not, the reported motion is wrong,
-            and no conclusion about the equations is possible.
+        consistent: True if the tree allows the bodies' velocities in their poses, and contacts have one place each. If
+            not, the reported motion is wrong, or its loads are not told, and no conclusion about the equations is
+            possible.
     """
 
-    def __init__(self, mechanism: Mechanism, placed: Placed, acceleration: FloatArray, which: FloatArray) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        placed: Placed,
+        acceleration: FloatArray,
+        which: FloatArray,
+        limits: ContactLimits | None = None,
+    ) -> None:
         self.mechanism, self.tree = mechanism, Tree(mechanism)
+        self._limits, self._pressing = limits or ContactLimits.of(0.0, 0.0), dict[tuple[int, Resisting], Pressing]()
         coordinates, _ = placed.of_tree()
         self.each: list[MechanismState] = []
         self.consistent = True
@@ -87,16 +98,26 @@ class MechanismStates:
                     t=float(placed.time[i]), q=q, v=v, motion=self.tree.at(q, v), acceleration=acceleration[i]
                 )
             )
+        self.consistent &= all(self.pressing(i, SCENES_LAW).told for i in range(len(self.each)))
 
     @cached_property
     def allowed(self) -> list[FloatArray]:
-        """Directions of the tree's velocities that loops and couplings allow, (nv, directions), at each state."""
-        return [self.free(state, ()) for state in self.each]
+        """Directions along which loops, couplings and contacts do no unknown work, (nv, directions), at each state."""
+        return [self.free(i, ()) for i in range(len(self.each))]
 
-    def free(self, state: MechanismState, without: tuple[int, ...]) -> FloatArray:
-        """Directions of velocity allowed at one state, (nv, directions), if some rows of loops are left out."""
-        rows = self.tree.loop_rows(state.motion)
-        C = np.concatenate([np.delete(rows.C, without, axis=0), self.coupled])
+    def pressing(self, i: int, law: Resisting) -> Pressing:
+        """Loads of contacts at one state, with a law of rolling resistance."""
+        if (i, law) not in self._pressing:
+            self._pressing[i, law] = pressing(self.mechanism, self.each[i].motion, self._limits, law)
+        return self._pressing[i, law]
+
+    def free(self, i: int, without: tuple[int, ...], law: Resisting = SCENES_LAW) -> FloatArray:
+        """Directions of velocity along which no unknown force works at one state, (nv, directions).
+
+        ``without``: rows of loops that are left out; ``law``: of rolling resistance.
+        """
+        rows = self.tree.loop_rows(self.each[i].motion)
+        C = np.concatenate([np.delete(rows.C, without, axis=0), self.coupled, self.pressing(i, law).unknown])
         if not len(C):
             return np.eye(self.mechanism.nv)
         _, S, Vt = np.linalg.svd(C)
@@ -143,14 +164,17 @@ class MechanismStates:
     def left(self, change: Change, without: tuple[int, ...] = ()) -> FloatArray:
         """Relative residuals of the balance along the allowed motions, all states in one vector.
 
-        Where a change removes all inertia and loads of a velocity, the unchanged mechanism's residual stands there: an
-        empty balance proves nothing.
+        Where a change removes all inertia and loads of a velocity, and loads no other one that had no load, the
+        unchanged mechanism's residual stands there: an empty balance proves nothing.
         """
         residuals, parts, plain = [], self.parts(change), self._own
         gone = np.max(parts[:, 2], axis=0) <= _GONE * np.max(plain[:, 2], axis=0)
+        loads, plain_loads = (np.max(np.abs(values[:, 1]), axis=0) for values in (parts, plain))
+        gone &= not np.any((loads > 0) & (plain_loads <= _GONE * loads))
         balance = np.where(gone, plain[:, 0] - plain[:, 1], parts[:, 0] - parts[:, 1])
         for i, row in enumerate(balance):
-            directions = self.free(self.each[i], without) if without else self.allowed[i]
+            as_built = not without and change.resisting == SCENES_LAW
+            directions = self.allowed[i] if as_built else self.free(i, without, change.resisting)
             residuals.append(directions.T @ row / (np.abs(directions.T) @ self.scale))
         return np.concatenate(residuals)
 
@@ -178,6 +202,8 @@ class Change:
         gyroscopic: factor on ω × I ω.
         factors_of_forces: factors on some of the applied forces, by their index.
         coupling: mask of entries of the mass matrix that are lost, (nv, nv).
+        decay: rates at which linear and angular momenta of all bodies are damped [1/s].
+        resisting: law of rolling resistance.
     """
 
     mechanism: Mechanism
@@ -200,6 +226,8 @@ class Change:
     gyroscopic: float = 1.0
     factors_of_forces: tuple[tuple[int, float], ...] = ()
     coupling: FloatArray | None = None
+    decay: tuple[float, float] = (0.0, 0.0)
+    resisting: Resisting = SCENES_LAW
 
     def balance(self, states: MechanismStates, i: int) -> FloatArray:
         """Inertial forces, applied forces, and the sum of sizes of their terms, along each velocity, (3, nv)."""
@@ -216,7 +244,8 @@ class Change:
         J[:, :3] -= skews(arm) @ J[:, 3:]
         alpha = state.acceleration[:, 3:]
         at_com = state.acceleration[:, :3] + cross(alpha, arm) + cross(w, cross(w, arm))
-        spin = cross(w, np.einsum("nij,nj->ni", inertia, w)) * self.gyroscopic
+        spinning = np.einsum("nij,nj->ni", inertia, w)
+        spin = cross(w, spinning) * self.gyroscopic
         force, moment = mass[:, None] * at_com, np.einsum("nij,nj->ni", inertia, alpha)
         terms = [np.einsum("nij,ni->j", J[:, :3], force)]
         terms += [np.einsum("nij,ni->j", J[:, 3:], item) for item in (moment, spin)]
@@ -231,6 +260,10 @@ class Change:
             terms.append(-(M * self.coupling) @ rate)
         acts = acts + self.torque * np.array([float(value_at(j.torque, state.t)) for j in by_v])
         acts = acts - self.friction * np.array([j.friction for j in by_v]) * np.sign(state.v)
+        momenta = mass[:, None] * (motion.v_WB[:n] + cross(w, arm)), spinning
+        for lost, carried, momentum in zip(self.decay, (J[:, :3], J[:, 3:]), momenta, strict=True):
+            acts = acts - lost * np.einsum("nij,ni->j", carried, momentum)
+        acts = acts + states.pressing(i, self.resisting).known
         for actuator in mechanism.actuators:
             at_one, rated = m.place_of(actuator.joint)
             acts[rated] += self.effort(actuator, state.t, float(state.q[at_one]), float(state.v[rated]))
@@ -291,14 +324,25 @@ def is_one_motion(run: Any, truth: Any, length: float) -> bool:
     return float(np.max(np.abs(unexplained), initial=0.0)) <= least
 
 
-def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:
-    """Mode of the switching laws at each sample: friction and stops, limited efforts, sections of tables."""
+def limits_of(element: Any) -> ContactLimits:
+    """Sizes by which the states of an element's contacts are told."""
+    return ContactLimits.of(element.length, element.speed)
+
+
+def _modes(element: Any, placed: Placed) -> list[tuple[object, ...]]:
+    """Mode of the switching laws at each sample: friction and stops, limited efforts, sections of tables, contacts."""
+    mechanism, limits = element.mechanism, limits_of(element)
+    followed = follow_contacts(placed)
+    touching = [
+        tuple(map(limits.kind, mechanism.contacts, gaps, slips))
+        for gaps, slips in zip(followed.gap.tolist(), followed.slip.tolist(), strict=True)
+    ]
     corners = np.array(breaks(mechanism.signals))
     modes: list[tuple[object, ...]] = []
     joints = switched_joints(mechanism)
     q, v = placed.of_tree() if joints or mechanism.actuators else (np.zeros((len(placed.time), mechanism.nq)),) * 2
     least = _AT_REST * np.max(np.abs(v), axis=0, initial=0.0)
-    for t, places, rates in zip(placed.time.tolist(), q, v, strict=True):
+    for t, places, rates, touched in zip(placed.time.tolist(), q, v, touching, strict=True):
         rest = tuple(
             (
                 np.sign(rates[j.velocity]) if abs(rates[j.velocity]) > least[j.velocity] else 0.0,
@@ -308,7 +352,7 @@ def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:
         )
         limited = ((item, *mechanism.place_of(item.joint)) for item in mechanism.actuators if item.limit is not None)
         efforts = tuple(item.mode(t, float(places[place]), float(rates[rated])) for item, place, rated in limited)
-        modes.append((rest, efforts, int(np.searchsorted(corners, t))))
+        modes.append((rest, efforts, int(np.searchsorted(corners, t)), touched))
     return modes
 
 
@@ -318,15 +362,16 @@ def _moves(mode: tuple[object, ...]) -> bool:
     return all(direction and inside for direction, inside in rest)
 
 
-def stretch(mechanism: Mechanism, *datasets: Any) -> slice | None:
-    """Longest stretch of samples in which no run switches and no joint is held.
+def stretch(element: Any, *datasets: Any) -> slice | None:
+    """Longest stretch of samples in which no run of an element switches and no joint is held.
 
     None: there are too few samples, or a run has values that are not finite.
     """
     if not all(is_motion(dataset) for dataset in datasets):
         return None
     count = min(dataset.sizes["time"] for dataset in datasets)
-    modes = list(zip(*(_modes(mechanism, placed_of(mechanism, dataset)) for dataset in datasets), strict=False))
+    placed = (placed_of(element.mechanism, dataset) for dataset in datasets)
+    modes = list(zip(*(_modes(element, motion) for motion in placed), strict=False))
     ends = [0, *(k for k in range(1, count) if modes[k] != modes[k - 1]), count]
     free = [slice(a, b) for a, b in itertools.pairwise(ends) if all(map(_moves, modes[a]))]
     longest = max(free, key=lambda part: part.stop - part.start, default=slice(0, 0))
@@ -338,17 +383,22 @@ def _fit(part: slice) -> tuple[int, int] | None:
     return next(((degree, ends) for degree, ends in _FITS if part.stop - part.start > degree + 2 * ends), None)
 
 
-def of_run(mechanism: Mechanism, dataset: Any, part: slice) -> MechanismStates:
-    """States of a run at some samples of a stretch, away from its ends."""
+def of_run(element: Any, dataset: Any, part: slice, ahead: float = 0.0) -> MechanismStates:
+    """States of a run of an element at some samples of a stretch, away from its ends.
+
+    ``ahead``: time by which the accelerations are those of later [s].
+    """
+    mechanism = element.mechanism
     placed = placed_of(mechanism, dataset)
     twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
     acceleration = np.zeros_like(twists)
     time, fit = placed.time[part], _fit(part)
     assert fit is not None  # :func:`stretch` returns only stretches that are long enough
     degree, ends = fit
-    acceleration[part] = make_interp_spline(time, twists[part], k=degree).derivative()(time)
+    later = np.minimum(time + ahead, time[-1])
+    acceleration[part] = make_interp_spline(time, twists[part], k=degree).derivative()(later)
     which = np.unique(np.linspace(part.start + ends, part.stop - 1 - ends, _SAMPLES).astype(int))
-    return MechanismStates(mechanism, placed, acceleration, which)
+    return MechanismStates(mechanism, placed, acceleration, which, limits_of(element))
 
 
 def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | None:
@@ -357,7 +407,7 @@ def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | Non
     Accelerations are those that the engine reports, or else those of its first steps; if ``derived``, only the latter.
     """
     element = evidence.element
-    if not _moves(_modes(element.mechanism, element.start)[0]):
+    if not _moves(_modes(element, element.start)[0]):
         return None
     lines = {line["quantity"]: line for line in evidence.lines}
     rows = []
@@ -368,6 +418,5 @@ def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | Non
         if line is None or not line["found"] or not np.all(np.isfinite(line["found"])):
             return None
         rows.append(np.reshape(line["found"], (len(element.bodies), 3)))
-    return MechanismStates(
-        element.mechanism, element.start, np.concatenate(rows, axis=-1)[None], np.zeros(1, dtype=int)
-    )
+    accelerations = np.concatenate(rows, axis=-1)[None]
+    return MechanismStates(element.mechanism, element.start, accelerations, np.zeros(1, dtype=int), limits_of(element))

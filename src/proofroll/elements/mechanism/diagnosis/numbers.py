@@ -8,14 +8,12 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, change_by, factor_text, possible
+from proofroll.core.diagnosis.fitting import Residuals, change_by, factor_text, in_doubt, possible
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
-
-# Damping by a scheme of first order at a step h and a stiffness k, in parts of k h: 0.5, and what a fit of it leaves.
-_FIRST_ORDER = 0.6
 
 
 def factor_of_all(
@@ -42,10 +40,11 @@ def factor_of_all(
     @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
     def test(evidence: Evidence) -> Iterator[Cause]:
         mechanism = evidence.element.mechanism
-        for residuals in residuals_of(evidence) if has(mechanism) and not evidence.read_back(line) else ():
+        for residuals in residuals_of(evidence) if has(mechanism) else ():
             factor, fitted = best(residuals, lambda x: change(mechanism, x))
             other_model = change(mechanism, factor)
-            if possible(factor, signed) and not _by_scheme(evidence, other_model):
+            told = possible(factor, signed) and in_doubt(evidence, residuals, line, fitted)
+            if told and not _by_scheme(residuals, other_model):
                 says = f"the engine moves it with {what} {factor_text(factor)}"
                 yield residuals.cause(name, says, other_model, remedy, fitted, change_by(factor))
 
@@ -152,23 +151,29 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
             which = np.arange(len(mass)) == i
 
             for what, values in (("mass", mass), ("inertia", inertia)):
-                if evidence.read_back(what):
-                    continue
 
                 def change(x: float, what: str = what, values: FloatArray = values, which: Any = which) -> Change:
                     scaled = (np.where(which, x, 1.0) * values.T).T
                     return Change(mechanism, **{what: scaled})  # type: ignore[arg-type]  # an array by its name
 
                 factor, number = best(residuals, change)
-                if not possible(factor, False):
+                if not (possible(factor, False) and in_doubt(evidence, residuals, what, number)):
                     continue
                 says = f"the engine moves the body {body.name} with its {what} {factor_text(factor)}"
                 model, remedy = change(factor), f"give {body.name} its {what} once"
                 yield residuals.cause(f"{what} of {body.name}", says, model, remedy, number, change_by(factor))
-        if not evidence.read_back("inertia"):
+        if in_doubt(evidence, residuals, "inertia"):
             yield from _reordered(residuals, mechanism, inertia)
-        if np.any(com) and not evidence.read_back("centre of mass"):
+        if np.any(com) and in_doubt(evidence, residuals, "inertia"):
             yield from _about_origin(residuals, mechanism, mass, com, inertia)
+        if np.any(com):
+            says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
+            model = Change(mechanism, weight_at_origin=True)
+            yield residuals.cause("place of weight", says, model, "put the weight at the centre of mass", 0)
+        if np.any(com) and in_doubt(evidence, residuals, "centre of mass"):
+            says = "the centres of mass are taken to be at the origins of the bodies' frames"
+            model = Change(mechanism, com=np.zeros_like(com))
+            yield residuals.cause("centre of mass", says, model, "give the centres of mass", 0)
 
 
 def _reordered(residuals: Residuals[Change], mechanism: Mechanism, inertia: FloatArray) -> Iterator[Cause]:
@@ -188,7 +193,7 @@ def _reordered(residuals: Residuals[Change], mechanism: Mechanism, inertia: Floa
 def _about_origin(
     residuals: Residuals[Change], mechanism: Mechanism, mass: FloatArray, com: FloatArray, inertia: FloatArray
 ) -> Iterator[Cause]:
-    """Hypotheses: Steiner's part added once too often or too few, centres of mass ignored."""
+    """Hypotheses: Steiner's part added once too often or too few."""
     steiner = mass[:, None, None] * (
         np.einsum("ni,ni->n", com, com)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None, :]
     )
@@ -199,14 +204,27 @@ def _about_origin(
             moved = inertia + sign * which[:, None, None] * steiner
             if np.min(np.linalg.eigvalsh(moved)) >= 0:
                 yield residuals.cause("point of inertia", says, Change(mechanism, inertia=moved), remedy, 0)
-    says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
-    yield residuals.cause(
-        "place of weight", says, Change(mechanism, weight_at_origin=True), "put the weight at the centre of mass", 0
-    )
-    says = "the centres of mass are taken to be at the origins of the bodies' frames"
-    yield residuals.cause(
-        "centre of mass", says, Change(mechanism, com=np.zeros_like(com)), "give the centres of mass", 0
-    )
+
+
+@hypothesis("damped motion", "the equations are linear in it: one rate balances them at every state of the run")
+def damped_motion(evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: velocities or spins of bodies, or both, decay at one rate, as engines for games have it.
+
+    Only free bodies tell it from damping in joints.
+    """
+    mechanism, period = evidence.element.mechanism, evidence.element.natural_time
+    remedy = "find the engine's own damping, drag or sleeping, and switch it off"
+    free = any(joint.kind == JointKind.FREE for joint in mechanism.joints)
+    for residuals in residuals_of(evidence) if free else ():
+        plain = residuals.left(Change(mechanism))
+        for what, which in (("velocities", (1.0, 0.0)), ("spins", (0.0, 1.0)), ("velocities and spins", (1.0, 1.0))):
+            slope = residuals.left(Change(mechanism, decay=which)) - plain
+            square = float(slope @ slope)
+            rate = -float(slope @ plain) / square if square else 0.0
+            if rate > 0:
+                says = f"{what} of all bodies are damped at a rate of {rate:.4g} per second"
+                model = Change(mechanism, decay=(rate * which[0], rate * which[1]))
+                yield residuals.cause("damped motion", says, model, remedy, 1, rate * period)
 
 
 @hypothesis(
@@ -268,28 +286,18 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
                 size = value * {"armature": 1.0, "damping": evidence.element.natural_time}[has]
                 remedy = f"set {has} of the joints yourself, also where it is zero"
                 change = Change(mechanism, **{key: value * which})
-                if _by_scheme(evidence, change):
+                if _by_scheme(residuals, change):
                     continue
                 part = abs(size) / float(np.min(inertia[which > 0]))
                 yield residuals.cause(f"{what} in {owner}", says, change, remedy, 1, part)
 
 
-def _by_scheme(evidence: Evidence, change: Change) -> bool:
-    """True if a change is damping alone, no more than a first-order scheme adds by itself at the engine's step.
-
-    Steps that are not known, as of an engine that adapts them, may be as long as the interval between samples. The
-    stiffness is that of springs and servos, or of a swing with the mechanism's natural time.
-    """
-    mechanism = evidence.element.mechanism
+def _by_scheme(residuals: Residuals[Change], change: Change) -> bool:
+    """True if a change is damping alone, and a first-order scheme leaves as much by itself at the engine's step."""
+    mechanism = change.mechanism
     damping = np.array([joint.damping for joint in mechanism.joints for _ in range(joint.nv)])
     added = (change.damping - 1.0) * damping + change.added_damping
-    step = evidence.step or (0.0 if evidence.run is None else float(np.diff(evidence.run["time"].to_numpy()).max()))
     if np.any(added < 0) or not np.any(added > 0):
         return False
-    equations = JointCoordinates(mechanism)
-    inertia = np.diag(equations.inertial(equations.tree.at(*mechanism.start()))[1])
-    stiffness = np.array([joint.stiffness for joint in mechanism.joints for _ in range(joint.nv)])
-    for actuator in mechanism.actuators:
-        stiffness[mechanism.place_of(actuator.joint)[1]] += actuator.gear**2 * actuator.kp
-    stiffness = np.maximum(stiffness, inertia / evidence.element.natural_time**2)
-    return bool(np.all(added <= _FIRST_ORDER * step * stiffness))
+    least = np.maximum(residuals.scheme, residuals.closes * residuals.before)
+    return bool(np.all(np.abs(residuals.left(residuals.plain)) <= least))

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, known_difference
+from proofroll.core.arrays import FloatArray, known_difference, longest
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis.clocks import delay_text, in_steps
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import (
     another_clock,
@@ -20,12 +21,18 @@ from proofroll.core.diagnosis.samples import (
 from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
+from proofroll.elements.mechanism.diagnosis.frames import frames_of
+from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.run.dataset import quaternions
 
 if TYPE_CHECKING:
     import xarray as xr
 
-BODY = "body axes"
+# Lines of the certificate that follow from velocities.
+_FOLLOWS = frozenset(
+    {"forces", "torques", "forces of contact", "efforts", "couplings", "drives"}
+    | {f"{turning}acceleration{OF_FIRST_STEPS}" for turning in ("", "angular ")}
+)
 _UNITS = {
     "p_WB": ("the origin of the body's frame", "m"),
     "v_WB": ("the velocity of that origin", "m/s"),
@@ -53,6 +60,52 @@ def _of_centres(vector: ReportedVector, evidence: Evidence) -> Iterator[Cause]:
     yield vector.cause(
         "centre of mass", says, vector.true + shift[-len(vector.true) :], "give the origins of the frames"
     )
+
+
+def _of_contacts(vector: ReportedVector, evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: positions or velocities of what touches are those of the point of contact, or spins its normal's."""
+    mechanism = evidence.element.mechanism
+    if not mechanism.contacts or vector.reported.shape != vector.true.shape:
+        return
+    placed = placed_of(mechanism, evidence.truth)
+    followed = follow_contacts(placed)
+    shift, normal = np.zeros_like(placed.p_WB), np.zeros_like(placed.p_WB)
+    for body, index in mechanism.body_index.items():
+        ends = [k for k, item in enumerate(mechanism.contacts) if body in {item.body_a, item.body_b}]
+        if index >= 0 and len(ends) == 1:  # of several contacts none is the one that is meant
+            shift[:, index] = followed.place[:, ends[0]] - placed.p_WB[:, index]
+            normal[:, index] = followed.normal[:, ends[0]]
+    spin = np.sum(placed.w_WB * normal, axis=-1, keepdims=True) * normal
+    at_contact = "of the contact point, not of the origin of the body's frame"
+    others = {
+        "p_WB": ((f"is the position {at_contact}", shift),),
+        "v_WB": ((f"is the velocity {at_contact}", np.cross(placed.w_WB, shift)),),
+        "w_WB": (
+            ("lacks the spin about the normal of the contact", -spin),
+            ("is the spin about the normal of the contact alone", spin - placed.w_WB),
+            ("has the spin about the normal of the contact with the wrong sign", -2 * spin),
+        ),
+    }
+    remedy = f"give {vector.name} of the body's frame, along the axes of the world"
+    for says, change in others[vector.name]:
+        explained = vector.true + change[-len(vector.true) :]
+        yield vector.cause("contact point", f"{vector.name} {says}", explained, remedy)
+
+
+@hypothesis("late start", "the positions at time 0 are those of the true path at another time, to second order")
+def starts_late(evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: the start lies on the true path before or after time 0; tested with the certificate's line alone."""
+    line = next((line for line in differing(evidence.lines) if line["quantity"] == "position"), None)
+    element = evidence.element
+    v, a = element.start.v_WB[0], element.first_motion.acceleration
+    if evidence.run is not None or line is None or len(line["found"]) != v.size or not np.any(v):
+        return
+    off = np.reshape(np.subtract(line["found"], line["expected"]), v.shape)
+    ahead = float(np.sum(off * v) / np.sum(v * v))
+    says = f"the start is {delay_text(-ahead, evidence.step)}: the bodies have moved before time 0"
+    proof = "position at time 0", "m", longest(off), longest(off - v * ahead - a * ahead**2 / 2)
+    remedy, change = "sample before the first step", in_steps(ahead, evidence.step)
+    yield Cause("late", says, *proof, remedy=remedy, fitted=1, change=change)
 
 
 @hypothesis(
@@ -99,14 +152,18 @@ def _attitudes(evidence: Evidence) -> FloatArray:
 CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque", "motion"))
 REPORTING_ERRORS: tuple[Any, ...] = (
     CLOCK,
+    starts_late,
     reported_vectors(
         _UNITS,
-        lambda evidence: {BODY: placed_of(evidence.element.mechanism, evidence.truth).R_WB[:, :-1]},
+        lambda evidence: frames_of(evidence.element, placed_of(evidence.element.mechanism, evidence.truth)),
         CLOCK,
         _size,
-        _of_centres,
+        lambda vector, evidence: (*_of_centres(vector, evidence), *_of_contacts(vector, evidence)),
     ),
-    at_start(lambda element: {BODY: element.start.R_WB[0, :-1]}, frozenset()),
+    at_start(
+        lambda element: {name: frame[0] for name, frame in frames_of(element, element.start).items()},
+        _FOLLOWS,
+    ),
     centres_at_start,
     reported_quaternions(_attitudes),
     single_precision_run,

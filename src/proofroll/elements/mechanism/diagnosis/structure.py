@@ -220,10 +220,10 @@ def _ancestry(mechanism: Mechanism) -> FloatArray:
 def loop_lacks_row(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: a loop lacks one or more of its rows."""
     mechanism = evidence.element.mechanism
-    part = stretch(mechanism, evidence.run) if mechanism.loops and evidence.run is not None else None
+    part = stretch(evidence.element, evidence.run) if mechanism.loops and evidence.run is not None else None
     if part is None:
         return
-    seen = of_run(mechanism, evidence.run, part)
+    seen = of_run(evidence.element, evidence.run, part)
     if not seen.consistent:
         return
     rows = [seen.tree.loop_rows(state.motion) for state in seen.each]

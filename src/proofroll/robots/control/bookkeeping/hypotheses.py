@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -58,7 +59,9 @@ def _of_start(evidence: Evidence, law: ControlLaw) -> Iterator[Cause]:
     """Mistakes that explain the accelerations of the certificate, if it has them."""
     if (start := of_start(evidence)) is not None:
         difference, explanations = explained_start(evidence.asked.mechanism, law, start.v_rates[0])
-        yield from (_cause(item, difference, of_run=False) for item in explanations[:2])
+        causes = (_cause(item, difference, of_run=False) for item in explanations[:2])
+        # one effort of each servo acts on the accelerations
+        yield from (replace(cause, explains=len(law.joints)) for cause in causes)
 
 
 def _of_run(evidence: Evidence, law: ControlLaw) -> MotionSearch | None:

@@ -28,6 +28,7 @@ _CHANGED = 1e-2  # least change of a fitted size that is no error of a step
 _ALIKE = 100.0  # explanations whose squares in the screen differ by no more are all tried
 _NEAR = 0.7  # part of a distance that a mistake of the size in the screen may leave
 _CLOSES_AT_START = 1e-3  # part of the distance of accelerations that an explanation may leave
+_ROUND_OFF = 1e-9  # part of that distance that counts as nothing
 _FOR_A_SIZE = 3.0  # what a fitted size must be better by
 
 
@@ -89,7 +90,7 @@ def explanations(
         count += 1
         if (explanation := tried(mistake)) is not None:
             several.append(explanation)
-    return sorted(several, key=lambda item: item.rank), count
+    return sorted(several, key=lambda item: (item.rank, item.fitted)), count
 
 
 def best_size(mistake: Mistake, law: ControlLaw, left: Callable[[ControlLaw], Array]) -> tuple[float, float]:
@@ -283,7 +284,7 @@ def explained_start(
 
     def explanation(mistake: Mistake) -> MistakeExplanation | None:
         left, size = best_size(mistake, law, off)
-        item = MistakeExplanation(mistake, size, left)
+        item = MistakeExplanation(mistake, size, left if left > _ROUND_OFF * distance else 0.0)
         return item if left <= _CLOSES_AT_START * distance and item.differs else None
 
     return distance, explanations(mistakes(law), explanation, SearchTime())[0]

@@ -114,3 +114,25 @@ def test_no_cause_contradicts_what_is_read_back(given: bool) -> None:
     lines = [line("gravity", mechanism.gravity, mechanism.gravity, True)] if given else []
     said = " ".join(item.sentence for item in diagnose_scene(scene, lines, run, true, 1e-3))
     assert ("gravity" in said) is not given
+
+
+@pytest.mark.parametrize(("factor", "said"), [(0.5, ["gravity"]), (0.7, [])])
+def test_exact_accelerations_and_a_known_mistake_are_stronger_than_what_is_read_back(
+    factor: float, said: list[str]
+) -> None:
+    """An engine whose accelerations are those of half the gravity moves by that, whatever its adapter reads back."""
+    scene = arm((0.7, 0.4), (2.0, -3.0))
+    (element,) = scene.elements
+    assert isinstance(element, MechanismElement)
+    mechanism = element.mechanism
+    gravity = np.array(mechanism.gravity)
+    true, moved = (
+        MechanismElement(replace(mechanism, gravity=tuple((part * gravity).tolist()))).first_motion
+        for part in (1.0, factor)
+    )
+    lines = [
+        line("gravity", gravity, gravity, True),
+        line("acceleration", true.acceleration, moved.acceleration, False),
+        line("angular acceleration", true.angular_acceleration, moved.angular_acceleration, False),
+    ]
+    assert [item.cause.id for item in diagnose_scene(scene, lines)] == said

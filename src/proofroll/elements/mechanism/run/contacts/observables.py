@@ -55,19 +55,22 @@ class Followed(NamedTuple):
         slip: speed along the surfaces [m/s], shape (time, contacts).
         normal: unit vectors from b to a, shape (time, contacts, 3).
         slide: velocity of a relative to b at the contact [m/s], shape (time, contacts, 3).
+        place: points of contact [m], shape (time, contacts, 3).
     """
 
     gap: FloatArray
     slip: FloatArray
     normal: FloatArray
     slide: FloatArray
+    place: FloatArray
 
 
 def follow_contacts(placed: Placed) -> Followed:
-    """Gaps, slip speeds, normals and sliding velocities of all contacts at all times."""
+    """Gaps, slip speeds, normals, sliding velocities and places of all contacts at all times."""
     mechanism = placed.mechanism
     shape = (len(placed.time), len(mechanism.contacts))
-    gap, slip, normal, slide = np.zeros(shape), np.zeros(shape), np.zeros((*shape, 3)), np.zeros((*shape, 3))
+    gap, slip = np.zeros(shape), np.zeros(shape)
+    normal, slide, place = (np.zeros((*shape, 3)) for _ in range(3))
     rest = np.zeros((len(placed.time), 3))
 
     def moving(body: str, k: int) -> Moving:
@@ -80,8 +83,8 @@ def follow_contacts(placed: Placed) -> Followed:
             touching = touch(contact, moving(contact.body_a, k), moving(contact.body_b, k))
             across = touching.slide - touching.normal * (touching.normal @ touching.slide)
             gap[k, c], slip[k, c], normal[k, c] = touching.gap, np.linalg.norm(across), touching.normal
-            slide[k, c] = touching.slide
-    return Followed(gap, slip, normal, slide)
+            slide[k, c], place[k, c] = touching.slide, touching.place
+    return Followed(gap, slip, normal, slide, place)
 
 
 def kept_laws(mechanism: Mechanism) -> frozenset[str]:

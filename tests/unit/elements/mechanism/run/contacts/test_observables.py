@@ -18,7 +18,7 @@ def left(force: list[float], slide: list[float], gap: float = 0.0) -> dict[str, 
     """Residuals of a contact on a floor at two equal samples, with a weight of 10 N and a speed of 1 m/s."""
     normal, moving = np.broadcast_to(UP, (2, 1, 3)), np.broadcast_to(slide, (2, 1, 3))
     slip = np.linalg.norm(moving[..., :2], axis=-1)
-    found = Followed(np.full((2, 1), gap), slip, normal, moving)
+    found = Followed(np.full((2, 1), gap), slip, normal, moving, np.zeros_like(normal))
     values = residuals(found, np.broadcast_to(force, (2, 1, 3)), np.array([MU]), 10.0, 1.0)
     return {name: float(value[1, 0]) for name, value in values.items()}
 
