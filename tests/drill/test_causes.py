@@ -56,7 +56,7 @@ def test_what_the_first_steps_or_the_end_of_a_run_tell_is_named(name: str) -> No
     ],
 )
 def test_faults_of_a_body_that_rolls_on_a_wall_are_named(name: str) -> None:
-    """Numbers, laws, axes and times of a ball on its wall are told as those of any mechanism are."""
+    """Wrong numbers, laws, axes and times of a ball on its wall are named as those of any mechanism are."""
     found = tried(mutant(name))
     assert found.named, found.said
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.first_steps import first_steps
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
@@ -462,3 +462,17 @@ def test_corners_of_a_face_land_together() -> None:
     assert impacts[0].time == impacts[1].time
     sample = run.sample()
     np.testing.assert_allclose([*sample.v_WB[0], *sample.w_WB[0]], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("height", "error"), [(0.15, Refused), (0.2, Diverged)])
+def test_a_cylinder_that_stands_on_its_end_is_refused(height: float, error: type[Exception]) -> None:
+    """One point of an edge holds no end that lies flat: projection says so at the start, or where it lands."""
+    cylinder = Geometry("can", "can", "cylinder", radius=0.25, length=0.3)
+    mechanism = Mechanism(
+        (Body("can", 1.0, inertia=(0.025, 0.025, 0.025)),),
+        (Joint("free", "free", "world", "can", q0=(0, 0, height, 1, 0, 0, 0), v0=(1, 0, 0, 0, 0, 0)),),
+        geometries=(Geometry("floor", "world", "plane"), cylinder),
+        pairs=(Pair("stand", ("can", "floor"), friction=0.0),),
+    )
+    with pytest.raises(error, match="lies flat"):
+        PROJECTION.build(Scene("can", "", (MechanismElement(mechanism),)), DEFAULT).advance(0.3)

@@ -111,7 +111,7 @@ class Residuals(Generic[M]):
         contradicted: True for a model that contradicts a correct report of the engine.
         exact: True if the engine's own accelerations leave nothing but round-off to its model. They show that numbers
             read back are not those by which it moves; a run with the errors of its steps does not.
-        scheme: what a scheme of first order leaves by itself at the engine's step, as ``left``.
+        scheme: residual that a scheme of first order leaves by itself at the engine's step, as ``left``.
     """
 
     left: Callable[[M | None], FloatArray]

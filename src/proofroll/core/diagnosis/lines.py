@@ -35,7 +35,7 @@ def built_otherwise(
     Args:
         names: quantities that the adapter hands to the engine.
         covers: quantities that follow from them.
-        places: those of ``names`` that are others, too, where the start is another.
+        places: part of ``names`` that is another, too, where the start is another.
         state: quantities of the start.
     """
 

@@ -69,8 +69,8 @@ class MechanismStates:
     Attributes:
         each: the states.
         consistent: True if the tree allows the bodies' velocities in their poses, and contacts have one place each. If
-            not, the reported motion is wrong, or its loads are not told, and no conclusion about the equations is
-            possible.
+            not, the reported motion is wrong, or its loads are not determinate, and no conclusion about the equations
+            is possible.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class MechanismStates:
                     t=float(placed.time[i]), q=q, v=v, motion=self.tree.at(q, v), acceleration=acceleration[i]
                 )
             )
-        self.consistent &= all(self.pressing(i, SCENES_LAW).told for i in range(len(self.each)))
+        self.consistent &= all(self.pressing(i, SCENES_LAW).determinate for i in range(len(self.each)))
 
     @cached_property
     def allowed(self) -> list[FloatArray]:
@@ -325,7 +325,7 @@ def is_one_motion(run: Any, truth: Any, length: float) -> bool:
 
 
 def limits_of(element: Any) -> ContactLimits:
-    """Sizes by which the states of an element's contacts are told."""
+    """Limits between the states of an element's contacts."""
     return ContactLimits.of(element.length, element.speed)
 
 

@@ -1,4 +1,4 @@
-"""Loads of closed contacts at a state of a run: known ones, and those by each force that the state does not tell."""
+"""Loads of closed contacts at a state of a run: known ones, and those by each unknown force."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ _STILL = 1e-6  # turning that counts as none, relative to the bodies'
 
 
 class ContactLimits(NamedTuple):
-    """Sizes by which the state of a contact is told.
+    """Limits between the states of a contact.
 
     Attributes:
         gap: largest gap of a closed contact [m].
@@ -63,14 +63,14 @@ class Pressing(NamedTuple):
     """Loads of contacts along the velocities of a mechanism's tree.
 
     Attributes:
-        unknown: by a unit of each force or moment that the state does not tell, (forces, nv).
-        known: sum of those that it tells, (nv).
-        told: False if a closed contact has no one place or normal.
+        unknown: by a unit of each force or moment that the state leaves open, (forces, nv).
+        known: sum of all others, (nv).
+        determinate: False if a closed contact has no one place or normal.
     """
 
     unknown: FloatArray
     known: FloatArray
-    told: bool
+    determinate: bool
 
 
 def pressing(mechanism: Mechanism, motion: BodyMotion, limits: ContactLimits, law: Resisting) -> Pressing:
@@ -79,7 +79,7 @@ def pressing(mechanism: Mechanism, motion: BodyMotion, limits: ContactLimits, la
     A contact that sticks has any force; one that slips has friction against its slip, a coefficient times its unknown
     normal force. Friction against turning is an arm times that force, or any moment where nothing turns.
     """
-    nv, told = motion.J.shape[2], True
+    nv, determinate = motion.J.shape[2], True
     unknown, known = [np.zeros((0, nv))], np.zeros(nv)
     index, g = mechanism.body_index, float(np.linalg.norm(mechanism.gravity))
     masses = np.array([*(body.mass for body in mechanism.bodies), 0.0])
@@ -90,7 +90,7 @@ def pressing(mechanism: Mechanism, motion: BodyMotion, limits: ContactLimits, la
         kind = limits.kind(contact, touching.gap, slip)
         if kind == "open" or touching.absent:
             continue
-        told &= not touching.flat
+        determinate &= not touching.flat
         bodies = index[contact.body_a], index[contact.body_b]
         J, surface = slide_row(motion, bodies, touching)[0], frame_of_axis(n)[:, :2].T
         push = n if kind == "stick" or not slip else n - contact.friction * across / slip
@@ -103,7 +103,7 @@ def pressing(mechanism: Mechanism, motion: BodyMotion, limits: ContactLimits, la
         known += weight * moments[0] @ of_turning if law.by_weight else 0.0
         by_normal = moments[1] if law.by_weight else moments.sum(axis=0)
         unknown.append((push @ J + by_normal @ of_turning)[None])
-    return Pressing(np.concatenate(unknown), known, told)
+    return Pressing(np.concatenate(unknown), known, determinate)
 
 
 def _against_turning(

@@ -21,7 +21,6 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.acting import (
     FAINT,
     OPEN,
-    Acting,
     ContactMode,
     changes,
     first_mode,
@@ -50,7 +49,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, coefficients_of
 from proofroll.elements.mechanism.scene.signal import breaks, varies
 from proofroll.engines.projection.contact.alternating import AlternatingMotion, Excess, ends_of_efforts
-from proofroll.engines.projection.contact.contacts_there import ContactsThere, landing_together
+from proofroll.engines.projection.contact.contacts_there import ContactsThere, landing_together, leaving, refuse_lying
 from proofroll.engines.projection.contact.slip_directions import SlipDirections, balanced, led_direction
 from proofroll.engines.projection.smooth.connections import Bodies
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates, SolvedState
@@ -113,6 +112,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             instant.touching, scale.length / self._arms, scale.rate, start_digits(self.contacts)
         )
         refuse_rubbing_stops(self.contacts, closed_mask, 0.0)
+        refuse_lying(self._bodies, instant.touching, closed_mask, 0.0)
         self.mode = tuple(OPEN for _ in self.contacts)
         self._enter(0.0, start, self._decided(instant, closed_mask, resting))
 
@@ -398,7 +398,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         elif kind == "still":
             slips = self._slips(instant)
             resting = [stuck or number == k or slips[number] <= self._faint for number, stuck in enumerate(resting)]
-        mode = self._leaving(instant, k) if kind == EventKind.SLIP else self._decided(instant, closed_mask, resting)
+        if kind == EventKind.SLIP:
+            mode = leaving(old_mode, k, self.forces(instant, old_mode)[k], instant.touching[k].normal)
+        else:
+            mode = self._decided(instant, closed_mask, resting)
         if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped
             mode = self._decided(
                 instant, closed_mask, [stands and number != k for number, stands in enumerate(resting)]
@@ -424,14 +427,6 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         moves, will = (float(np.abs(sizes * part[7 * n : 13 * n]).max()) for part in (y, rate))
         return moves <= self._still and will <= _STANDS * self._unit * self._rate
 
-    def _leaving(self, instant: ContactsThere, k: int) -> ContactMode:
-        """Mode in which a contact starts to slip, opposite to the friction that held it."""
-        force, n = self.forces(instant, self.mode)[k], instant.touching[k].normal
-        friction = force - n * (n @ force)
-        x, y, z = (-friction / np.linalg.norm(friction)).tolist()
-        line = None if self.mode[k].along is None else (x, y, z)
-        return (*self.mode[:k], Acting("slip", line, (x, y, z)), *self.mode[k + 1 :])
-
     def _struck(self, x: Array, instant: ContactsThere, hits: Sequence[int]) -> tuple[Array, list[bool], bool]:
         """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
         which = [k for k, acting in enumerate(self.mode) if (acting.kind != "open" or k in hits) and self._presses[k]]
@@ -452,6 +447,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         ]
         closed_mask = shut_by_pressing(self.contacts, closed_mask)
         try:
+            refuse_lying(self._bodies, instant.touching, [k in hits for k in range(len(self.mode))], self.t)
             refuse_rubbing_stops(self.contacts, closed_mask, self.t)
         except Refused as error:
             raise Diverged(str(error)) from None

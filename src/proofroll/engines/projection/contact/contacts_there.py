@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.contact.acting import ContactMode
-from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.contact.acting import Acting, ContactMode
+from proofroll.elements.mechanism.contact.touching import Touching, lying
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.engines.projection.smooth.dependent import SolvedState
@@ -76,3 +77,31 @@ def landing_together(
         if instant.touching[k].gap + overlap[k] <= near and abs(speeds[k] - speeds[hit]) <= _ALIKE * speeds[hit]
     ]
     return [hit, *corners]
+
+
+def leaving(mode: ContactMode, k: int, force: Array, normal: Array) -> ContactMode:
+    """Mode in which a contact starts to slip, opposite to the friction that held it.
+
+    Args:
+        mode: before.
+        k: the contact.
+        force: on its body a while it sticks [N].
+        normal: of the contact.
+    """
+    friction = force - normal * (normal @ force)
+    x, y, z = (-friction / np.linalg.norm(friction)).tolist()
+    line = None if mode[k].along is None else (x, y, z)
+    return (*mode[:k], Acting("slip", line, (x, y, z)), *mode[k + 1 :])
+
+
+def refuse_lying(
+    contacts: Sequence[BodyContact], touching: Sequence[Touching], closed_mask: Sequence[bool], time: float
+) -> None:
+    """Raises Refused if a closed contact of bodies is along an edge or a line at a time [s].
+
+    No one point of an edge holds it: the nearest would jump to and fro with the last digits of the tilt, in steps
+    without end.
+    """
+    for contact, point, closed in zip(contacts, touching, closed_mask, strict=False):
+        if closed and point.flat:
+            raise Refused(str(lying(contact, time)))
