@@ -122,6 +122,7 @@ def _of_joint_columns() -> Iterator[ColumnMistake]:
     yield ColumnMistake("swapped", "the columns q.JOINT and v.JOINT are each the other", _exchanged("q.", "v."))
     yield ColumnMistake("degrees", "q.JOINT is in degrees: name it q.JOINT[deg]", _scaled("q.", _DEGREE))
     yield ColumnMistake("degrees", "v.JOINT is in degrees per second: name it v.JOINT[deg/s]", _scaled("v.", _DEGREE))
+    yield ColumnMistake("sign", "v.JOINT has the other sign", _scaled("v.", -1.0))
     yield ColumnMistake("milliseconds", "the times are in milliseconds: name them time[ms]", _in_seconds)
 
 
@@ -258,7 +259,11 @@ def _scaled(start: str, factor: float) -> Changed:
     def scaled(part: Mapping[str, Array]) -> dict[str, Array]:
         return {name: factor * item if name.startswith(start) else item for name, item in part.items()}
 
-    return lambda record: ControlRecord(record.path, scaled(record.columns), scaled(record.rounding), record.time)
+    def changed(record: ControlRecord) -> ControlRecord:
+        rounding = {name: np.abs(item) for name, item in scaled(record.rounding).items()}
+        return ControlRecord(record.path, scaled(record.columns), rounding, record.time)
+
+    return changed
 
 
 def _in_seconds(record: ControlRecord) -> ControlRecord:
