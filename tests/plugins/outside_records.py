@@ -64,12 +64,12 @@ class Loop:
     to_joint: Sequence[int] = range(6)
     seen: Sequence[int] = range(6)
     pose: np.ndarray = field(default_factory=POSE.copy)
-    kp: float = KP
-    kd: float = KD
-    scale: float = SCALE
+    kp: float | np.ndarray = KP
+    kd: float | np.ndarray = KD
+    scale: float | np.ndarray = SCALE
     more_steps: int = 0
     late: int = 0
-    limit: float = EFFORT
+    limit: float | np.ndarray = EFFORT
     armature: float = ARMATURE
     xyzw: bool = False
     gravity_sign: float = -1.0
@@ -93,6 +93,14 @@ class Loop:
     damping: float = 0.0
     friction: float = 0.0
     payload: float = 0.0
+    bias: float = 0.0
+    late_effort: bool = False
+    meaning: str = ""
+    shift: int = 0
+    conjugated: bool = False
+    see_before: bool = False
+    seen_gravity: float = 1.0
+    seen_signs: np.ndarray = field(default_factory=lambda: np.ones(6))
 
     def record(self, program: Callable[[Loop], Simulator]) -> dict[str, np.ndarray]:
         """Columns over time of a run, each named as in the documentation."""
@@ -102,12 +110,14 @@ class Loop:
         sim, act, rows = program(self), make(JOINTS), []
         action, counts, queue = np.zeros(6), np.zeros(6), [POSE.copy() for _ in range(self.late)]
         period = round(self.periods / RATE / self.step) + self.more_steps
-        before = sim.state()
+        before, answers = sim.state(), list[np.ndarray]()
         factor = {key: self.factors.get(key, 1.0) for key in ("q", "v", "v_WB_W", "w_WB_B", "last")}
         for k in range(self.steps + 1):
-            state = sim.state()
+            now = state = sim.state()
             if k % period == 0 and k != self.repeated * period:
-                quaternion = np.roll(state["q_WB"], -1) if self.xyzw else state["q_WB"]
+                state = before if self.see_before else now
+                quaternion = state["q_WB"] * [1, -1, -1, -1] if self.conjugated else state["q_WB"]
+                quaternion = np.roll(quaternion, -1 if self.xyzw else self.shift)
                 R, body = _matrix(quaternion), _matrix(state["q_WB"])
                 R = R.T if self.back else R
                 velocity, spin = state["v_WB"], body.T @ state["w_WB"]
@@ -118,24 +128,34 @@ class Loop:
                 spin = state["w_WB"] if self.world_spin else body.T @ spin if self.spin_back else spin
                 places = state["q"] - POSE if self.relative else state["q"]
                 seen = {
-                    "q": factor["q"] * places[list(self.seen)],
+                    "q": self.seen_signs * factor["q"] * places[list(self.seen)],
                     "v": factor["v"] * state["v"][list(self.seen)],
                     "v_WB_W": factor["v_WB_W"] * velocity,
                     "w_WB_B": factor["w_WB_B"] * spin,
-                    "gravity_B": R.T @ np.array([0, 0, self.gravity_sign]),
+                    "gravity_B": self.seen_gravity * (R.T @ np.array([0, 0, self.gravity_sign])),
                 }
-                last = factor["last"] * action
-                action = act(Observation(time=k * self.step, p_WB=state["p_WB"], R_WB=R, last=last, **seen))
+                state, last = now, factor["last"] * action
+                previous, action = (
+                    action,
+                    act(Observation(time=k * self.step, p_WB=state["p_WB"], R_WB=R, last=last, **seen)),
+                )
                 clipped = np.clip(action, -self.clip, self.clip)
                 action = action if self.raw else clipped
-                counts = counts + self.smoothing * (clipped - counts)
+                counts = clipped if self.meaning == "filtered" and not k else counts
+                counts = counts + (0.3 if self.meaning == "filtered" else self.smoothing) * (clipped - counts)
                 placed = np.zeros(6)
-                placed[list(self.to_joint)] = counts
-                queue.append(self.signs * (self.pose + self.scale * placed))
+                placed[list(self.to_joint)] = {
+                    "mixed": (clipped + previous) / 2,
+                    "squashed": np.tanh(counts),
+                }.get(self.meaning, counts)
+                pose = state["q"] if self.meaning == "added" else self.pose
+                queue.append(self.signs * (pose + self.scale * placed))
                 target = queue.pop(0)
             servo = before if self.lag else state
             if not self.hold or k % period == 0:
-                effort = np.clip(self.kp * (target - servo["q"]) - self.kd * servo["v"], -self.limit, self.limit)
+                answered = np.clip(self.kp * (target - servo["q"]) - self.kd * servo["v"], -self.limit, self.limit)
+                answers.append(answered + self.bias)
+                effort = answers[-2] if self.late_effort and k else answers[-1]
             row = {"time": np.array([k * self.step]), **state, **{f"observed.{key}": seen[key] for key in seen}}
             rows.append({**row, "action": action, "target": target, "effort": effort})
             before = state
@@ -313,6 +333,46 @@ MISTAKES: Mapping[str, tuple[str, str, dict[str, Any]]] = {
     "dry friction": ("friction", "acceleration", {"friction": 0.03}),
     "payload": ("payload", "acceleration", {"payload": 0.15}),
 }
+ONE, HIPS = np.arange(6) == 2, np.array([True, False, False, True, False, False])  # FL_KFE; FL_HAA and FR_HAA
+# Mistake -> its id, layer, attributes of a loop, and what is said of it: numbers of single joints, and others that a
+# fit finds.
+FITTED: Mapping[str, tuple[str, str, dict[str, Any], str]] = {
+    "kp of a joint": ("servo", "effort", {"kp": KP * np.where(ONE, 1.3, 1)}, "kp is another: FL_KFE 1.3 of"),
+    "kd of hips": ("servo", "effort", {"kd": KD * np.where(HIPS, 0.5, 1)}, "kd is another: FL_HAA, FR_HAA 0.5 of"),
+    "kp and kd": ("servo", "effort", {"kp": 0.8 * KP, "kd": 1.5 * KD}, "kp is 0.8 of the right one; kd is 1.5 of"),
+    "a clamp": (
+        "servo",
+        "effort",
+        {"limit": EFFORT * np.where(ONE, 0.4, 1)},
+        "the limit of efforts is another: FL_KFE",
+    ),
+    "bias": (
+        "servo",
+        "effort",
+        {"bias": 0.04},
+        "beside the servo's: FL_HAA, FL_HFE, FL_KFE, FR_HAA, FR_HFE, FR_KFE 0.04",
+    ),
+    "sign of kd": ("kd_sign", "effort", {"kd": -KD, "steps": 60}, "kd has the other sign"),
+    "a step late": ("late_effort", "effort", {"late_effort": True}, "efforts are those of the row before"),
+    "scale of a joint": (
+        "affine_target",
+        "target",
+        {"scale": SCALE * np.where(ONE, 0.5, 1)},
+        "FL_KFE 0.5 of the right",
+    ),
+    "scale and pose": ("affine_target", "target", {"scale": 0.7 * SCALE, "pose": POSE + 0.1 * ONE}, "FL_KFE +0.1"),
+    "sign of actions": ("affine_target", "target", {"scale": -SCALE}, "actions have the other sign"),
+    "low pass from the first": ("smoothing", "target", {"meaning": "filtered"}, "of which 0.3 is new at each instant"),
+    "mixed": ("mixed_actions", "target", {"meaning": "mixed"}, "mix 0.5 of an action with 0.5 of the one before"),
+    "squashed": ("squashed", "target", {"meaning": "squashed"}, "actions pass a tanh"),
+    "added": ("added", "target", {"meaning": "added"}, "actions are added to the present coordinates"),
+    "first for last": ("quaternion", "observation", {"shift": 1}, "is read as x, y, z, w, and is w, x, y, z"),
+    "last of the inverse": ("quaternion", "observation", {"shift": -1, "conjugated": True}, "of the inverse rotation"),
+    "last, turned back": ("quaternion", "observation", {"shift": -1, "back": True}, "used as the inverse rotation"),
+    "gravity in m/s²": ("observed_gravity", "observation", {"seen_gravity": 9.81}, "gravity is observed at 9.81 of"),
+    "an observation late": ("observed_before", "observation", {"see_before": True}, "the state of the step before"),
+    "sign of a coordinate": ("observed_size", "observation", {"seen_signs": np.where(ONE, -1.0, 1)}, "q.FL_KFE -1 of"),
+}
 # Mistakes of observations, which show at the action where no observation is recorded.
 OBSERVED = tuple(name for name, (_, layer, _) in MISTAKES.items() if layer == "observation")
 
@@ -342,3 +402,50 @@ def written(columns: Mapping[str, np.ndarray], path: Path, digits: str = "") -> 
     with path.open("w", newline="") as file:
         csv.writer(file).writerows([names, *([text(*pair) for pair in zip(names, row, strict=True)] for row in rows)])
     return path
+
+
+_IN_BASE = {name: f"{name} is along the axes of the base" for name in ("v_WB", "w_WB")}
+
+
+def miswritten(record: Mapping[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
+    """A record with a mistake of its columns, one of :data:`MISWRITTEN`."""
+    q, v, attitude = record["q"], record["v"], record["q_WB"]
+    bodies = np.array([_matrix(row) for row in attitude])
+    in_base = {kind: np.einsum("tji,tj->ti", bodies, record[kind]) for kind in _IN_BASE}
+    changed = {
+        "q and v": {"q": v, "v": q},
+        "degrees": {"q": np.degrees(q)},
+        "degrees per second": {"v": np.degrees(v)},
+        "sign of rates": {"v": -v},
+        "milliseconds": {"time": 1e3 * record["time"]},
+        "scalar last": {"q_WB": np.roll(attitude, -1, axis=1)},
+        "inverse": {"q_WB": attitude * [1, -1, -1, -1]},
+        "centre": {"v_WB": record["v_WB"] + np.cross(record["w_WB"], bodies @ np.array(CENTRE))},
+        "v_WB": {"v_WB": in_base["v_WB"]},
+        "w_WB": {"w_WB": in_base["w_WB"]},
+        "scaled actions": {"action": SCALE * record["action"]},
+        "targets as actions": {"action": POSE + SCALE * record["action"]},
+        "late actions": {"action": np.concatenate([np.zeros((20, 6)), record["action"][:-20]])},
+        "other legs": {"effort": record["effort"][:, [3, 4, 5, 0, 1, 2]]},
+        "sign of efforts": {"effort": -record["effort"]},
+    }
+    return {**record, **changed[name]}
+
+
+# Mistake of columns -> its layer, and what is said of it.
+MISWRITTEN: Mapping[str, tuple[str, str]] = {
+    "q and v": ("state", "the columns q.JOINT and v.JOINT are each the other"),
+    "degrees": ("state", "q.JOINT is in degrees"),
+    "degrees per second": ("state", "v.JOINT is in degrees per second"),
+    "sign of rates": ("state", "v.JOINT has the other sign"),
+    "milliseconds": ("state", "the times are in milliseconds"),
+    "scalar last": ("state", "q_WB is x, y, z, w under the names of w, x, y, z"),
+    "inverse": ("state", "q_WB is of the inverse rotation"),
+    "centre": ("state", "v_WB is the velocity of the base's centre of mass"),
+    **{name: ("state", words) for name, words in _IN_BASE.items()},
+    "scaled actions": ("action", "the columns of actions have the scale of the controller already"),
+    "targets as actions": ("action", "the columns of actions are targets"),
+    "late actions": ("action", "the columns of actions are one instant late"),
+    "other legs": ("effort", "efforts are of joints in another order (FL and FR swapped)"),
+    "sign of efforts": ("effort", "efforts have the other sign"),
+}

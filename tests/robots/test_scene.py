@@ -245,6 +245,11 @@ def test_what_a_file_has_beyond_the_answer_is_said(robot):
     arm = robot("arm.urdf", urdf(first='<dynamics damping="0.3"/>'))
     assert load_scene(arm).omitted == ("2 joint ranges (limits=1)", "contacts")
     assert load_scene(arm, limits=1, damping=0).omitted == ("damping of joints (damping=1)", "contacts")
+    drive = '<transmission name="t"><joint name="j1"/><actuator name="a"/></transmission>'
+    spring = '<dynamics damping="0" springStiffness="5" springReference="0.0"/>'
+    arm = robot("arm.urdf", urdf(first=spring, extra=drive))
+    drives = "1 transmission (--control)"
+    assert load_scene(arm, limits=1).omitted == (drives, "springStiffness of 1 joint", "contacts")
 
 
 @pytest.mark.drill

@@ -38,6 +38,7 @@ class Observable:
         hangs_on_events: True if it is unpredictable once the time of an event is ill-posed.
         at_impacts: False if it has no value beside an impact, whose length is an engine's own, nor where the question
             is ill-posed.
+        of_contacts: True if it is zero wherever nothing touches.
         sums_samples: True if runs sum it over their samples, which have no impulses: it is compared up to the first
             impact.
         difference_of: larger variable whose small difference, with its round-off, it is; empty: none.
@@ -61,6 +62,7 @@ class Observable:
     audit: bool = False
     hangs_on_events: bool = True
     at_impacts: bool = True
+    of_contacts: bool = False
     sums_samples: bool = False
     absent: str = ""
     difference_of: str = ""

@@ -194,8 +194,8 @@ def parse_engine(text: str) -> EngineSpec:
 def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collection[str] = ()) -> Any:
     """Complete settings of an engine: a preset of a formulation, overridden by the given options.
 
-    Without a given formulation it is the first that provides all that the scene ``requires``; one that is made for such
-    scenes goes first.
+    Without a given formulation it is the first that lacks least of what the scene ``requires``; one that is made for
+    such scenes goes first.
 
     Raises:
         InputError: unknown or ill-typed option.
@@ -208,9 +208,11 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
     for key, value in options.items():
         require_known(f"{engine.name}: {key}", key, fields, "there is no such setting; choose from", value)
     purposes = engine.made_for if isinstance(engine, MadeFor) else {}
-    able = [name for name in engine.presets if set(requires) <= engine.provides[name]]
-    able.sort(key=lambda name: not offered(name, requires, purposes))
-    formulation = options.get("formulation") or next(iter([*able, *engine.presets]))
+
+    def misfit(formulation: str) -> tuple[int, bool]:
+        return len(set(requires) - engine.provides[formulation]), not offered(formulation, requires, purposes)
+
+    formulation = options.get("formulation") or min(engine.presets, key=misfit)
     require_known(f"{engine.name}: formulation", formulation, engine.presets)
     presets = engine.presets[formulation]
     preset = options.get("preset", "matched" if "matched" in presets else next(iter(presets)))

@@ -128,14 +128,20 @@ def _dimension(name: str, level: int, labels: Sequence[str]) -> str:
 
 
 def _numbers(header: list[str], rows: list[list[str]], *, decimal_comma: bool) -> Any:
-    numbers = []
+    numbers, wrong = [], list[str]()
     for line, row in enumerate(rows, start=2):
         if not any(field.strip() for field in row):  # spreadsheets end with rows of separators
             continue
-        if len(row) != len(header):
-            raise ValueError(f"line {line} has {len(row)} fields, the header {len(header)}")
         fields = [field.replace(",", ".") if decimal_comma else field for field in row]
-        numbers.append([_number(field, line, column) for field, column in zip(fields, header, strict=True)])
+        try:
+            if len(row) != len(header):
+                raise ValueError(f"line {line} has {len(row)} fields, the header {len(header)}")
+            numbers.append([_number(field, line, column) for field, column in zip(fields, header, strict=True)])
+        except ValueError as error:
+            wrong.append(str(error))
+    if wrong:
+        further = f"; {len(wrong) - 1} further lines are wrong" if len(wrong) > 1 else ""
+        raise ValueError(f"{wrong[0]}{further}")
     return np.array(numbers).reshape(len(numbers), len(header))
 
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from proofroll.core.number_format import counted
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.opening import BASES
@@ -74,7 +75,9 @@ class RobotScenes:
         start = random_states(robot, 1, int(values["seed"]))
         start = held_start(robot, start) if values["couplings"] else start
         tables = tables_of(file, robot, start, values)
-        return tables | {"actuators": acting, "unmodelled": [*clauses, *tables["unmodelled"]]}
+        drives = [f"{counted(len(file.driven), 'transmissions')} (--control)"] if file.driven else []
+        omitted = [*drives, *tables["omitted"]]
+        return tables | {"actuators": acting, "unmodelled": [*clauses, *tables["unmodelled"]], "omitted": omitted}
 
     @staticmethod
     def judge_record(

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.events import EventKind
 from proofroll.elements.mechanism import Mechanism
@@ -266,12 +267,24 @@ class LawRecorder:
             times = start + length * (POINTS + 1) / 2
             states = inside(times)
             sizes = np.abs(TO_SERIES @ states.T)
-            turned = length * max(float(np.abs(self._route.bodies(y)[3]).max()) for y in states.T[[0, -1]])
+            turning, spins = self._turns(states)
+            turned = length * float(np.abs(spins).max(initial=0.0))
             resolved = sizes[-2:] <= _RESOLVED * np.maximum(sizes.max(0), sizes.max() * _RESOLVED)
-            if turned <= _TURN and resolved.all():
+            hidden = bool(self._mechanism.prescribed) and _unresolved(turning.reshape(-1, len(POINTS)))
+            if turned <= _TURN and resolved.all() and not hidden:
                 break
             length /= 2
         return _Piece(times, np.full(len(POINTS), length / 2), states.T)
+
+    def _turns(self, states: Array) -> tuple[Array, Array]:
+        """Rotations and angular velocities of the bodies [rad/s] at states of a piece, (state, points).
+
+        Where no motion is prescribed, which no state contains, those at both ends suffice.
+        """
+        known = states.T if self._mechanism.prescribed else states.T[[0, -1]]
+        poses = [self._route.bodies(y) for y in known]
+        turning = np.array([Rotation.from_quat(pose[2], scalar_first=True).as_matrix() for pose in poses]).T
+        return turning, np.array([pose[3] for pose in poses])
 
     def _parts(
         self,
@@ -289,16 +302,18 @@ class LawRecorder:
         """
         places = (start + end) / 2 + (end - start) / 2 * POINTS
         states = np.asarray(inside(places))
-        coefficients = np.abs(TO_SERIES @ states.T)
-        rough = bool((coefficients[-2:].max(0) > _RESOLVED * np.maximum(1.0, coefficients.max(0))).any())
+        rough = _unresolved(states)
         time = states[-1] if paced else places
         record, pace = (np.zeros((0, 0)), np.ones(1)) if recorded is None else recorded(states)
         if not rough and depth < _HALVINGS:
-            if not len(record):
-                spins = np.array([self._route.bodies(y)[3] for y in states.T[[0, -1]]])
+            if len(record):
+                moving = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, len(POINTS))
+                turning, spins = moving[:, 3:12], moving[:, 15:]
             else:
-                spins = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, len(POINTS))[:, 15:]
+                turning, spins = self._turns(states)
             rough = float(np.abs(spins).max(initial=0.0)) * (time[-1] - time[0]) > _TURN
+            # no state has a prescribed motion, which may turn bodies as no polynomial of the points does
+            rough |= bool(self._mechanism.prescribed) and _unresolved(turning.reshape(-1, len(POINTS)))
         if rough and depth < _HALVINGS:
             middle = (start + end) / 2
             yield from self._parts(start, middle, inside, recorded, paced=paced, depth=depth + 1)
@@ -306,6 +321,12 @@ class LawRecorder:
             return
         rate = np.full(len(POINTS), (end - start) / 2) * (pace if paced else 1.0)
         yield _Piece(time, rate, states.T, record.T if len(record) else None)
+
+
+def _unresolved(values: Array) -> bool:
+    """True if the points of a piece do not resolve one of the values on it, (values, points)."""
+    coefficients = np.abs(TO_SERIES @ values.T)
+    return bool((coefficients[-2:].max(0) > _RESOLVED * np.maximum(1.0, coefficients.max(0))).any())
 
 
 def _spread(items: Sequence[_T], most: int) -> list[_T]:

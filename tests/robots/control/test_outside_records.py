@@ -8,7 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from outside_records import CONTROL, JOINTS, MISTAKES, OBSERVED, PROGRAMS, Loop, columns_of, urdf, written
+from outside_records import (
+    CONTROL,
+    FITTED,
+    JOINTS,
+    MISTAKES,
+    MISWRITTEN,
+    OBSERVED,
+    PROGRAMS,
+    Loop,
+    columns_of,
+    miswritten,
+    urdf,
+    written,
+)
 
 from proofroll.robots.control.judge import RecordJudgement, judge_record
 
@@ -99,6 +112,53 @@ def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: 
     """A mistake in a loop around another program stops at its layer and is named; a limit is that of the URDF."""
     cause, layer, _ = MISTAKES[name]
     require_first(judged(recorded(name, program), digits), layer, cause)
+
+
+@pytest.mark.parametrize(
+    ("name", "program"),
+    [
+        pytest.param(name, program, marks=() if k % 7 == 0 and program == "pinocchio" else pytest.mark.drill)
+        for k, name in enumerate(FITTED)
+        for program in PROGRAMS
+    ],
+)
+def test_numbers_of_single_joints_are_named(name: str, program: str, judged: Judged) -> None:
+    """What differs at a joint, by two numbers, or by a law of targets, is named at its layer with its size."""
+    cause, layer, changes, words = FITTED[name]
+    judgement = judged(columns_of(Loop(**changes).record(PROGRAMS[program])))
+    require_first(judgement, layer, cause)
+    assert words in "\n".join(judgement.lines())
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if k % 5 == 0 else pytest.mark.drill) for k, name in enumerate(MISWRITTEN)]
+)
+def test_a_mistake_of_columns_accuses_nothing_else(name: str, judged: Judged) -> None:
+    """Columns that are not what their names say are named, and every layer behind them is judged without that."""
+    layer, words = MISWRITTEN[name]
+    judgement = judged(columns_of(miswritten(Loop().record(PROGRAMS["pinocchio"]), name)))
+    wrong = [item for item in judgement.layers if not item.holds and item.name != "acceleration"]
+    assert [item.name for item in wrong] == [layer]
+    assert wrong[0].causes[0].sentence.startswith(words)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("begin", [3.0, pytest.param(3.007, marks=pytest.mark.drill)])
+def test_a_clock_that_begins_at_any_time(begin: float, program: str, judged: Judged) -> None:
+    """A right record holds wherever its clock begins, between two instants of a clock from 0 as well."""
+    columns = recorded("", program)
+    judgement = judged({**columns, "time": columns["time"] + begin})
+    assert judgement.agrees, "\n".join(judgement.lines())
+
+
+def test_a_limit_that_is_never_reached_has_a_bound(judged: Judged) -> None:
+    """Where no effort is at a limit, it is at least the largest effort, beside the cause that there is none."""
+    said = "\n".join(judged(columns_of(Loop(limit=40.0).record(PROGRAMS["mujoco"]))).lines())
+    columns = columns_of(Loop(limit=40.0).record(PROGRAMS["mujoco"]))
+    largest = max(np.abs(values).max() for name, values in columns.items() if name.startswith("effort."))
+    bound = re.search(r"the limit of efforts is at least (\S+) of the right one, for no effort is larger", said)
+    assert bound, said
+    assert float(bound[1]) == pytest.approx(largest / 0.8, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", OF_OBSERVATIONS)

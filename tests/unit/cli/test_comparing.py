@@ -79,25 +79,45 @@ def test_a_scene_of_two_kinds_is_compared(
     assert [row.engine for row in load_comparison("look.toml").rows] == ["projection[formulation=dependent]"]
 
 
-def test_why_nobody_can_is_said_engine_by_engine(
-    mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+TENDON = """<mujoco><worldbody>
+  <body name="a"><joint name="j" type="hinge" axis="0 1 0"/><inertial pos="0 0 -0.3" mass="1" diaginertia="1 1 1"/>
+    <site name="s" pos="0.1 0 -0.3"/></body>
+  <body name="b" pos="0.4 0 0"><site name="t"/></body>
+</worldbody>
+<tendon><spatial stiffness="20"><site site="t"/><site site="s"/></spatial></tendon></mujoco>"""
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("asked", [(), ("--engine", "mujoco")])
+def test_what_no_engine_takes_has_a_row_of_each_with_its_reason(
+    asked: tuple[str, ...],
+    tmp_path: Path,
+    command_line: Callable[..., tuple[int, str, str]],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """What nobody provides is named; where each is provided by somebody, each engine's elements without a model."""
+    """Engines that all refuse a file judge nothing, exit 3, and each row names what is lacking, and nothing else."""
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison.engine_names", lambda: ["mujoco", "reduced"])
+    (tmp_path / "tendon.xml").write_text(TENDON, encoding="utf-8")
+    out_folder = ("--out", str(tmp_path / "out"), "--json")
+    code, out, err = command_line("compare", str(tmp_path / "tendon.xml"), *asked, *out_folder)
+    assert code == 3, err
+    rows = {row["engine"]: row for row in json.loads(out)["rows"]}
+    assert rows.keys() == ({"mujoco"} if asked else {"mujoco", "reduced"})
+    assert {row["verdict"] for row in rows.values()} == {"refused"}
+    assert "needs the tendon spatial tendon0 (couplings=0 leaves it out); no formulation" in rows["mujoco"]["reason"]
+
+
+@pytest.mark.drill
+def test_two_kinds_that_no_engine_has_together(
+    tmp_path: Path, mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An engine that lacks one of the kinds of a scene has a row with what it lacks."""
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison.engine_names", lambda: ["reduced"])
-    code, _, err = command_line("compare", str(mixed))
-    assert code == 2
-    assert "no adapter that is installed here represents revolute joints" in err
-    provided = {
-        "jointed": {"rods": ["revolute joints"]},
-        "rolling": {"ball": ["contact between bodies", "contacts that never slip (friction = inf)"]},
-    }
-    engines = [SimpleNamespace(name=name, provides=provides, made_for={}) for name, provides in provided.items()]
-    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._installed", lambda *_: engines)
-    code, _, err = command_line("compare", str(mixed))
-    assert code == 2
-    said = "jointed has no formulation for ball (contact between bodies, contacts that never slip (friction = inf)); "
-    said += "rolling has no formulation for mechanism"
-    assert f"can represent all of the scene: {said} (revolute joints)" in err
+    code, out, err = command_line("compare", str(mixed), "--until", "0.1", "--out", str(tmp_path / "out"), "--json")
+    assert code == 3, err
+    (row,) = json.loads(out)["rows"]
+    assert (row["engine"], row["verdict"]) == ("reduced", "refused")
+    assert "needs revolute joints; no formulation of reduced has that" in row["reason"]
 
 
 @pytest.mark.drill

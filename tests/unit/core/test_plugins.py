@@ -101,6 +101,12 @@ def test_a_formulation_made_for_other_scenes_is_not_taken_unasked(scene: str, fo
     assert resolve_settings(engine, {}, load_scene(scene).requires).formulation == formulation
 
 
+def test_where_no_formulation_suffices_the_one_that_lacks_least_is_taken() -> None:
+    """What a refusal then names is lacking in every formulation."""
+    engine = pytest.importorskip("proofroll.engines.pinocchio.adapter").Pinocchio
+    assert resolve_settings(engine, {}, {*load_scene("pendulum").requires, "a tendon"}).formulation == "null_space"
+
+
 def test_options_go_over_the_preset() -> None:
     """A preset gives what is not given, and text becomes the type of its field."""
     found = resolve_settings(Toy, {"preset": "default", "iterations": "7", "exact": "true"})

@@ -180,3 +180,14 @@ def test_friction_and_stops_beside_a_motion_switch_alike() -> None:
     # the method's own tolerance is 2e-14, its switches are found to 1e-12
     assert np.abs(run["q.hinge"].to_numpy() - truth.record.q[:, 1]).max() < 1e-10
     assert np.abs(run["drive.shaker"].to_numpy() - truth.record.named[:, 0])[1:].max() < 1e-8
+
+
+@pytest.mark.parametrize("angle", [0.3, pytest.param(3.0, marks=pytest.mark.drill)])
+def test_a_motion_that_leaves_nothing_free_holds_its_laws(angle: float) -> None:
+    """Where all is prescribed no state bounds the steps, and yet each law is held over the whole turn."""
+    body = Body("arm", mass=1.0, com=(0.3, 0.0, 0.0), inertia=((0.03, 0, 0), (0, 0.02, 0), (0, 0, 0.02)))
+    motion = Table((0.0, 0.1), (0.0, angle))
+    joint = Joint("hinge", "revolute", "world", "arm", axis=(0.0, 1.0, 0.0), motion=motion)
+    truth = truth_of(Mechanism(bodies=(body,), joints=(joint,), gravity=(0.0, 0.0, -9.81)), np.linspace(0, 0.1, 3))
+    assert (truth.ended, truth.laws != "") == ("", True)
+    assert truth.record.q[1, 0] == pytest.approx(angle / 2, rel=1e-14)  # the spline is symmetric

@@ -80,7 +80,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         ],
         budget=comparison.budget,
         beyond_budget=outcome.beyond_budget,
-        truth_ends=[*_truth_ends(outcome), *([outcome.no_contact] if outcome.no_contact else [])],
+        truth_ends=[*_truth_ends(outcome), *([outcome.no_contact] if outcome.no_contact else _quiet(outcome))],
         step_bound=step_bound(scene.elements, steps),
         omitted=list(scene.omitted),
         unfit=comparison.unfit,
@@ -107,6 +107,12 @@ def _truth_ends(outcome: Outcome) -> list[str]:
         for name, reference in truths.items()
         if reference.ended
     ]
+
+
+def _quiet(outcome: Outcome) -> list[str]:
+    """Sentence on truths in which nothing moves or touches, if that is so at every point of the parameters."""
+    references = [point.reference for point in outcome.points.values() if point.reference is not None]
+    return list(dict.fromkeys(item.quiet for item in references)) if all(item.quiet for item in references) else []
 
 
 def runs_at(outcome: Outcome, point: str) -> list[tuple[int, Run, StoredTrajectory]]:

@@ -22,6 +22,7 @@ from proofroll.files.trajectory_file import read_columns
 from proofroll.report.labels import engine_words, omitted_lines, precision_words, settings_text, step
 from proofroll.report.run.last_values import FORCES, bounce_table, short_names, value_table
 from proofroll.running.case import Case, Result, Status
+from proofroll.studies.judging.quiet import quiet
 
 _FEW = 3  # most forces and moments that are shown without being asked for
 _FEW_BODIES = 6  # most bodies whose places are shown where no point is tracked
@@ -50,6 +51,7 @@ class RunContent:
         bounces: energy and height of each impact; without error bars they are those of samples beside the impacts.
         step_bound: clause on the longest stable step and on that of the run; None: nothing bounds it.
         omitted: clauses on what the file describes and the run leaves out; None: nothing.
+        quiet: sentence on a run in which nothing moves, or nothing touches; None: something does.
         ends: time from which the truth is not known [s]; samples from there on are missing; None: none is.
     """
 
@@ -82,6 +84,7 @@ class RunContent:
     ends: float | None = field(default=None, metadata=OPTIONAL)
     step_bound: str | None = field(default=None, metadata=OPTIONAL)
     omitted: list[str] | None = field(default=None, metadata=OPTIONAL)
+    quiet: str | None = field(default=None, metadata=OPTIONAL)
 
 
 def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
@@ -129,6 +132,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         error_bars={name: float(c.attrs["error_bar"]) for name, c in curves.items() if "error_bar" in c.attrs} or None,
         bounces=_bounces(scene, columns) or None,
         ends=end[0] if end else None,
+        quiet=quiet(scene, columns.variables, events_of(columns)) or None,
     )
 
 
@@ -213,7 +217,7 @@ def run_lines(content: RunContent, *, forces: bool = True, everything: bool = Fa
 
     lines: list[Any] = [Text(_ended_words(content))]
     lines += [Text(content.step_bound)] if content.step_bound else []
-    lines += [Text(words) for words in omitted_lines(content.omitted or [])]
+    lines += [Text(words) for words in (*omitted_lines(content.omitted or []), *filter(None, [content.quiet]))]
     lines += [Text(f"  {cause.sentence}") for cause in content.diagnosis]
     if not content.final:
         return lines

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -12,9 +12,8 @@ import numpy as np
 
 from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.scene.policy import Observation
 from proofroll.robots.control.air_fit import AirFit, acceleration_fit
-from proofroll.robots.control.bookkeeping.law import VECTORS, ControlLaw, RobotState
+from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import (
     IMPLICIT,
     LAYERS,
@@ -24,13 +23,26 @@ from proofroll.robots.control.bookkeeping.mistakes import (
     mistakes,
     offsets_told,
 )
-from proofroll.robots.control.bookkeeping.search import MistakeExplanation, best_size, explanations, largest
+from proofroll.robots.control.bookkeeping.search import MistakeExplanation, best_size, bounded, explanations, largest
+from proofroll.robots.control.columns import action_mistakes
+from proofroll.robots.control.differences import (
+    DIFFERENCES,
+    ROUND_OFF,
+    SAME_TIME,
+    LayerDifferences,
+    at_instants,
+    due_rows,
+    efforts_of,
+    held_rows,
+    instant_rows,
+    servo_rows,
+    sources,
+)
+from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
-from proofroll.robots.control.record import BASE, OBSERVED, ControlRecord, Layer, LayerCause
+from proofroll.robots.control.record import ControlRecord, Layer, LayerCause
 from proofroll.robots.model import Array
 
-# Least residual that counts, in parts of the largest number of its column: round-off of a sum of some terms.
-_ROUND_OFF = 1e-9
 # Part of the largest forces up to which what is left without a cause is taken for the program's steps between the rows:
 # fourth order in steps of 5 ms leaves a seventh of it, a thigh that is heavier by a fifth four times as much.
 _STEPS = 1e-2
@@ -40,17 +52,7 @@ BETWEEN = "no cause is known; taken for the program's own steps between the rows
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
 _HELPS = 0.1
-_SAME_TIME = 1e-6  # part of the time between instants that is round-off
-
-
-@dataclass(frozen=True)
-class _Compared:
-    """Differences of a layer with its columns: ``difference`` (times, columns), in their units, and their sizes."""
-
-    columns: tuple[str, ...]
-    time: Array
-    difference: Array
-    sizes: Array
+_FITS = 1e-2  # the same of causes with several fitted numbers
 
 
 def record_layers(record: ControlRecord, law: ControlLaw, mechanism: Mechanism, *, grounded: bool) -> list[Layer]:
@@ -65,12 +67,15 @@ def record_layers(record: ControlRecord, law: ControlLaw, mechanism: Mechanism, 
     evidence = _Evidence(record, law, mechanism)
     layers: list[Layer] = []
     time = SearchTime(SEARCH_TIME)
-    for name in _DIFFERENCES:
+    for name in DIFFERENCES:
         layer = _layer(name, evidence)
         if not layer.holds:
             skipped = {item.name for item in layers if item.residual is None}
             layer = dataclasses.replace(layer, **_explained(layer, skipped, evidence, time))
+            if name == "action" and not layer.causes:
+                layer, evidence = _of_columns(layer, evidence)
         layers.append(layer)
+    record = evidence.record
     if grounded:
         layers.append(Layer("acceleration", reason="the robot touches the ground, whose forces no record has"))
         return layers
@@ -89,9 +94,9 @@ class _Evidence:
 
     def difference(
         self, name: str, law: ControlLaw | None = None, record: ControlRecord | None = None
-    ) -> _Compared | str:
+    ) -> LayerDifferences | str:
         """Differences of a layer, or the reason why there are none."""
-        return _DIFFERENCES[name](record or self.record, law or self.law)
+        return DIFFERENCES[name](record or self.record, law or self.law)
 
     def left(self, name: str, law: ControlLaw) -> Array:
         """Differences of a layer under a law in parts of the sizes of their columns; NaN where there are none."""
@@ -144,21 +149,21 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer]) -> Layer:
 
 def _fit_by_law(record: ControlRecord, evidence: _Evidence) -> AirFit | str:
     """Fit of accelerations to efforts that the law gives for the states of a record."""
-    efforts = _efforts(record, evidence.law)
+    efforts = efforts_of(record, evidence.law)
     if isinstance(efforts, str) or not np.isfinite(efforts).all():
         return efforts if isinstance(efforts, str) else "the record begins between two instants"
     return acceleration_fit(record, evidence.law, evidence.mechanism, efforts, held_rows(record, evidence.law))
 
 
-def _bars(name: str, evidence: _Evidence, compared: _Compared) -> Array:
+def _bars(name: str, evidence: _Evidence, compared: LayerDifferences) -> Array:
     """Difference of each column that the rounding of the record explains."""
     generator = np.random.default_rng(0)
     changes = [np.zeros(len(compared.columns))]
     for _ in range(_ROUNDINGS):
         moved = evidence.difference(name, record=evidence.record.rounded(generator))
-        if isinstance(moved, _Compared) and moved.difference.shape == compared.difference.shape:
+        if isinstance(moved, LayerDifferences) and moved.difference.shape == compared.difference.shape:
             changes.append(np.abs(moved.difference - compared.difference).max(axis=0))
-    return np.asarray(_SAFETY * np.max(changes, axis=0) + _ROUND_OFF * compared.sizes)
+    return np.asarray(_SAFETY * np.max(changes, axis=0) + ROUND_OFF * compared.sizes)
 
 
 def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time: SearchTime) -> dict[str, Any]:
@@ -176,13 +181,23 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
 
     def explanation(mistake: Mistake) -> MistakeExplanation | None:
         left, size = best_size(mistake, evidence.law, partial(evidence.left, layer.name))
-        return MistakeExplanation(mistake, size, left) if left <= most else None
+        if left > most:
+            return None
+
+        def left_by(size: float) -> float:
+            return _norm(evidence, layer.name, mistake.changed(evidence.law, size))
+
+        return bounded(MistakeExplanation(mistake, size, left), left_by, max(2 * left, rounding))
 
     candidates = [item for item in mistakes(evidence.law) if _shows(item, shown)]
     several, tried = explanations(candidates, explanation, time)
     ranked = [(item.rank, item.cause) for item in several]
     if "target" in shown and not isinstance(offset := _offset(evidence, layer.name), str):
         ranked.append((2 * offset.after, offset))  # a pose has many numbers: a mistake with fewer goes before
+    if all(item.after > rounding for item in several):
+        ranked += [
+            ((1 + numbers) * cause.after, cause) for numbers, cause in _fits(layer.name, compared, evidence, most)
+        ]
     causes = [cause for _, cause in sorted(ranked, key=lambda item: item[0])]
     if layer.name == "instants" and not causes:
         causes = [*_missed(evidence)]
@@ -195,13 +210,54 @@ def _shows(mistake: Mistake, layers: Sequence[str]) -> bool:
     return mistake.layer in layers or (mistake.later and order.index(mistake.layer) + 1 == order.index(layers[-1]))
 
 
+def _fits(name: str, compared: LayerDifferences, evidence: _Evidence, most: float) -> Iterator[tuple[int, LayerCause]]:
+    """Mistakes of some numbers that explain a layer, each with their count."""
+    record, law = evidence.record, evidence.law
+    if name == "observation":
+        yield from observation_causes(compared.columns, compared.recorded, compared.difference, compared.sizes, most)
+    elif name == "effort":
+        efforts, servos = record.stacked("effort", law.joints), servo_rows(record, law)
+        if efforts is None or isinstance(servos, str):
+            return
+        target, q, v, known = servos
+        rows = ServoRows(target=target[known], q=q[known], v=v[known], effort=efforts[known])
+        yield from servo_causes(rows, law, most)
+    elif name == "target" and law.policy is not None:
+        part = at_instants(record, law)
+        targets, actions = (part.stacked(kind, law.joints) for kind in ("target", "action"))
+        if targets is None or actions is None:
+            return
+        source = sources(part, law)
+        later = np.flatnonzero(source >= 0)
+        places = part.stacked("q", law.joints)
+        seen = None if places is None else places[later]
+        yield from target_causes(targets[later], actions[source[later]], seen, law, most)
+
+
+def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:
+    """A layer of actions with the mistake of their columns that explains it, and evidence without that mistake."""
+    instants = instant_rows(evidence.record, evidence.law)
+    known = [*action_mistakes(evidence.law, instants)]
+    trials = []
+    for mistake in known:
+        corrected = dataclasses.replace(evidence, record=mistake.changed(evidence.record))
+        left = _norm(corrected, layer.name, evidence.law)
+        if left <= _HELPS * _norm(evidence, layer.name, evidence.law):
+            trials.append((left, LayerCause(mistake.id, mistake.words, None, left), corrected))
+    tried = dataclasses.replace(layer, tried=layer.tried + len(known), known=layer.known + len(known))
+    if not trials:
+        return tried, evidence
+    _, cause, evidence = min(trials, key=lambda item: item[0])
+    return dataclasses.replace(tried, causes=(cause,)), evidence
+
+
 def _missed(evidence: _Evidence) -> Iterator[LayerCause]:
     """Instants at which the action before acts again, where all others have one."""
     record, law = evidence.record, evidence.law
-    changes, due = instant_rows(record, law), _due(record, law)
+    changes, due = instant_rows(record, law), due_rows(record, law)
     period, times = 1 / law.rate, record.time
     others = times[changes] * law.rate
-    if not len(due) or np.abs(others - np.round(others)).max() > _SAME_TIME:
+    if not len(due) or np.abs(others - np.round(others)).max() > SAME_TIME:
         return
     missed = [row for row in due.tolist() if np.abs(times[changes] - times[row]).min() > 0.5 * period]
     if missed:
@@ -229,232 +285,3 @@ def _offset(evidence: _Evidence, name: str) -> LayerCause | str:
 def _norm(evidence: _Evidence, name: str, law: ControlLaw) -> float:
     """Largest difference of a layer in parts of the size of its column."""
     return largest(evidence.left(name, law))
-
-
-def _compared(columns: list[str], time: Array, recorded: Array, computed: Array) -> _Compared:
-    sizes = np.maximum(np.abs(recorded).max(axis=0, initial=0.0), np.abs(computed).max(axis=0, initial=0.0))
-    sizes = np.maximum(sizes, 1e-3 * sizes.max(initial=0.0))
-    return _Compared(tuple(columns), time, recorded - computed, np.where(sizes > 0, sizes, 1.0))
-
-
-def _told(record: ControlRecord) -> list[str]:
-    """Columns that change at instants."""
-    return [name for name in record.columns if name.startswith(("action.", "target."))]
-
-
-def instant_rows(record: ControlRecord, law: ControlLaw) -> Any:
-    """Rows at which a record's action or target changes, and the first row if an instant can lie there."""
-    names = _told(record)
-    if not names:
-        near = np.abs(record.time * law.rate - np.round(record.time * law.rate)) < _SAME_TIME
-        return np.flatnonzero(near)
-    values = np.stack([record.columns[name] for name in names], axis=1)
-    changes = np.any(np.abs(np.diff(values, axis=0)) > 0, axis=1)
-    later = 1 + np.flatnonzero(changes)
-    if record.time[0] != 0 and len(later):  # a record may begin between two instants
-        periods = (record.time[later[0]] - record.time[0]) * law.rate
-        if abs(periods - np.round(periods)) > _SAME_TIME:
-            return later
-    return np.concatenate([[0], later])
-
-
-def _due(record: ControlRecord, law: ControlLaw) -> Any:
-    """Rows at instants of a law at which the action, or the target, should change but for rounding."""
-    far = np.abs(record.time * law.rate - np.round(record.time * law.rate))
-    rows: Any = np.flatnonzero(far < _SAME_TIME)
-    rows = rows[rows > 0]
-    if not len(rows) or law.extra_steps:
-        return rows[:0]
-    part = record.part(rows)
-    for kind, computed in (("action", _actions), ("target", _targets)):
-        recorded = record.stacked(kind, law.joints)
-        values = None if recorded is None or (kind == "action" and law.policy is None) else computed(part, law)
-        if recorded is not None and values is not None and not isinstance(values, str):
-            previous, rounding = recorded[rows - 1], 4 * record.rounding_of(kind, law.joints)[rows]
-            values = np.clip(values, recorded.min(axis=0), recorded.max(axis=0))  # what is clipped does not change
-            return rows[np.any(np.abs(values - previous) > rounding + _ROUND_OFF, axis=1)]
-    return rows[:0]
-
-
-def _instants(record: ControlRecord, law: ControlLaw) -> _Compared | str:
-    if not _told(record):
-        return "the record has no columns action.JOINT or target.JOINT, which change at instants"
-    time = record.time[instant_rows(record, law)]
-    if len(time) < 2:
-        return "nothing in the record changes at instants"
-    step = law.extra_steps * float(np.diff(record.time).min())
-    period = 1 / law.rate + step
-    expected = time[0] + period * np.round((time - time[0]) / period)
-    rounding = 2 * max(_SAME_TIME * period, float(np.abs(np.diff(record.time) - np.diff(record.time).mean()).max()))
-    sizes = np.full(1, min(rounding, 0.1 * float(np.diff(record.time).min())) / _ROUND_OFF)
-    due = record.time[_due(record, law)]
-    due = due[due <= time[-1] + (1 + _SAME_TIME) * period]  # what comes later may hold on purpose
-    lacking = np.array([np.abs(time - instant).min() for instant in due])
-    instants = np.concatenate([time[1:], due])
-    return _Compared(("time",), instants, np.concatenate([(time - expected)[1:], lacking])[:, None], sizes)
-
-
-def held_rows(record: ControlRecord, law: ControlLaw) -> Any:
-    """True at rows at which no action or target changes."""
-    mask = np.ones(len(record.time), bool)
-    if _told(record) or law.policy is not None:
-        mask[instant_rows(record, law)[1:]] = False
-    return mask
-
-
-def states(record: ControlRecord, law: ControlLaw) -> list[RobotState] | str:
-    """States at all rows of a record, or the reason why it has none; without columns of the base it is fixed."""
-    q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
-    if q is None or v is None:
-        return f"the record has no columns {'q' if q is None else 'v'}.JOINT"
-    base_at_rest = {"p_WB": np.zeros(3), "q_WB": np.array([1.0, 0, 0, 0]), "v_WB": np.zeros(3), "w_WB": np.zeros(3)}
-    base = {name: record.stacked(name, tuple(axes)) for name, axes in BASE.items()}
-    return [
-        RobotState(
-            time=float(time),
-            q=q[row],
-            v=v[row],
-            **{name: base_at_rest[name] if item is None else item[row] for name, item in base.items()},
-        )
-        for row, time in enumerate(record.time)
-    ]
-
-
-def _part(observation: Observation, name: str) -> Array:
-    return np.asarray(getattr(observation, name))
-
-
-def _observed(record: ControlRecord, law: ControlLaw) -> tuple[dict[str, Array], list[str]]:
-    """Recorded parts of observations, each (times, entries), and all of their columns."""
-    parts = {name: record.stacked(f"{OBSERVED}.{name}", law.joints) for name in ("q", "v", "last")}
-    parts |= {name: record.stacked(f"{OBSERVED}.{name}", tuple("xyz")) for name in VECTORS}
-    recorded = {name: item for name, item in parts.items() if item is not None}
-    labels = {name: law.joints if name in {"q", "v", "last"} else tuple("xyz") for name in recorded}
-    return recorded, [f"{OBSERVED}.{name}.{label}" for name in recorded for label in labels[name]]
-
-
-def _observation(record: ControlRecord, law: ControlLaw) -> _Compared | str:
-    record = record.part(instant_rows(record, law))
-    recorded, columns = _observed(record, law)
-    actions = record.stacked("action", law.joints)
-    if actions is None or record.time[0] != 0:
-        recorded.pop("last", None)
-        columns = [name for name in columns if not name.startswith(f"{OBSERVED}.last.")]
-    if not recorded:
-        return f"the record has no columns {OBSERVED}.…"
-    instants = states(record, law)
-    if isinstance(instants, str):
-        return instants
-    if not instants:
-        return "no row lies at an instant of the controller"
-    no_action = np.zeros((1, len(law.joints)))
-    last = np.tile(no_action, (len(instants), 1)) if actions is None else np.concatenate([no_action, actions[:-1]])
-    seen = [law.observed(state, action) for state, action in zip(instants, last, strict=True)]
-    computed = np.concatenate([np.stack([_part(item, name) for item in seen]) for name in recorded], axis=1)
-    return _compared(columns, record.time, np.concatenate([*recorded.values()], axis=1), computed)
-
-
-def _actions(record: ControlRecord, law: ControlLaw) -> Array | str:
-    """Actions of the policy at the rows of a record of instants, from recorded observations where there are some."""
-    answer = law.answer()
-    assert answer is not None  # the caller knows that there is a policy
-    observed = _observed(record, law)[0]
-    instants = states(record, law)
-    if isinstance(instants, str):
-        return instants
-    recorded = record.stacked("action", law.joints)
-    last = np.zeros(len(law.joints))
-    actions = []
-    for row, state in enumerate(instants):
-        seen = law.observed(state, observed["last"][row] if "last" in observed else last)
-        seen = dataclasses.replace(seen, **{name: item[row] for name, item in observed.items()})
-        actions.append(np.clip(answer(seen), -law.clip, law.clip))
-        last = actions[-1] if recorded is None else recorded[row]
-    return np.array(actions)
-
-
-def _action(record: ControlRecord, law: ControlLaw) -> _Compared | str:
-    record = record.part(instant_rows(record, law))
-    recorded = record.stacked("action", law.joints)
-    if law.policy is None or recorded is None:
-        return "the controller has no policy" if law.policy is None else "the record has no columns action.JOINT"
-    computed = _actions(record, law)
-    if isinstance(computed, str):
-        return computed
-    columns = [f"action.{name}" for name in law.joints]
-    late = int(record.time[0] > 0 and f"{OBSERVED}.last.{law.joints[0]}" not in record.columns)
-    return _compared(columns, record.time[late:], recorded[late:], computed[late:])
-
-
-def _targets(record: ControlRecord, law: ControlLaw) -> Array | str:
-    """Targets at the rows of a record of instants, from recorded actions where there are some."""
-    counts: list[Array | None] = [None] * len(record.time)
-    if law.policy is not None:
-        actions = record.stacked("action", law.joints)
-        computed = _actions(record, law) if actions is None else actions
-        if isinstance(computed, str):
-            return computed
-        smoothed = np.zeros(len(law.joints)) if record.time[0] == 0 else computed[0]
-        for row, action in enumerate(computed):
-            counts[row] = smoothed = law.smoothed(action, smoothed)
-    times = record.time
-    # An action that equals the one before has no row of its own.
-    source = np.searchsorted(times, times - (law.delay - _SAME_TIME) / law.rate, side="right") - 1
-    targets = [law.pose if row < 0 else law.target(counts[row], float(times[row])) for row in source.tolist()]
-    return np.array(targets)
-
-
-def _target(record: ControlRecord, law: ControlLaw) -> _Compared | str:
-    record = record.part(instant_rows(record, law))
-    recorded = record.stacked("target", law.joints)
-    if recorded is None:
-        return "the record has no columns target.JOINT"
-    computed = _targets(record, law)
-    if isinstance(computed, str):
-        return computed
-    late = record.time - record.time[0] > (law.delay - 0.5) / law.rate
-    counts = np.ones(len(late), bool) if record.time[0] == 0 else late
-    columns = [f"target.{name}" for name in law.joints]
-    return _compared(columns, record.time[counts], recorded[counts], computed[counts])
-
-
-def _efforts(record: ControlRecord, law: ControlLaw) -> Array | str:
-    """Efforts at all rows, from recorded targets where there are some; NaN where the record does not reach back."""
-    q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
-    if q is None or v is None:
-        return "the record has no columns q.JOINT and v.JOINT"
-    target, rows, instants = record.stacked("target", law.joints), np.arange(len(q)), instant_rows(record, law)
-    places = np.searchsorted(instants, rows, side="right") - 1
-    if target is None:
-        if record.time[0] != 0 or (law.policy is None and not _told(record) and not len(instants)):
-            return "the record has no columns target.JOINT"
-        computed = _targets(record.part(instants), law)
-        if isinstance(computed, str):
-            return computed
-        target = computed[places]
-    seen = np.where(places < 0, -1, instants[places]) if law.hold_effort else rows
-    seen = seen - law.lag
-    efforts = law.effort(target, q[seen], v[seen])
-    efforts[seen < 0] = np.nan
-    return efforts
-
-
-def _effort(record: ControlRecord, law: ControlLaw) -> _Compared | str:
-    recorded = record.stacked("effort", law.joints)
-    if recorded is None:
-        return "the record has no columns effort.JOINT"
-    computed = _efforts(record, law)
-    if isinstance(computed, str):
-        return computed
-    rows = np.isfinite(computed).all(axis=1)
-    columns = [f"effort.{name}" for name in law.joints]
-    return _compared(columns, record.time[rows], recorded[rows], computed[rows])
-
-
-_DIFFERENCES: dict[str, Callable[[ControlRecord, ControlLaw], _Compared | str]] = {
-    "instants": _instants,
-    "observation": _observation,
-    "action": _action,
-    "target": _target,
-    "effort": _effort,
-}

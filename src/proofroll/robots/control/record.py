@@ -120,9 +120,11 @@ def record_of(
     if len(time) < 2 or not np.all(np.diff(time) > 0):
         raise InputError(str(path), "time", "give two or more times that grow")
     for name, values in columns.items():
-        if not np.isfinite(values).all():
-            row = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise InputError(f"{path}: {name}", float(values[row]), f"it is not finite at t = {time[row]:g} s")
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            rows = f" and in {len(bad) - 1} of the {len(values)} rows besides" if len(bad) > 1 else ""
+            advice = f"it is not finite at t = {time[bad[0]]:g} s{rows}"
+            raise InputError(f"{path}: {name}", float(values[bad[0]]), advice)
     factors = {name: in_si(unit)[1] for name, unit in (units or {}).items()}
     if digits is None:
         rounding = _roundings(columns)  # of the digits that are written
@@ -137,10 +139,10 @@ def record_of(
         off = np.abs(np.linalg.norm(attitude, axis=1) - 1)
         for axis in "wxyz":
             rounding[f"q_WB.{axis}"] = np.maximum(rounding[f"q_WB.{axis}"], off)
-    return _in_world(record)
+    return in_world(record)
 
 
-def _in_world(record: ControlRecord) -> ControlRecord:
+def in_world(record: ControlRecord) -> ControlRecord:
     """The record with velocities of the base along the world's axes, which it may have along those of the base."""
     columns, rounding = dict(record.columns), dict(record.rounding)
     attitude = record.stacked("q_WB", "wxyz")

@@ -4,6 +4,7 @@ Links connected by fixed joints are one body, in the frame of the child of its m
 tree are loops and couplings; joints in them start near the file's pose, at rest. Contacts and looks are left out.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -21,6 +22,7 @@ from proofroll.elements.mechanism.scene.rotations import to_rpy
 from proofroll.robots.files.meaning import opened, robot_of_text
 from proofroll.robots.files.mjcf.parse import COMPENSATION
 from proofroll.robots.files.robot_file import RobotFile
+from proofroll.robots.files.urdf import extra_dynamics
 from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotJoint, RobotLoop, Tie
 from proofroll.robots.states import RobotStates
 
@@ -139,6 +141,8 @@ def _omitted(file: RobotFile, robot: Robot, values: Mapping[str, float]) -> Iter
     compensated = sum(remark.what == COMPENSATION for remark in file.remarks)
     if compensated:
         yield f"gravity compensation of {counted(compensated, 'bodies')}"
+    extra = Counter(key for joint in file.root.iter("joint") for key in extra_dynamics(joint))
+    yield from (f"{key} of {counted(number, 'joints')}" for key, number in extra.items())
     yield "contacts"
 
 

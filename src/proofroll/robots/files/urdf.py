@@ -38,6 +38,10 @@ def neutral_urdf(root: Element) -> tuple[Element, list[LintRemark]]:
                 remarks.append(LintRemark("note", child.tag, "options for one program; left out for every engine"))
             elif child.tag not in {"material", "group_state", "link_state"}:
                 remarks.append(LintRemark("warning", str(child.tag), "the specification has no such element; left out"))
+    for joint in root.iter("joint"):
+        for key in extra_dynamics(joint):
+            words = "the specification has no such attribute; left out for every engine"
+            remarks.append(LintRemark("warning", f"joint {joint.get('name')} {key}", words))
     meshes = 0
     for link in root.iter("link"):
         removed = 0
@@ -57,6 +61,12 @@ def neutral_urdf(root: Element) -> tuple[Element, list[LintRemark]]:
         words = f"{meshes} collision meshes left out for every engine: masses come from <inertial> alone"
         remarks.append(LintRemark("note", "links", words))
     return root, remarks
+
+
+def extra_dynamics(joint: Element) -> list[str]:
+    """Attributes of the dynamics of a URDF's joint that the specification lacks, as springStiffness, but zeros."""
+    attributes = [item for dynamics in joint.findall("dynamics") for item in dynamics.attrib.items()]
+    return [key for key, value in attributes if key not in {"damping", "friction"} and value.strip("0. ")]
 
 
 def driven_joints(root: Element) -> dict[str, float]:

@@ -8,7 +8,7 @@ from proofroll.core.bounds import require_bounds
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.engine_abilities import offered
 from proofroll.core.errors import InputError, Missing, ProofrollError
-from proofroll.core.multi_element import each_alone, represents
+from proofroll.core.multi_element import represents
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names, parse_engine, require_engine
 from proofroll.core.scene import Scene
@@ -50,7 +50,7 @@ def default_comparison(
         every: sampling interval [s]; None: about a fiftieth of that.
 
     Raises:
-        InputError: there is no such scene or engine, a value makes no sense, or no engine can represent the scene.
+        InputError: there is no such scene or engine, a value makes no sense, or no engine is installed.
     """
     begin = processor_seconds()
     file, scene = read_scene_file(name), load_scene(name, **parameters)
@@ -63,7 +63,7 @@ def default_comparison(
     rest = f" (the first {until:g} s of {file.duration:g})" if file.duration and until < file.duration - every else ""
     rows = asked_rows(scene, file, workers, engines, _CLOSE)
     if not rows:
-        raise InputError("scene", name, _reason_for_none(scene, workers))
+        raise InputError("engine", None, "none is installed here that can be asked; pip install 'proofroll[all]'")
     described = {} if engines else describe_each(engine_names(), workers)
     return Comparison(
         name=scene.name,
@@ -109,7 +109,7 @@ def asked_rows(
     """Rows without claims of engines that a user asks for by name or ``name[key=value,…]``.
 
     An engine without settings has a row for each formulation that can represent the scene. If none can, or the engine
-    is not installed, it has one row, whose run says why.
+    is not installed, it has one row, whose run says why. If no engine can, all that are installed have such a row.
 
     Args:
         scene: the scene.
@@ -130,7 +130,7 @@ def asked_rows(
             raise facts
     for spec in specs:
         texts += [str(spec)] if spec.options else able(scene, workers, names=[spec.name]) or [spec.name]
-    texts = texts if engines else able(scene, workers)
+    texts = texts if engines else able(scene, workers) or [engine.name for engine in _installed(workers)]
     return [Row(text, tolerance, list(Verdict), because=_BECAUSE) for text in _stepped(texts, file.dt, workers)]
 
 
@@ -201,21 +201,3 @@ def _installed(workers: Workers | None, names: Sequence[str] | None = None) -> l
     """Descriptions of the installed engines, or of those among ``names``."""
     described = describe_each(engine_names() if names is None else names, workers)
     return [item for item in described.values() if isinstance(item, EngineDescription)]
-
-
-def _reason_for_none(scene: Scene, workers: Workers | None) -> str:
-    """Reason why no engine can represent a scene: missing capabilities, or else the elements that each cannot build."""
-    engines = _installed(workers)
-    provided = {item for engine in engines for items in engine.provides.values() for item in items}
-    if lacking := scene.requires - provided:
-        return f"no adapter that is installed here represents {', '.join(sorted(lacking))}"
-    reasons = []
-    for engine in engines:
-        none = [
-            f"{alone.elements[0].name} ({', '.join(sorted(alone.requires))})"
-            for alone in each_alone(scene)
-            if not any(alone.requires <= set(items) for items in engine.provides.values())
-        ]
-        lacking_for = " and ".join(none) or "all elements of one kind at once"
-        reasons.append(f"{engine.name} has no formulation for {lacking_for}")
-    return f"no installed engine can represent all of the scene: {'; '.join(reasons)}"

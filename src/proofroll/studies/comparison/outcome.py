@@ -198,7 +198,7 @@ class Outcome:
     def _unjudged(self) -> list[Run]:
         """All runs, if none has a claim and none of them could be judged."""
         free = all(set(run.row.expected(run.parameters)) == set(Verdict) for run in self.runs)
-        return self.runs if free and all(run.verdict is Verdict.NOT_JUDGED for run in self.runs) else []
+        return self.runs if free and all(run.verdict in set(_UNJUDGED.values()) for run in self.runs) else []
 
     def _repr_html_(self) -> str:
         """HTML table for a notebook: a row for each run, with the observable that is furthest beyond its tolerance."""

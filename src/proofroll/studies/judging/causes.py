@@ -96,6 +96,28 @@ def causes_of(variables: Mapping[str, GivenVariable], times: FloatArray, falling
     return [*filter(None, sentences.values()), *_first_row(open_ones, times)]
 
 
+def begun_later(variables: Mapping[str, GivenVariable], from_start: Mapping[str, GivenVariable], begin: float) -> str:
+    """Clause on a clock that does not begin with the motion; empty if that does not explain what differs.
+
+    Args:
+        variables: of the trajectory and the truth at its times, by name.
+        from_start: the same with the truth at times that begin with 0.
+        begin: time of the first row [s].
+    """
+    wrong = [name for name, item in variables.items() if item.wrong]
+    closed = [
+        from_start[name].off <= CLOSES * item.off or not from_start[name].wrong for name, item in variables.items()
+    ]
+    if not wrong or not all(closed):
+        return ""
+    name = max(wrong, key=lambda name: variables[name].off / (variables[name].way or 1.0))
+    unit, off, left = spaced(variables[name].unit), number(variables[name].off), number(from_start[name].off, 1)
+    return (
+        f"the record is late by {begin:.4g} s (its clock begins then, with the scene's start: {name} is off by "
+        f"{off}{unit}, by {left}{unit} with that)"
+    )
+
+
 def mapping(cause: str, units: Mapping[str, str], columns: Mapping[str, str]) -> list[str]:
     """Names of columns that close a cause of another unit or of swapped columns, as ``theta=q.pivot[deg]``.
 

@@ -25,7 +25,7 @@ from proofroll.core.whole_turns import samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging import run_values
-from proofroll.studies.judging.causes import GivenVariable, causes_of
+from proofroll.studies.judging.causes import GivenVariable, begun_later, causes_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.judging.run_values import turned_alike
 from proofroll.studies.judging.user_trajectory import GivenRun, RunInput, read_run
@@ -50,10 +50,12 @@ class Compared:
     Attributes:
         judgement: see :class:`proofroll.core.verdict.Judgement`.
         at: time of the largest difference [s]; None if the quantity is no function of time.
+        lost: words on the rows without a finite number; empty: all have one.
     """
 
     judgement: Judgement
     at: float | None
+    lost: str = ""
 
     @property
     def agrees(self) -> bool:
@@ -69,7 +71,7 @@ class Compared:
         difference = f"{judgement.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
         if not np.isfinite(judgement.error):
             counts = judgement.reason.removeprefix("the question is ill-posed here; ").partition(";")[0]
-            unlike = f"has {counts}" if " values, the truth has " in counts else "is not finite"
+            unlike = f"has {counts}" if " values, the truth has " in counts else f"is not finite{self.lost}"
             difference = f"{judgement.observable} {unlike}{when}"
         bar = f"the truth is known to {number(judgement.truth_error_bar)}{unit}"
         if judgement.verdict is Verdict.NOT_JUDGED:
@@ -88,6 +90,7 @@ class Judged:
         because: reason of the tolerances; empty if not given.
         unjudged: given variable that is not judged -> reason.
         ended: time and reason of an early end of the truth, behind which nothing is judged; empty: there is none.
+        quiet: sentence on a truth in which nothing moves, or nothing touches; empty: something does.
         step_bound: clause on the longest stable step of an explicit scheme; empty: nothing bounds it.
         causes: clauses on mistakes that explain a difference.
     """
@@ -97,6 +100,7 @@ class Judged:
     because: str = ""
     unjudged: Mapping[str, str] = field(default_factory=dict)
     ended: str = ""
+    quiet: str = ""
     step_bound: str = ""
     causes: tuple[str, ...] = ()
 
@@ -115,8 +119,7 @@ class Judged:
             lines.append(f"  not judged: {', '.join(name for name, its in self.unjudged.items() if its == why)}; {why}")
         if self.ended:
             lines.append(f"  not judged: what lies behind, for {self.ended}")
-        if self.step_bound:
-            lines.append(f"  {self.step_bound}")
+        lines += [f"  {sentence}" for sentence in (self.quiet, self.step_bound) if sentence]
         return "\n".join([head, *lines])
 
     def _repr_html_(self) -> str:
@@ -148,6 +151,7 @@ class Judged:
             "compared": rows,
             "unjudged": dict(self.unjudged),
             "ended": self.ended,
+            "quiet": self.quiet,
             "step_bound": self.step_bound,
             "causes": list(self.causes),
         }
@@ -230,6 +234,7 @@ def judge(
         because=because,
         unjudged=unjudged,
         ended=reference.ended,
+        quiet=reference.quiet,
         step_bound=bound,
         causes=tuple(causes),
     )
@@ -267,8 +272,14 @@ def _causes(reference: Reference, user_run: GivenRun, run: xr.Dataset) -> list[s
     free = [f"{name}.{axis}" for name in points for axis in "xyz"]
     laws = {name for name, item in scene.observables.items() if item.role is Role.RESIDUAL}
     names = (user_run.besides.keys() or set(_states(reference, list(map(str, run.data_vars))))) - laws
+    times = run["time"].to_numpy()
     given_columns = {name: item for name, item in _given(run, true).items() if name in names}
-    causes = causes_of(given_columns, run["time"].to_numpy(), free)
+    if times[0] > 0 and len(times) > 1 and "scene_digest" not in run.attrs:
+        sooner = run.assign_coords(time=times - times[0])
+        from_start = _given(sooner, _truth(scene, times - times[0], np.zeros(0)))
+        if begun := begun_later(given_columns, from_start, float(times[0])):
+            return [begun]
+    causes = causes_of(given_columns, times, free)
     if causes or not user_run.twice or not user_run.besides:  # proofroll's own engines have studies that say more
         return causes
     return [item.sentence for item in diagnose_scene(scene, [], run, true)]
@@ -430,7 +441,13 @@ def _compared(
             _size(reference, name, true_values, unit),
         )
     judgement = judge_curve(Allowance(name, unit, bound.absolute(scale), scale), run, true)
-    return Compared(judgement, _farthest(run, true.values, times))
+    return Compared(judgement, _farthest(run, true.values, times), _lost(run.values))
+
+
+def _lost(values: FloatArray) -> str:
+    """Words on the rows of a curve that are not finite; empty: at most one is not."""
+    count = sum(not np.isfinite(row).all() for row in values)
+    return f" in {count} of {len(values)} rows, first" if count > 1 else ""
 
 
 def _against_state(

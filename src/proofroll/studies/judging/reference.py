@@ -31,6 +31,7 @@ from proofroll.core.events import EVENT_ORDER, JUMPS, Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import TrueCurve
+from proofroll.studies.judging.quiet import quiet, untouched
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,10 +95,12 @@ class Reference:
     @property
     def untouched(self) -> bool:
         """True if bodies may touch and none does: no event, and no force of a contact."""
-        variables = self.dataset.variables
-        forces = [name for name, item in self.scene.observables.items() if not item.at_impacts and name in variables]
-        arrays = [variables[name].values for name in forces]
-        return bool(arrays) and not self.events and not any(np.any(values != 0) for values in arrays)
+        return untouched(self.scene, self.dataset.variables, self.events)
+
+    @property
+    def quiet(self) -> str:
+        """Sentence on a truth in which nothing moves, or nothing touches; empty: something does."""
+        return quiet(self.scene, self.dataset.variables, self.events)
 
     def shared(self, routes: Collection[str]) -> str:
         """Sentence about a route of the truth that is among ``routes``, and its check; empty if none is."""

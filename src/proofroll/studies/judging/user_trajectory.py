@@ -181,7 +181,8 @@ def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
             bad = ~np.all(np.isfinite(values), axis=1)
             if np.any(bad):
                 time = float(run["time"][int(np.argmax(bad))])
-                raise InputError("run", name, f"it is not finite at {time:.6g} s; leave it out, or correct it")
+                rows = f" and in {bad.sum() - 1} of the {len(bad)} rows besides" if bad.sum() > 1 else ""
+                raise InputError("run", name, f"it is not finite at {time:.6g} s{rows}; leave it out, or correct it")
             if variable == "q_WB" and values.shape[1] % 4 == 0:
                 try:
                     require_unit(values.reshape(-1, 4), "somewhere")

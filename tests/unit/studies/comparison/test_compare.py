@@ -349,7 +349,7 @@ def test_a_refusal_is_no_failure(tmp_path: Path, status: Status, verdict: Verdic
 @pytest.mark.parametrize("status", [Status.DIVERGED, Status.WRONG_MODEL, Status.CRASHED, Status.REFUSED])
 @pytest.mark.parametrize("true", [True, False])
 def test_a_failure_counts_where_nothing_is_claimed(tmp_path: Path, status: Status, true: bool) -> None:
-    """A first look exits 3 where an engine failed, whether or not there is a truth; a refusal is no failure."""
+    """A first look exits 3 where an engine failed or all refused, truth or not; one refusal is no failure."""
 
     def answer(*_: object) -> Result:
         return Result(status, "the step fell to nothing")
@@ -357,7 +357,10 @@ def test_a_failure_counts_where_nothing_is_claimed(tmp_path: Path, status: Statu
     free = [dataclasses.replace(ROW, engine=engine, expect=list(Verdict)) for engine in ("alpha", "beta")]
     none = {} if true else {4.0: Result(Status.REFUSED, "two feet touch at once")}
     outcome = judged(tmp_path, claim(free, [4.0]), answer, none)
-    assert exit_code([outcome]) == (0 if status is Status.REFUSED else 3)
+    assert exit_code([outcome]) == 3
+    right = judged(tmp_path / "right", claim(free[:1], [4.0]), the_truth)
+    beside = dataclasses.replace(right, runs=[*right.runs, *outcome.runs])
+    assert exit_code([beside]) == (0 if status is Status.REFUSED else 3)
 
 
 @pytest.mark.parametrize(("witness", "engine", "code"), [(True, True, 0), (True, False, 3), (False, True, 3)])

@@ -153,6 +153,19 @@ def test_a_late_record_is_named(*, whole: bool, clock: bool) -> None:
     assert "cause: the record is late by 0.1 s (" in str(judged)
 
 
+def test_a_clock_that_begins_later_is_no_delay_less_some_periods() -> None:
+    """The first row of a swing that comes back is the scene's start, wherever its clock begins."""
+    scene = load_scene("pendulum", angle=0.5)
+    times = 0.02 * np.arange(61)
+    true = truth(scene.fully_asked, times)
+    judged = proofroll.judge({"time": 3.0 + times, "q.pivot": true["q.pivot"].to_numpy()}, scene)
+    assert [cause.partition(" is off")[0] for cause in judged.causes] == [
+        "the record is late by 3 s (its clock begins then, with the scene's start: q.pivot"
+    ]
+    later = truth(scene.fully_asked, np.concatenate([[0.0], 3.0 + times]))
+    assert proofroll.judge({"time": 3.0 + times, "q.pivot": later["q.pivot"].to_numpy()[1:]}, scene).agrees
+
+
 def test_millimetres_are_named() -> None:
     """A length in another unit."""
     assert said(1e3 * ONE, TWO, "m")[0].startswith("q.a is a thousand times the truth: millimetres?")

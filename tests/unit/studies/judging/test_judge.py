@@ -124,4 +124,4 @@ def test_a_number_that_is_not_finite_is_named_with_its_time() -> None:
     angles[2:] = np.nan
     judged = proofroll.judge({"time": run["time"].to_numpy(), "q.pivot": angles}, "pendulum")
     assert not judged.agrees
-    assert "q.pivot is not finite at 0.2 s; " in str(judged)
+    assert "q.pivot is not finite in 3 of 5 rows, first at 0.2 s; " in str(judged)

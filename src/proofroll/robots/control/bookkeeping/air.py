@@ -154,7 +154,7 @@ def steps_in_air(
         time = law.begins + k * step
         state, observation = robot.state(time, q, v), None
         if k % period == 0:
-            observation = law.observed(state, last)
+            observation = law.observed(states[-1] if law.observed_lag else state, last)
             action = None if answer is None else answer(observation)
             last = last if action is None else action
             counts = counts if action is None else law.smoothed(action, counts)

@@ -64,7 +64,8 @@ class ControlLaw:
         action_order: joint that each entry of an action is for.
         observed_order: joint that each entry of the observed coordinates and rates is of.
         signs: sign of each joint's target, shape (n,).
-        scalar_last: True if a quaternion with its scalar last is read as one with its scalar first.
+        scalar_last: 1 if a quaternion with its scalar last is read as one with its scalar first, -1 the other way.
+        conjugated: True if the quaternion is that of the inverse rotation, before it is read.
         turned_back: True if the rotation of the base is used the other way around.
         gravity_sign: of the observed direction of gravity.
         velocity_turns: times that the observed velocity of the base is turned from the world's axes to the base's.
@@ -79,6 +80,7 @@ class ControlLaw:
         reductions: turns of each joint's motor per turn of the joint, shape (n,).
         effort_factor: on what a servo's effort is before it acts, shape (n,).
         lag: steps by which the state of the servos is late.
+        observed_lag: steps by which the state that the policy sees is late.
         extra_steps: steps by which the time between two instants is longer.
         begins: time of the first instant of a motion [s].
         earlier: actions at the instants before it, the last one last.
@@ -100,7 +102,8 @@ class ControlLaw:
     action_order: tuple[int, ...] = ()
     observed_order: tuple[int, ...] = ()
     signs: Array = dataclasses.field(default_factory=lambda: np.ones(1))
-    scalar_last: bool = False
+    scalar_last: int = 0
+    conjugated: bool = False
     turned_back: bool = False
     gravity_sign: float = 1.0
     velocity_turns: int = 0
@@ -115,6 +118,7 @@ class ControlLaw:
     reductions: Array = dataclasses.field(default_factory=lambda: np.ones(1))
     effort_factor: Array = dataclasses.field(default_factory=lambda: np.ones(1))
     lag: int = 0
+    observed_lag: int = 0
     extra_steps: int = 0
     begins: float = 0.0
     earlier: tuple[Array, ...] = ()
@@ -174,8 +178,8 @@ class ControlLaw:
 
     def observed(self, state: RobotState, last: Array) -> Observation:
         """Observation of a state, ``last`` being the action before."""
-        quaternion = np.roll(state.q_WB, -1) if self.scalar_last else state.q_WB
-        R = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+        quaternion = state.q_WB * [1, -1, -1, -1] if self.conjugated else state.q_WB
+        R = Rotation.from_quat(np.roll(quaternion, -self.scalar_last), scalar_first=True).as_matrix()
         R = R.T if self.turned_back else R
         body = Rotation.from_quat(state.q_WB, scalar_first=True).as_matrix()
         order = self._entries[1]
@@ -196,8 +200,15 @@ class ControlLaw:
     @property
     def observing(self) -> tuple[object, ...]:
         """Settings on which :meth:`observed` depends besides a state."""
-        turns = (self.scalar_last, self.turned_back, self.gravity_sign, self.velocity_turns, self.spin_turns)
-        return (*turns, self.observed_order, self.factors, self.pose_observed, self.at_centre)
+        turns = (
+            self.scalar_last,
+            self.conjugated,
+            self.turned_back,
+            self.gravity_sign,
+            self.velocity_turns,
+            self.spin_turns,
+        )
+        return (*turns, self.observed_order, self.factors, self.pose_observed, self.at_centre, self.observed_lag)
 
     def smoothed(self, action: Array, previous: Array) -> Array:
         """Part of an action that counts, clipped, beside what counted at the instant ``previous``."""

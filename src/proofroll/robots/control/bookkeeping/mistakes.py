@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -16,6 +17,7 @@ from proofroll.robots.control.bookkeeping.law import SCALED, ControlLaw
 
 # Layers of a record, each computed from the ones before; a record shows a mistake at one of them.
 LAYERS = {
+    "state": "velocities against the rates of places",
     "instants": "times at which the controller acts, from its rate",
     "observation": "from the state",
     "action": "from the observation, by the policy",
@@ -33,6 +35,7 @@ IMPLICIT = (
 )
 _NOTHING = 1e-6  # size that is 0
 _ARMATURES = (1e-4, 1e-3, 1e-2, 0.1)  # kg m², where the right one is 0
+_STANDARD = 9.81  # m/s², by which an observed direction is no unit vector
 _TOLD = 1e-3  # least part of the largest offset of a pose that is told
 
 
@@ -67,6 +70,7 @@ class Mistake:
         absent: clause that names it where its size is 0; empty: ``words`` do.
         later: True if a record may show it at the next layer, as where it lacks a part of an observation, or has an
             action before it is clipped.
+        at_least: clause that names it where any larger size explains as much; empty: none does.
     """
 
     id: str
@@ -79,12 +83,14 @@ class Mistake:
     none: float = 1.0
     absent: str = ""
     later: bool = False
+    at_least: str = ""
 
-    def sentence(self, size: float) -> str:
-        """The mistake with its size."""
+    def sentence(self, size: float, *, larger: bool = False) -> str:
+        """The mistake with its size; ``larger``: any larger one explains as much."""
         if self.absent and abs(size) < _NOTHING:
             return self.absent
-        return self.words.format(size=f"{round(size, 12):.5g}")
+        words = self.at_least if larger else self.words
+        return words.format(size=f"{round(size, 12):.5g}")
 
 
 def mistakes(law: ControlLaw) -> list[Mistake]:
@@ -133,9 +139,12 @@ def _of_servos(law: ControlLaw) -> Iterator[Mistake]:
     for gain, words in (("kp", "kp"), ("kd", "kd")):
         if getattr(law, gain).any():
             yield _sized(gain, f"{words} is {{size}} of the right one", "effort", gain)
+            yield _fixed(f"{gain}_sign", f"{words} has the other sign", "effort", **{gain: -getattr(law, gain)})
     if np.isfinite(law.limit).any():
         yield _fixed("clamp_missing", "efforts have no limit", "effort", limit=np.full(len(law.joints), np.inf))
-        yield _sized("clamp", "the limit of efforts is {size} of the right one", "effort", "limit", (0.8, 0.5, 1.2))
+        words, at_least = "the limit of efforts is {size} of the right one", "at least {size} of the right one"
+        clamp = _sized("clamp", words, "effort", "limit", (0.8, 0.5, 1.2))
+        yield dataclasses.replace(clamp, at_least=f"the limit of efforts is {at_least}, for no effort is larger")
     if np.any(law.reductions != 1):
         words = "efforts are those of motors, divided by the reductions of the robot's file"
         yield _fixed("reduction", words, "effort", effort_factor=law.effort_factor / law.reductions)
@@ -148,9 +157,27 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
     """Mistakes of what a policy observes."""
     for words, order in orders(law.joints):
         yield _seen("observed_order", f"joints are observed in another order ({words})", observed_order=order)
-    yield _seen("quaternion", "the quaternion of the base is read as w, x, y, z, and is x, y, z, w", scalar_last=True)
+    read = "the quaternion of the base is read as"
+    yield _seen("quaternion", f"{read} w, x, y, z, and is x, y, z, w", scalar_last=1)
+    yield _seen("quaternion", f"{read} x, y, z, w, and is w, x, y, z", scalar_last=-1)
+    for last, read_order in ((1, "w, x, y, z, and is x, y, z, w"), (-1, "x, y, z, w, and is w, x, y, z")):
+        sentence = f"{read} {read_order}, and used as the inverse rotation"
+        yield _seen("quaternion", sentence, scalar_last=last, turned_back=True)
+        sentence = f"{read} {read_order}, of the inverse rotation"
+        yield _seen("quaternion", sentence, scalar_last=last, conjugated=True)
     yield _seen("rotation", "the rotation of the base is used the other way around", turned_back=True)
     yield _seen("gravity_sign", "the observed gravity has the other sign", gravity_sign=-law.gravity_sign)
+    yield Mistake(
+        id="observed_gravity",
+        words="gravity is observed at {size} of the right size",
+        layer="observation",
+        changed=partial(_scaled, "gravity_sign"),
+        sized=True,
+        starts=(0.95, _STANDARD),
+        absent="gravity is not observed",
+        later=True,
+    )
+    yield _seen("observed_before", "the policy sees the state of the step before", observed_lag=1)
     velocity, spin = "the velocity of the base is", "the angular velocity of the base is"
     yield _seen("velocity_frame", f"{velocity} observed in the base's axes", velocity_turns=1)
     yield _seen(

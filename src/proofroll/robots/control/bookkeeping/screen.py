@@ -86,7 +86,8 @@ class MistakeScreen:
             answer, (last, _), actions = law.answer(), law.waiting(), []
             assert answer is not None  # the caller knows that there is a policy
             for k in range(0, len(self._states), period):
-                last = answer(law.observed(self._robot.state(law.begins + k * self.step, *self._states[k]), last))
+                seen = self._states[max(k - law.observed_lag, 0)]
+                last = answer(law.observed(self._robot.state(law.begins + k * self.step, *seen), last))
                 actions.append(last)
             self._actions[key] = actions
         return self._actions[key]

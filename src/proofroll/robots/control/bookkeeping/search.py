@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -29,6 +29,7 @@ _ALIKE = 100.0  # explanations whose squares in the screen differ by no more are
 _NEAR = 0.7  # part of a distance that a mistake of the size in the screen may leave
 _CLOSES_AT_START = 1e-3  # part of the distance of accelerations that an explanation may leave
 _ROUND_OFF = 1e-9  # part of that distance that counts as nothing
+_BISECTIONS = 14  # of a size that is a bound only: to four digits
 _FOR_A_SIZE = 3.0  # what a fitted size must be better by
 
 
@@ -40,16 +41,18 @@ class MistakeExplanation:
         mistake: the mistake.
         size: its size; 1 where it has none.
         after: largest distance that it leaves; of motions [rad, m, or 20 times as many per second].
+        larger: True if any larger size leaves no more.
     """
 
     mistake: Mistake
     size: float
     after: float
+    larger: bool = False
 
     @property
     def sentence(self) -> str:
         """The mistake with its size."""
-        return self.mistake.sentence(self.size)
+        return self.mistake.sentence(self.size, larger=self.larger)
 
     @property
     def fitted(self) -> int:
@@ -102,6 +105,21 @@ def best_size(mistake: Mistake, law: ControlLaw, left: Callable[[ControlLaw], Ar
     if mistake.sized:
         sizes = [fitted(lambda size: left(mistake.changed(law, size)), start) for start in mistake.starts]
     return min((largest(left(mistake.changed(law, size))), size) for size in sizes)
+
+
+def bounded(explanation: MistakeExplanation, left: Callable[[float], float], bound: float) -> MistakeExplanation:
+    """The explanation itself; or its least size, where any larger one leaves no more than a bound.
+
+    ``left``: of a size.
+    """
+    mistake, high = explanation.mistake, explanation.size
+    if not mistake.at_least or high <= mistake.none or left(2 * high) > bound:
+        return explanation
+    low = mistake.none
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if left(middle) <= bound else (middle, high)
+    return replace(explanation, size=high, larger=True)
 
 
 def largest(left: Array) -> float:
@@ -226,7 +244,12 @@ class MotionSearch:
                 size = max(0.0, float(motions.fit(sized, np.array([size]), scheme, rounds=3)[0]))
                 distance = motions.distance(mistake.changed(self.law, size), scheme)
             if distance <= _CLOSES * self.before:
-                yield MistakeExplanation(mistake, size, distance)
+                bound = max(2 * distance, self.seen.bar)
+                yield bounded(
+                    MistakeExplanation(mistake, size, distance),
+                    lambda size, scheme=scheme: motions.distance(mistake.changed(self.law, size), scheme),  # type: ignore[misc]
+                    bound,
+                )
                 if distance <= self.seen.bar:
                     break
 

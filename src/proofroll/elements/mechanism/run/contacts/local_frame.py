@@ -146,7 +146,7 @@ def table(body: BodyOnWall, weight: float, lengths: Sequence[float]) -> tuple[Ob
             asked_for=False,
             asked_as="orientation",
         ),
-        Observable("N", "N", "normal force", Role.REACTION, floor=force, headline=True, column=True),
+        Observable("N", "N", "normal force", Role.REACTION, floor=force, headline=True, column=True, of_contacts=True),
         Observable("F2", "N", "friction on the ball along e2", Role.REACTION, floor=force, headline=True),
         Observable("F3", "N", "friction on the ball along e3", Role.REACTION, floor=force, headline=True, column=True),
         Observable(

@@ -128,7 +128,7 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
     meaning = "normal forces between what may touch"
     yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True)
     meaning = "contact forces, where they are determinate"
-    told: dict[str, Any] = {"asked_for": False, "at_impacts": False, "watched": True}
+    told: dict[str, Any] = {"asked_for": False, "at_impacts": False, "of_contacts": True, "watched": True}
     yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, always=_WRONG, **told)
     if shared_pairs(mechanism.contacts):
         meaning = "sums of the forces of each pair that touches at several places, where they are determinate"

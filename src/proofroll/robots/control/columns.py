@@ -1,0 +1,281 @@
+"""Mistakes of a record's own columns: units, axes, points, orders and instants that are not those of their names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.number_format import error
+from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.record import BASE, ControlRecord, Layer, LayerCause, in_world
+from proofroll.robots.model import Array
+
+_HELPS = 0.1  # part of what velocities contradict places by that a mistake may leave
+_TELLS = 5e-3  # least part of the way by which velocities contradict places
+_SAFETY = 10.0  # on the rounding of places
+_DEGREE = np.pi / 180
+_MILLI = 1e-3
+_SCHEMES = (-1.0, 0.0, 1.0)  # places move by the velocity before a step, by the mean, by that after it
+
+Changed = Callable[[ControlRecord], ControlRecord]
+
+
+class ColumnMistake(NamedTuple):
+    """A mistake of columns.
+
+    Attributes:
+        id: name of its kind.
+        words: clause that names it.
+        changed: record with the columns as their names say.
+    """
+
+    id: str
+    words: str
+    changed: Changed
+
+
+class _Off(NamedTuple):
+    """Distance between places and the integrals of their velocities, the way itself, and rounding [rad or m]."""
+
+    off: float
+    way: float
+    rounding: float
+
+
+def state_layer(record: ControlRecord, law: ControlLaw) -> tuple[ControlRecord, Layer | None]:
+    """Record whose velocities are the rates of its places, and the layer that says what was wrong; None: nothing.
+
+    A contradiction without a known cause is no layer: rows that are far apart make one, too.
+    """
+    causes: list[LayerCause] = []
+    worst, column, count = _Off(0.0, 0.0, 0.0), "", 0
+    for name, measured, known in (
+        ("v", _of_joints, _of_joint_columns()),
+        ("w_WB", _of_spin, _of_spins()),
+        ("v_WB", _of_velocity, _of_velocities(law)),
+    ):
+        apart = measured(record)
+        if apart is None or apart.off <= max(_TELLS * apart.way, _SAFETY * apart.rounding):
+            continue
+        trials = []
+        for number, mistake in enumerate(known):
+            count += 1
+            trial = mistake.changed(record)
+            left = measured(trial)
+            if left is not None and left.off <= _HELPS * min(apart.off, left.way):
+                trials.append((left.off, number, mistake, trial))
+        if trials:
+            after, _, mistake, record = min(trials, key=lambda item: item[:2])
+            proof = f"places off by {error(apart.off)}, by {error(after, 1)} with that"
+            causes.append(LayerCause(mistake.id, f"{mistake.words} ({proof})", None, after))
+            worst, column = max((worst, column), (apart, name))
+    if not causes:
+        return record, None
+    bar = min(worst.rounding, 0.5 * worst.off)
+    layer = Layer("state", worst.off, bar, column, causes=tuple(causes), tried=count, known=count)
+    return record, layer
+
+
+def _of_joints(record: ControlRecord) -> _Off | None:
+    names = [name[2:] for name in record.columns if name.startswith("q.") and f"v.{name[2:]}" in record.columns]
+    q, v = record.stacked("q", names), record.stacked("v", names)
+    return None if q is None or v is None else _apart(record, q, v, record.rounding_of("q", names))
+
+
+def _of_velocity(record: ControlRecord) -> _Off | None:
+    place, velocity = record.stacked("p_WB", "xyz"), record.stacked("v_WB", "xyz")
+    if place is None or velocity is None:
+        return None
+    return _apart(record, place, velocity, record.rounding_of("p_WB", "xyz"))
+
+
+def _apart(record: ControlRecord, places: Array, rates: Array, rounding: Array) -> _Off:
+    """Distance of places from the integrals of their rates, by the scheme that suits best."""
+    steps, way = np.diff(record.time)[:, None], places[1:] - places[0]
+    mean = np.cumsum(steps * (rates[1:] + rates[:-1]) / 2, axis=0)
+    half = np.cumsum(steps * np.diff(rates, axis=0) / 2, axis=0)
+    off = min(float(np.abs(way - mean - part * half).max()) for part in _SCHEMES)
+    return _Off(off, float(np.abs(way).max()), float(rounding.max()))
+
+
+def _of_spin(record: ControlRecord) -> _Off | None:
+    attitude, spin = record.stacked("q_WB", "wxyz"), record.stacked("w_WB", "xyz")
+    if attitude is None or spin is None:
+        return None
+    turned = Rotation.from_quat(attitude, scalar_first=True)
+    steps, offs = np.diff(record.time)[:, None], []
+    for part in _SCHEMES:
+        turns = Rotation.from_rotvec(steps * ((1 - part) * spin[:-1] + (1 + part) * spin[1:]) / 2)
+        reached, off = turned[0], 0.0
+        for k in range(len(steps)):
+            reached = turns[k] * reached
+            off = max(off, (turned[k + 1] * reached.inv()).magnitude())
+        offs.append(off)
+    way = float((turned[1:] * turned[0].inv()).magnitude().max())
+    return _Off(min(offs), way, float(record.rounding_of("q_WB", "wxyz").max()))
+
+
+def _of_joint_columns() -> Iterator[ColumnMistake]:
+    yield ColumnMistake("swapped", "the columns q.JOINT and v.JOINT are each the other", _exchanged("q.", "v."))
+    yield ColumnMistake("degrees", "q.JOINT is in degrees: name it q.JOINT[deg]", _scaled("q.", _DEGREE))
+    yield ColumnMistake("degrees", "v.JOINT is in degrees per second: name it v.JOINT[deg/s]", _scaled("v.", _DEGREE))
+    yield ColumnMistake("sign", "v.JOINT has the other sign", _scaled("v.", -1.0))
+    yield ColumnMistake("milliseconds", "the times are in milliseconds: name them time[ms]", _in_seconds)
+
+
+def _of_spins() -> Iterator[ColumnMistake]:
+    last = "q_WB is x, y, z, w under the names of w, x, y, z"
+    inverse = "q_WB is of the inverse rotation, of the world in the base"
+    both = f"{last}, and of the inverse rotation, of the world in the base"
+    yield ColumnMistake("base_axes", "w_WB is along the axes of the base: name it w_WB_B", _along_base("w_WB"))
+    yield ColumnMistake("quaternion", last, _requaternioned(_SCALAR_LAST))
+    yield ColumnMistake("quaternion", inverse, _requaternioned(_INVERSE))
+    yield ColumnMistake("quaternion", both, _requaternioned({**_SCALAR_LAST, **_INVERSE}))
+    for words, change in ((last, _SCALAR_LAST), (inverse, _INVERSE)):
+        sentence = f"{words}, and w_WB is along the axes of the base"
+        yield ColumnMistake("quaternion", sentence, _after(_requaternioned(change), _along_base("w_WB")))
+
+
+def _of_velocities(law: ControlLaw) -> Iterator[ColumnMistake]:
+    yield ColumnMistake("base_axes", "v_WB is along the axes of the base: name it v_WB_B", _along_base("v_WB"))
+    if law.centre.any():
+        at_centre = "v_WB is the velocity of the base's centre of mass, not of its origin"
+        yield ColumnMistake("point", at_centre, _to_origin(law.centre))
+        along = _after(_along_base("v_WB"), _to_origin(law.centre))
+        yield ColumnMistake("point", f"{at_centre}, along the axes of the base", along)
+
+
+def action_mistakes(law: ControlLaw, instants: Array) -> Iterator[ColumnMistake]:
+    """Mistakes of the columns of actions; ``instants``: rows at which the controller acts."""
+    pose = dict(zip(law.joints, law.pose.tolist(), strict=True))
+
+    def scaled(name: str, values: Array, offset: float) -> Array:
+        return np.asarray((values - offset * pose.get(name.removeprefix("action."), 0.0)) / law.scale)
+
+    def of_actions(change: Callable[[str, Array], Array]) -> Changed:
+        def changed(record: ControlRecord) -> ControlRecord:
+            columns = {
+                name: change(name, item) if name.startswith("action.") else item
+                for name, item in record.columns.items()
+            }
+            factor = np.abs(1 / law.scale)
+            rounding = {
+                name: item * (factor if name.startswith("action.") else 1.0) for name, item in record.rounding.items()
+            }
+            return ControlRecord(record.path, columns, rounding, record.time)
+
+        return changed
+
+    if law.scale != 1:
+        words = "the columns of actions have the scale of the controller already"
+        yield ColumnMistake("scaled_action", words, of_actions(lambda name, item: scaled(name, item, 0.0)))
+    words = "the columns of actions are targets, the default pose and the scale included"
+    yield ColumnMistake("action_target", words, of_actions(lambda name, item: scaled(name, item, 1.0)))
+
+    def sooner(record: ControlRecord) -> ControlRecord:
+        """The record up to its last instant, with the actions of the next one."""
+        rows: Any = np.arange(int(instants[-1]))
+        following = np.searchsorted(instants, rows, side="right")
+        part = record.part(rows)
+        columns, rounding = dict(part.columns), dict(part.rounding)
+        for name in (name for name in columns if name.startswith("action.")):
+            columns[name] = record.columns[name][instants[following]]
+            rounding[name] = record.rounding[name][instants[following]]
+        return ControlRecord(record.path, columns, rounding, part.time)
+
+    if len(instants) > 2:
+        yield ColumnMistake("late_action", "the columns of actions are one instant late", sooner)
+
+
+_SCALAR_LAST: Mapping[str, str] = {"w": "z", "x": "w", "y": "x", "z": "y"}  # component -> the column that has it
+_INVERSE: Mapping[str, str] = {"inverse": ""}
+
+
+def _requaternioned(change: Mapping[str, str]) -> Changed:
+    """Change of the columns of quaternions, and of what was turned by them."""
+
+    def changed(record: ControlRecord) -> ControlRecord:
+        columns, rounding = dict(record.columns), dict(record.rounding)
+        for axis in BASE["q_WB"]:
+            source = f"q_WB.{change.get(axis, axis)}"
+            sign = -1.0 if "inverse" in change and axis != "w" else 1.0
+            columns[f"q_WB.{axis}"] = sign * record.columns[source]
+            rounding[f"q_WB.{axis}"] = record.rounding[source]
+        return _turned_again(ControlRecord(record.path, columns, rounding, record.time))
+
+    return changed
+
+
+def _turned_again(record: ControlRecord) -> ControlRecord:
+    """The record with the velocities that it has along the axes of its base turned to the world's anew."""
+    turned = tuple(f"{name}." for name in ("v_WB", "w_WB") if f"{name}_B.x" in record.columns)
+    columns, rounding = (
+        {name: item for name, item in part.items() if not (turned and name.startswith(turned))}
+        for part in (record.columns, record.rounding)
+    )
+    return in_world(ControlRecord(record.path, columns, rounding, record.time))
+
+
+def _along_base(kind: str) -> Changed:
+    """Change of velocities that are along the axes of the base."""
+
+    def changed(record: ControlRecord) -> ControlRecord:
+        columns, rounding = (
+            {name.replace(f"{kind}.", f"{kind}_B."): item for name, item in part.items()}
+            for part in (record.columns, record.rounding)
+        )
+        return in_world(ControlRecord(record.path, columns, rounding, record.time))
+
+    return changed
+
+
+def _to_origin(centre: Array) -> Changed:
+    """Change of velocities of a point [m, in the base's axes] to those of the origin."""
+
+    def changed(record: ControlRecord) -> ControlRecord:
+        attitude, velocity, spin = (record.stacked(name, tuple(BASE[name])) for name in ("q_WB", "v_WB", "w_WB"))
+        if attitude is None or velocity is None or spin is None:
+            return record
+        moved = velocity - np.cross(spin, Rotation.from_quat(attitude, scalar_first=True).apply(centre))
+        columns = dict(record.columns) | {f"v_WB.{axis}": moved[:, k] for k, axis in enumerate("xyz")}
+        return ControlRecord(record.path, columns, record.rounding, record.time)
+
+    return changed
+
+
+def _exchanged(first: str, second: str) -> Changed:
+    names = {first: second, second: first}
+
+    def renamed(part: Mapping[str, Array]) -> dict[str, Array]:
+        return {names.get(name[:2], name[:2]) + name[2:]: item for name, item in part.items()}
+
+    return lambda record: ControlRecord(record.path, renamed(record.columns), renamed(record.rounding), record.time)
+
+
+def _scaled(start: str, factor: float) -> Changed:
+    def scaled(part: Mapping[str, Array]) -> dict[str, Array]:
+        return {name: factor * item if name.startswith(start) else item for name, item in part.items()}
+
+    def changed(record: ControlRecord) -> ControlRecord:
+        rounding = {name: np.abs(item) for name, item in scaled(record.rounding).items()}
+        return ControlRecord(record.path, scaled(record.columns), rounding, record.time)
+
+    return changed
+
+
+def _in_seconds(record: ControlRecord) -> ControlRecord:
+    return ControlRecord(record.path, record.columns, record.rounding, _MILLI * record.time)
+
+
+def _after(*changes: Changed) -> Changed:
+    """Change by several ones, one after another."""
+
+    def changed(record: ControlRecord) -> ControlRecord:
+        for change in changes:
+            record = change(record)
+        return record
+
+    return changed

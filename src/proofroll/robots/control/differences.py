@@ -1,0 +1,287 @@
+"""Differences of the layers of a record of a robot under a controller from what the layers before them give."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from proofroll.elements.mechanism.scene.policy import Observation
+from proofroll.robots.control.bookkeeping.law import VECTORS, ControlLaw, RobotState
+from proofroll.robots.control.record import BASE, OBSERVED, ControlRecord
+from proofroll.robots.model import Array
+
+# Least residual that counts, in parts of the largest number of its column: round-off of a sum of some terms.
+ROUND_OFF = 1e-9
+SAME_TIME = 1e-6  # part of the time between instants that is round-off
+
+
+@dataclass(frozen=True)
+class LayerDifferences:
+    """Differences of a layer with its columns: ``difference`` (times, columns), in their units, and their sizes."""
+
+    columns: tuple[str, ...]
+    time: Array
+    recorded: Array
+    difference: Array
+    sizes: Array
+
+
+def _compared(columns: list[str], time: Array, recorded: Array, computed: Array) -> LayerDifferences:
+    sizes = np.maximum(np.abs(recorded).max(axis=0, initial=0.0), np.abs(computed).max(axis=0, initial=0.0))
+    sizes = np.maximum(sizes, 1e-3 * sizes.max(initial=0.0))
+    return LayerDifferences(tuple(columns), time, recorded, recorded - computed, np.where(sizes > 0, sizes, 1.0))
+
+
+def _told(record: ControlRecord) -> list[str]:
+    """Columns that change at instants."""
+    return [name for name in record.columns if name.startswith(("action.", "target."))]
+
+
+def instant_rows(record: ControlRecord, law: ControlLaw) -> Any:
+    """Rows at which a record's action or target changes, and the first row if an instant can lie there."""
+    names = _told(record)
+    if not names:
+        near = np.abs(record.time * law.rate - np.round(record.time * law.rate)) < SAME_TIME
+        return np.flatnonzero(near)
+    values = np.stack([record.columns[name] for name in names], axis=1)
+    changes = np.any(np.abs(np.diff(values, axis=0)) > 0, axis=1)
+    later = 1 + np.flatnonzero(changes)
+    if record.time[0] != 0 and len(later):  # a record may begin between two instants
+        periods = (record.time[later[0]] - record.time[0]) * law.rate
+        if abs(periods - np.round(periods)) > SAME_TIME:
+            return later
+    return np.concatenate([[0], later])
+
+
+def due_rows(record: ControlRecord, law: ControlLaw) -> Any:
+    """Rows at instants of a law at which the action, or the target, should change but for rounding."""
+    begin = record.time[instant_rows(record, law)[0]]  # a clock may begin at any time
+    periods = (record.time - begin) * law.rate
+    rows: Any = np.flatnonzero(np.abs(periods - np.round(periods)) < SAME_TIME)
+    rows = rows[rows > 0]
+    if not len(rows) or law.extra_steps:
+        return rows[:0]
+    part = record.part(rows)
+    for kind, computed in (("action", _actions), ("target", _targets)):
+        recorded = record.stacked(kind, law.joints)
+        values = None if recorded is None or (kind == "action" and law.policy is None) else computed(part, law)
+        if recorded is not None and values is not None and not isinstance(values, str):
+            previous, rounding = recorded[rows - 1], 4 * record.rounding_of(kind, law.joints)[rows]
+            values = np.clip(values, recorded.min(axis=0), recorded.max(axis=0))  # what is clipped does not change
+            return rows[np.any(np.abs(values - previous) > rounding + ROUND_OFF, axis=1)]
+    return rows[:0]
+
+
+def _instants(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
+    if not _told(record):
+        return "the record has no columns action.JOINT or target.JOINT, which change at instants"
+    time = record.time[instant_rows(record, law)]
+    if len(time) < 2:
+        return "nothing in the record changes at instants"
+    step = law.extra_steps * float(np.diff(record.time).min())
+    period = 1 / law.rate + step
+    expected = time[0] + period * np.round((time - time[0]) / period)
+    rounding = 2 * max(SAME_TIME * period, float(np.abs(np.diff(record.time) - np.diff(record.time).mean()).max()))
+    sizes = np.full(1, min(rounding, 0.1 * float(np.diff(record.time).min())) / ROUND_OFF)
+    due = record.time[due_rows(record, law)]
+    due = due[due <= time[-1] + (1 + SAME_TIME) * period]  # what comes later may hold on purpose
+    lacking = np.array([np.abs(time - instant).min() for instant in due])
+    instants = np.concatenate([time[1:], due])
+    apart = np.concatenate([(time - expected)[1:], lacking])[:, None]
+    return LayerDifferences(("time",), instants, instants[:, None], apart, sizes)
+
+
+def at_instants(record: ControlRecord, law: ControlLaw) -> ControlRecord:
+    """Rows of a record at instants, with the state that the policy sees there."""
+    rows = instant_rows(record, law)
+    part = record.part(rows)
+    if not law.observed_lag:
+        return part
+    states = record.part(np.maximum(rows - law.observed_lag, 0))
+    kinds = ("q.", "v.", *(f"{name}." for name in BASE))
+    columns = {name: (states if name.startswith(kinds) else part).columns[name] for name in part.columns}
+    return ControlRecord(record.path, columns, part.rounding, part.time)
+
+
+def held_rows(record: ControlRecord, law: ControlLaw) -> Any:
+    """True at rows at which no action or target changes."""
+    mask = np.ones(len(record.time), bool)
+    if _told(record) or law.policy is not None:
+        mask[instant_rows(record, law)[1:]] = False
+    return mask
+
+
+def states(record: ControlRecord, law: ControlLaw) -> list[RobotState] | str:
+    """States at all rows of a record, or the reason why it has none; without columns of the base it is fixed."""
+    q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
+    if q is None or v is None:
+        return f"the record has no columns {'q' if q is None else 'v'}.JOINT"
+    base_at_rest = {"p_WB": np.zeros(3), "q_WB": np.array([1.0, 0, 0, 0]), "v_WB": np.zeros(3), "w_WB": np.zeros(3)}
+    base = {name: record.stacked(name, tuple(axes)) for name, axes in BASE.items()}
+    return [
+        RobotState(
+            time=float(time),
+            q=q[row],
+            v=v[row],
+            **{name: base_at_rest[name] if item is None else item[row] for name, item in base.items()},
+        )
+        for row, time in enumerate(record.time)
+    ]
+
+
+def _part(observation: Observation, name: str) -> Array:
+    return np.asarray(getattr(observation, name))
+
+
+def _observed(record: ControlRecord, law: ControlLaw) -> tuple[dict[str, Array], list[str]]:
+    """Recorded parts of observations, each (times, entries), and all of their columns."""
+    parts = {name: record.stacked(f"{OBSERVED}.{name}", law.joints) for name in ("q", "v", "last")}
+    parts |= {name: record.stacked(f"{OBSERVED}.{name}", tuple("xyz")) for name in VECTORS}
+    recorded = {name: item for name, item in parts.items() if item is not None}
+    labels = {name: law.joints if name in {"q", "v", "last"} else tuple("xyz") for name in recorded}
+    return recorded, [f"{OBSERVED}.{name}.{label}" for name in recorded for label in labels[name]]
+
+
+def _observation(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
+    record = at_instants(record, law)
+    recorded, columns = _observed(record, law)
+    actions = record.stacked("action", law.joints)
+    if actions is None or record.time[0] != 0:
+        recorded.pop("last", None)
+        columns = [name for name in columns if not name.startswith(f"{OBSERVED}.last.")]
+    if not recorded:
+        return f"the record has no columns {OBSERVED}.…"
+    instants = states(record, law)
+    if isinstance(instants, str):
+        return instants
+    if not instants:
+        return "no row lies at an instant of the controller"
+    no_action = np.zeros((1, len(law.joints)))
+    last = np.tile(no_action, (len(instants), 1)) if actions is None else np.concatenate([no_action, actions[:-1]])
+    seen = [law.observed(state, action) for state, action in zip(instants, last, strict=True)]
+    computed = np.concatenate([np.stack([_part(item, name) for item in seen]) for name in recorded], axis=1)
+    return _compared(columns, record.time, np.concatenate([*recorded.values()], axis=1), computed)
+
+
+def _actions(record: ControlRecord, law: ControlLaw) -> Array | str:
+    """Actions of the policy at the rows of a record of instants, from recorded observations where there are some."""
+    answer = law.answer()
+    assert answer is not None  # the caller knows that there is a policy
+    observed = _observed(record, law)[0]
+    instants = states(record, law)
+    if isinstance(instants, str):
+        return instants
+    recorded = record.stacked("action", law.joints)
+    last = np.zeros(len(law.joints))
+    actions = []
+    for row, state in enumerate(instants):
+        seen = law.observed(state, observed["last"][row] if "last" in observed else last)
+        seen = dataclasses.replace(seen, **{name: item[row] for name, item in observed.items()})
+        actions.append(np.clip(answer(seen), -law.clip, law.clip))
+        last = actions[-1] if recorded is None else recorded[row]
+    return np.array(actions)
+
+
+def _action(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
+    record = at_instants(record, law)
+    recorded = record.stacked("action", law.joints)
+    if law.policy is None or recorded is None:
+        return "the controller has no policy" if law.policy is None else "the record has no columns action.JOINT"
+    computed = _actions(record, law)
+    if isinstance(computed, str):
+        return computed
+    columns = [f"action.{name}" for name in law.joints]
+    late = int(record.time[0] > 0 and f"{OBSERVED}.last.{law.joints[0]}" not in record.columns)
+    return _compared(columns, record.time[late:], recorded[late:], computed[late:])
+
+
+def _targets(record: ControlRecord, law: ControlLaw) -> Array | str:
+    """Targets at the rows of a record of instants, from recorded actions where there are some."""
+    counts: list[Array | None] = [None] * len(record.time)
+    if law.policy is not None:
+        actions = record.stacked("action", law.joints)
+        computed = _actions(record, law) if actions is None else actions
+        if isinstance(computed, str):
+            return computed
+        smoothed = np.zeros(len(law.joints)) if record.time[0] == 0 else computed[0]
+        for row, action in enumerate(computed):
+            counts[row] = smoothed = law.smoothed(action, smoothed)
+    times, source = record.time, sources(record, law)
+    targets = [law.pose if row < 0 else law.target(counts[row], float(times[row])) for row in source.tolist()]
+    return np.array(targets)
+
+
+def sources(record: ControlRecord, law: ControlLaw) -> Any:
+    """Instant of a record of instants whose action acts at each of them; -1: one before the record."""
+    # An action that equals the one before has no row of its own.
+    return np.searchsorted(record.time, record.time - (law.delay - SAME_TIME) / law.rate, side="right") - 1
+
+
+def _target(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
+    record = at_instants(record, law)
+    recorded = record.stacked("target", law.joints)
+    if recorded is None:
+        return "the record has no columns target.JOINT"
+    computed = _targets(record, law)
+    if isinstance(computed, str):
+        return computed
+    late = record.time - record.time[0] > (law.delay - 0.5) / law.rate
+    counts = np.ones(len(late), bool) if record.time[0] == 0 else late
+    columns = [f"target.{name}" for name in law.joints]
+    return _compared(columns, record.time[counts], recorded[counts], computed[counts])
+
+
+def efforts_of(record: ControlRecord, law: ControlLaw) -> Array | str:
+    """Efforts at all rows, from recorded targets where there are some; NaN where the record does not reach back."""
+    servos = servo_rows(record, law)
+    if isinstance(servos, str):
+        return servos
+    target, q, v, known = servos
+    efforts = law.effort(target, q, v)
+    efforts[~known] = np.nan
+    return efforts
+
+
+def servo_rows(record: ControlRecord, law: ControlLaw) -> tuple[Array, Array, Array, Any] | str:
+    """Targets, coordinates and rates that servos have at all rows; True at rows to which the record reaches back."""
+    q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
+    if q is None or v is None:
+        return "the record has no columns q.JOINT and v.JOINT"
+    target, rows, instants = record.stacked("target", law.joints), np.arange(len(q)), instant_rows(record, law)
+    places = np.searchsorted(instants, rows, side="right") - 1
+    if target is None:
+        if record.time[0] != 0 or (law.policy is None and not _told(record) and not len(instants)):
+            return "the record has no columns target.JOINT"
+        computed = _targets(at_instants(record, law), law)
+        if isinstance(computed, str):
+            return computed
+        target = computed[places]
+    seen = np.where(places < 0, -1, instants[places]) if law.hold_effort else rows
+    seen = seen - law.lag
+    return target, q[seen], v[seen], seen >= 0
+
+
+def _effort(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
+    recorded = record.stacked("effort", law.joints)
+    if recorded is None:
+        return "the record has no columns effort.JOINT"
+    computed = efforts_of(record, law)
+    if isinstance(computed, str):
+        return computed
+    rows = np.isfinite(computed).all(axis=1)
+    columns = [f"effort.{name}" for name in law.joints]
+    return _compared(columns, record.time[rows], recorded[rows], computed[rows])
+
+
+# Layer -> its differences, or the reason why there are none.
+DIFFERENCES: Mapping[str, Callable[[ControlRecord, ControlLaw], LayerDifferences | str]] = {
+    "instants": _instants,
+    "observation": _observation,
+    "action": _action,
+    "target": _target,
+    "effort": _effort,
+}

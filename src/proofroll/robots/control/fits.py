@@ -1,0 +1,253 @@
+"""Linear fits of a layer to what it is computed from: gains, biases and limits of each joint, scales and poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.bookkeeping.mistakes import offsets_told, orders
+from proofroll.robots.control.record import LayerCause
+from proofroll.robots.model import Array
+
+Flags = NDArray[np.bool_]
+_ROWS = 2  # rows for each number of a joint at least
+_SAME = 1e-3  # relative difference of two numbers of joints that are told as one, and least one that is told
+_SMALL = 1e-9  # part of a column that is round-off
+
+
+@dataclass(frozen=True)
+class ServoRows:
+    """Inputs and outputs of servos, each (times, joints).
+
+    Attributes:
+        target, q, v: targets, coordinates and rates that a servo has in a row.
+        effort: of the record.
+    """
+
+    target: Array
+    q: Array
+    v: Array
+    effort: Array
+
+
+def observation_causes(
+    columns: Sequence[str], recorded: Array, difference: Array, sizes: Array, most: float
+) -> Iterator[tuple[int, LayerCause]]:
+    """Columns of an observation that are each a part of the right ones, with their number.
+
+    Args:
+        columns: their names.
+        recorded: values, (times, columns).
+        difference: of these from the right ones.
+        sizes: of the columns.
+        most: largest difference that a mistake may leave, in parts of the sizes.
+    """
+    right = recorded - difference
+    squares = (right**2).sum(axis=0)
+    factors = np.where(squares > 0, (right * recorded).sum(axis=0) / np.where(squares > 0, squares, 1.0), 1.0)
+    after = float((np.abs(recorded - factors * right) / sizes).max())
+    other = np.asarray((np.abs(difference) > most * sizes).any(axis=0), bool)
+    if after <= most and len(recorded) > _ROWS:
+        words = f"parts are observed at another size: {_listed(factors, other, columns, ' of the right one')}"
+        yield int(other.sum()), LayerCause("observed_size", words, None, after)
+
+
+def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tuple[int, LayerCause]]:
+    """Mistakes of efforts, each with the number of its fitted numbers.
+
+    Args:
+        rows: of the record.
+        law: as it should be.
+        most: largest difference that a mistake may leave, in parts of the largest effort of each joint.
+    """
+    right = law.effort(rows.target, rows.q, rows.v)
+    sizes = _sizes(rows.effort)
+
+    def left(efforts: Array, recorded: Array = rows.effort) -> float:
+        return float(np.abs((efforts - recorded) / sizes).max())
+
+    if len(right) > 1 and (late := left(right[:-1], rows.effort[1:])) <= most:
+        yield 0, LayerCause("late_effort", "efforts are those of the row before", None, late)
+    for words, order in orders(law.joints):
+        if (after := left(right[:, order])) <= most:
+            yield 0, LayerCause("effort_order", f"efforts are of joints in another order ({words})", None, after)
+    fit = _ServoFit.of(rows, law)
+    if fit is not None and (after := left(fit.efforts(rows))) <= most and (clauses := fit.clauses(law)):
+        size = fit.size if len(clauses) == 1 else None
+        yield len(clauses), LayerCause("servo", "; ".join(clauses), size, after)
+
+
+@dataclass
+class _ServoFit:
+    """Servos whose numbers were fitted, each (joints,): effort = bias + clamped(kp (target - q) - kd v)."""
+
+    kp: Array
+    kd: Array
+    bias: Array
+    limit: Array
+    size: float | None = None
+
+    @classmethod
+    def of(cls, rows: ServoRows, law: ControlLaw) -> _ServoFit | None:
+        """The fit; None: too few rows are beside a clamp."""
+        count = len(law.joints)
+        fit = cls(kp=law.kp.copy(), kd=law.kd.copy(), bias=np.zeros(count), limit=np.full(count, np.inf))
+        for k in range(count):
+            effort = rows.effort[:, k]
+            columns = np.stack([rows.target[:, k] - rows.q[:, k], -rows.v[:, k], np.ones(len(effort))], axis=1)
+            free = ~_at_ends(effort)
+            if free.sum() < _ROWS * columns.shape[1]:
+                return None
+            scale = np.maximum(np.abs(columns[free]).max(axis=0), 1e-300)
+            numbers = np.linalg.lstsq(columns[free] / scale, effort[free], rcond=_SMALL)[0] / scale
+            fit.kp[k], fit.kd[k], fit.bias[k] = numbers
+            if not free.all():
+                fit.limit[k] = float(np.abs(effort[~free] - numbers[2]).min())
+        return fit
+
+    def efforts(self, rows: ServoRows) -> Array:
+        """Efforts of the fit, (times, joints)."""
+        plain = self.kp * (rows.target - rows.q) - self.kd * rows.v
+        return np.asarray(self.bias + np.clip(plain, -self.limit, self.limit))
+
+    def clauses(self, law: ControlLaw) -> list[str]:
+        """Clauses on the numbers that are not the law's; efforts that are all one part of the right ones have one."""
+        parts = {"kp": (self.kp, law.kp), "kd": (self.kd, law.kd)}
+        factors = {name: _factors(found, right) for name, (found, right) in parts.items() if right.any()}
+        clamped = np.isfinite(self.limit)
+        factors["limit"] = np.where(clamped, _factors(np.where(clamped, self.limit, 1.0), law.limit), 1.0)
+        biased = np.abs(self.bias) > _SAME * np.where(np.isfinite(law.limit), law.limit, np.abs(law.kp))
+        gains = np.concatenate([factors[name] for name in parts if name in factors])
+        scaled = np.concatenate([gains, np.sign(gains[:1]) * factors["limit"][clamped]])
+        if len(factors) > 2 and not biased.any() and _alike(scaled) and abs(scaled[0] - 1) > _SAME:
+            self.size = float(scaled.mean())
+            if np.isclose(self.size, -1, atol=_SAME):
+                return ["efforts have the other sign"]
+            return [f"efforts are {self.size:.5g} of the right ones"]
+        clauses = []
+        words = {"kp": "kp", "kd": "kd", "limit": "the limit of efforts"}
+        for name, values in factors.items():
+            clauses += _told(words[name], values, law.joints)
+        if biased.any():
+            clauses.append("efforts have a constant part beside the servo's: " + _listed(self.bias, biased, law.joints))
+        return clauses
+
+
+def target_causes(
+    targets: Array, actions: Array, q: Array | None, law: ControlLaw, most: float
+) -> Iterator[tuple[int, LayerCause]]:
+    """Mistakes of what actions mean, each with the number of its fitted numbers.
+
+    Args:
+        targets: at successive instants, (times, joints).
+        actions: those that these targets come from.
+        q: coordinates at these instants; None: the record has none.
+        law: as it should be.
+        most: largest difference that a mistake may leave, in parts of the largest target of each joint.
+    """
+    sizes = _sizes(targets)
+
+    def left(computed: Array, rows: slice = slice(None)) -> float:
+        return float(np.abs((computed - targets[rows]) / sizes).max())
+
+    if (after := left(law.pose + law.scale * np.tanh(actions))) <= most:
+        yield 0, LayerCause("squashed", "actions pass a tanh", None, after)
+    if q is not None and (after := left(q + law.scale * actions)) <= most:
+        words = "actions are added to the present coordinates, not to the default pose"
+        yield 0, LayerCause("added", words, None, after)
+    yield from _of_before(targets, actions, law, most, left)
+    affine = _affine(targets, actions)
+    if affine is None:
+        return
+    scale, offset = affine
+    clauses = _told("the scale of actions", scale / law.scale, law.joints)
+    if np.allclose(scale / law.scale, -1, atol=_SAME) and np.abs(offset - law.pose).max() <= _SAME:
+        clauses = ["actions have the other sign"]
+    moved = offset - law.pose
+    if np.abs(moved).max() > _SAME * max(1e-3, float(np.abs(targets).max())):
+        clauses.append(offsets_told(law.joints, moved))
+    if clauses and (after := left(offset + scale * actions)) <= most:
+        size = float((scale / law.scale).mean()) if len(clauses) == 1 and _alike(scale) else None
+        yield len(clauses), LayerCause("affine_target", "; ".join(clauses), size, after)
+
+
+def _of_before(
+    targets: Array, actions: Array, law: ControlLaw, most: float, left: Callable[[Array, slice], float]
+) -> Iterator[tuple[int, LayerCause]]:
+    """Targets that keep a part of the target before, or of the action before."""
+    if len(targets) < 3:
+        return
+    moved, new = targets - law.pose, law.scale * actions
+    for name, previous, words in (
+        ("smoothing", moved[:-1], "actions pass a filter, of which {new:.5g} is new at each instant"),
+        ("mixed_actions", new[:-1], "targets mix {new:.5g} of an action with {old:.5g} of the one before"),
+    ):
+        columns = np.stack([new[1:].ravel(), previous.ravel()], axis=1)
+        part, rest = np.linalg.lstsq(columns, moved[1:].ravel(), rcond=_SMALL)[0]
+        after = left(law.pose + part * new[1:] + rest * previous, slice(1, None))
+        if after <= most and abs(rest) > _SAME:
+            yield 2, LayerCause(name, words.format(new=part, old=rest), float(part), after)
+
+
+def _affine(targets: Array, actions: Array) -> tuple[Array, Array] | None:
+    """Scale and offset of each joint's target in its action; None: there are too few instants."""
+    if len(targets) < 2 * _ROWS:
+        return None
+    centred = actions - actions.mean(axis=0)
+    squares = (centred**2).sum(axis=0)
+    if not np.all(squares > _SMALL * np.maximum(np.abs(actions).max(axis=0), 1e-300) ** 2):
+        return None
+    scale = (centred * targets).sum(axis=0) / squares
+    return scale, targets.mean(axis=0) - scale * actions.mean(axis=0)
+
+
+def _at_ends(effort: Array) -> Flags:
+    """True where an effort is the largest or the least of its joint, and several rows have it: it is clamped."""
+    mask = np.zeros(len(effort), bool)
+    for end in (effort.max(), effort.min()):
+        alike = np.abs(effort - end) <= _SMALL * max(abs(end), 1e-300)
+        mask |= alike if alike.sum() > 1 else False
+    return mask
+
+
+def _sizes(values: Array) -> Array:
+    """Largest size of each column, at least a thousandth of all."""
+    sizes = np.abs(values).max(axis=0)
+    return np.asarray(np.maximum(sizes, 1e-3 * sizes.max(initial=0.0)) + 1e-300)
+
+
+def _factors(found: Array, right: Array) -> Array:
+    """Numbers in parts of the right ones; 1 where the right one is 0, or has no bound."""
+    sensible = (right != 0) & np.isfinite(right)
+    return np.where(sensible, found / np.where(sensible, right, 1.0), 1.0)
+
+
+def _alike(values: Array) -> bool:
+    return bool(len(values)) and float(np.ptp(values)) <= _SAME * float(np.abs(values).max())
+
+
+def _told(what: str, factors: Array, joints: Sequence[str]) -> list[str]:
+    """Clause on factors that are not 1, one number for all joints where they are alike; empty where all are 1."""
+    other = np.abs(factors - 1) > _SAME
+    if not other.any():
+        return []
+    if other.all() and _alike(factors):
+        return [f"{what} is {factors.mean():.5g} of the right one"]
+    return [f"{what} is another: {_listed(factors, other, joints, ' of the right one')}"]
+
+
+def _listed(values: Array, chosen: Flags, joints: Sequence[str], unit: str = "") -> str:
+    """Joints with their numbers; joints with one number stand together."""
+    groups: list[tuple[float, list[str]]] = []
+    for k in np.flatnonzero(chosen).tolist():
+        for value, names in groups:
+            if abs(value - values[k]) <= _SAME * abs(value):
+                names.append(joints[k])
+                break
+        else:
+            groups.append((float(values[k]), [joints[k]]))
+    return "; ".join(f"{', '.join(names)} {value:.4g}{unit}" for value, names in groups)
