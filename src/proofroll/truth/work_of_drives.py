@@ -75,10 +75,19 @@ class WorkAlong:
         for moments, powers, work, rest in zip(time, power, summed, unresolved, strict=True):
             start, end = float(moments[0]), float(moments[-1])
             self._over_a_gap(stretch, start, powers[0])
-            series = TO_SERIES @ moments, TO_SERIES @ (self._total + work)
+            work_series = TO_SERIES @ (self._total + work)
             self._total = self._total + work[-1]
             self._unresolved = self._unresolved + rest
-            self._parts.append(_Part(stretch, start, end, *series, self._unresolved))
+            self._parts.append(
+                _Part(
+                    stretch=stretch,
+                    start=start,
+                    end=end,
+                    time=TO_SERIES @ moments,
+                    work=work_series,
+                    unresolved=self._unresolved,
+                )
+            )
             self._last = end, powers[-1]
 
     def passes(self, passage: Passage, impulses: Mapping[int, float]) -> None:
@@ -128,8 +137,16 @@ class WorkAlong:
         self._total = ended + span * (last_power + power) / 2
         self._unresolved = self._unresolved + span * np.abs(last_power - power) / 2
         line = np.array([[1.0, 1.0], [-1.0, 1.0]]) / 2
-        series = np.array([(begun + time) / 2, span / 2]), line @ np.array([ended, self._total])
-        self._parts.append(_Part(stretch, begun, time, *series, self._unresolved))
+        self._parts.append(
+            _Part(
+                stretch=stretch,
+                start=begun,
+                end=time,
+                time=np.array([(begun + time) / 2, span / 2]),
+                work=line @ np.array([ended, self._total]),
+                unresolved=self._unresolved,
+            )
+        )
         self._last = time, power
 
     def _power(self, pieces: Pieces) -> Array:
