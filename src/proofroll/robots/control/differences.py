@@ -33,7 +33,13 @@ class LayerDifferences:
 def _compared(columns: list[str], time: Array, recorded: Array, computed: Array) -> LayerDifferences:
     sizes = np.maximum(np.abs(recorded).max(axis=0, initial=0.0), np.abs(computed).max(axis=0, initial=0.0))
     sizes = np.maximum(sizes, 1e-3 * sizes.max(initial=0.0))
-    return LayerDifferences(tuple(columns), time, recorded, recorded - computed, np.where(sizes > 0, sizes, 1.0))
+    return LayerDifferences(
+        columns=tuple(columns),
+        time=time,
+        recorded=recorded,
+        difference=recorded - computed,
+        sizes=np.where(sizes > 0, sizes, 1.0),
+    )
 
 
 def _told(record: ControlRecord) -> list[str]:
@@ -92,7 +98,7 @@ def _instants(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
     lacking = np.array([np.abs(time - instant).min() for instant in due])
     instants = np.concatenate([time[1:], due])
     apart = np.concatenate([(time - expected)[1:], lacking])[:, None]
-    return LayerDifferences(("time",), instants, instants[:, None], apart, sizes)
+    return LayerDifferences(columns=("time",), time=instants, recorded=instants[:, None], difference=apart, sizes=sizes)
 
 
 def at_instants(record: ControlRecord, law: ControlLaw) -> ControlRecord:

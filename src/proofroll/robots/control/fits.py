@@ -144,7 +144,7 @@ def target_causes(
 
     Args:
         targets: at successive instants, (times, joints).
-        actions: those that these targets come from.
+        actions: of the same instants, (times, joints).
         q: coordinates at these instants; None: the record has none.
         law: as it should be.
         most: largest difference that a mistake may leave, in parts of the largest target of each joint.

@@ -84,7 +84,7 @@ def follow_contacts(placed: Placed) -> Followed:
             across = touching.slide - touching.normal * (touching.normal @ touching.slide)
             gap[k, c], slip[k, c], normal[k, c] = touching.gap, np.linalg.norm(across), touching.normal
             slide[k, c], place[k, c] = touching.slide, touching.place
-    return Followed(gap, slip, normal, slide, place)
+    return Followed(gap=gap, slip=slip, normal=normal, slide=slide, place=place)
 
 
 def kept_laws(mechanism: Mechanism) -> frozenset[str]:
