@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
@@ -227,3 +227,10 @@ class ElementKind(Protocol):
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
         """Short scenes that are compared with the truth and reveal confused reference frames."""
+
+
+def described_by(element: Element) -> str:
+    """Name of the class that declares the fields of an element; a subclass that adds none describes nothing else."""
+    names = [item.name for item in fields(element)]  # type: ignore[arg-type]  # a protocol of dataclasses
+    bases = [base for base in type(element).__mro__ if is_dataclass(base)]
+    return next(base.__name__ for base in reversed(bases) if [item.name for item in fields(base)] == names)

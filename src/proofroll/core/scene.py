@@ -8,13 +8,13 @@ import copy
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Self
 
 from proofroll.core.arrays import read_only
-from proofroll.core.element import Element
+from proofroll.core.element import Element, described_by
 from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.observable import Observable
 from proofroll.core.source_code import code_of
@@ -126,17 +126,10 @@ class Scene:
         The code of elements from other packages is included; that of this package is part of every engine's hash
         instead.
         """
-        content = [[_described_by(element), asdict(element)] for element in self.elements]  # type: ignore[call-overload]
+        content = [[described_by(element), asdict(element)] for element in self.elements]  # type: ignore[call-overload]
         code = code_of(self.elements)
         everything = [self.name, content, self.asks, *([code] if code else [])]
         digest = hashlib.sha256(json.dumps(everything, sort_keys=True, default=str).encode())
         for name in self.files:
             digest.update(name.encode() + (self.folder / name).read_bytes())
         return digest.hexdigest()[:16]
-
-
-def _described_by(element: Element) -> str:
-    """Name of the class that declares the fields of an element; a subclass that adds none describes nothing else."""
-    names = [item.name for item in fields(element)]  # type: ignore[arg-type]  # a protocol of dataclasses
-    bases = [base for base in type(element).__mro__ if is_dataclass(base)]
-    return next(base.__name__ for base in reversed(bases) if [item.name for item in fields(base)] == names)

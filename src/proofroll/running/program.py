@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from proofroll.core.element import described_by
 from proofroll.core.engine import Sample, fixed_step, whole_steps
 from proofroll.core.errors import Diverged, InputError, ProofrollError, Refused
 from proofroll.core.multi_element import REQUIRED
@@ -159,7 +160,7 @@ class Program:
         self._pipe, self._step = Pipe(self.path), fixed_step(settings)
         (element,) = scene.elements  # elements of a scene with several are built one by one
         self._sample_type = element.sample_type
-        content = {"kind": type(element).__name__, "name": element.name} | plain(dataclasses.asdict(element))  # type: ignore[call-overload]  # elements are dataclasses
+        content = {"kind": described_by(element), "name": element.name} | plain(dataclasses.asdict(element))  # type: ignore[call-overload]  # elements are dataclasses
         try:
             request = {"do": "build", "scene": content, "asks": scene.asks, "settings": dataclasses.asdict(settings)}
             self._last = self._pipe.ask(request)

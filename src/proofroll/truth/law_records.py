@@ -263,7 +263,8 @@ class LawRecorder:
         """
         start, end, inside = step
         length = end - start
-        for _ in range(_SHORTER):
+        for halvings in range(_SHORTER):
+            length = (end - start) / 2**halvings
             times = start + length * (POINTS + 1) / 2
             states = inside(times)
             sizes = np.abs(TO_SERIES @ states.T)
@@ -273,7 +274,6 @@ class LawRecorder:
             hidden = bool(self._mechanism.prescribed) and _unresolved(turning.reshape(-1, len(POINTS)))
             if turned <= _TURN and resolved.all() and not hidden:
                 break
-            length /= 2
         return _Piece(times, np.full(len(POINTS), length / 2), states.T)
 
     def _turns(self, states: Array) -> tuple[Array, Array]:

@@ -72,6 +72,10 @@ class SmoothTree(ContactTree):
             near=none,
         )
 
+    def _law_inside(self, state: Array, mode: ContactMode) -> StretchLaw:
+        eliminated = self.dynamics.equations.eliminated
+        return self._law(state, mode)._replace(corrected=lambda y: np.append(eliminated(y[:-1]), y[-1]))
+
     def _walked(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         if not self._implicit:
             return super()._walked(time, state, mode, until)

@@ -214,13 +214,14 @@ def _unsure(cause: Cause, rival: Cause) -> bool:
 
 
 def hypotheses_of(element: Element) -> Sequence[Hypothesis]:
-    """Hypotheses of the kind of element in whose package the element's class is defined; empty if it has none."""
+    """Hypotheses of the kind of element in whose package the element's class or its base is defined; empty: none."""
     from proofroll.core.plugins import load_element_kinds
 
-    package = type(element).__module__.rpartition(".")[0]
-    for kind in load_element_kinds():
-        if kind.__module__.rpartition(".")[0] == package and isinstance(kind, ExplainsRuns):
-            return kind.hypotheses()
+    for base in type(element).__mro__:
+        package = base.__module__.rpartition(".")[0]
+        for kind in load_element_kinds():
+            if kind.__module__.rpartition(".")[0] == package and isinstance(kind, ExplainsRuns):
+                return kind.hypotheses()
     return ()
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ _TELLS = 5e-3  # least part of the way by which velocities contradict places
 _SAFETY = 10.0  # on the rounding of places
 _DEGREE = np.pi / 180
 _MILLI = 1e-3
+_READINGS = 4  # of a record that are judged at most
 _SCHEMES = (-1.0, 0.0, 1.0)  # places move by the velocity before a step, by the mean, by that after it
 
 Changed = Callable[[ControlRecord], ControlRecord]
@@ -45,38 +47,83 @@ class _Off(NamedTuple):
     rounding: float
 
 
-def state_layer(record: ControlRecord, law: ControlLaw) -> tuple[ControlRecord, Layer | None]:
-    """Record whose velocities are the rates of its places, and the layer that says what was wrong; None: nothing.
+_NONE = _Off(0.0, 0.0, 0.0)
 
-    A contradiction without a known cause is no layer: rows that are far apart make one, too.
+
+class StateReading(NamedTuple):
+    """A record as its columns may have been meant.
+
+    Attributes:
+        record: with velocities that are the rates of its places.
+        layer: what was wrong; None: nothing.
     """
-    causes: list[LayerCause] = []
-    worst, column, count = _Off(0.0, 0.0, 0.0), "", 0
+
+    record: ControlRecord
+    layer: Layer | None
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """Mistakes of columns that were found so far, and the record without them; ``worst``: what contradicts most."""
+
+    record: ControlRecord
+    causes: tuple[LayerCause, ...] = ()
+    worst: _Off = _NONE
+    column: str = ""
+    tried: int = 0
+
+
+def state_readings(record: ControlRecord, law: ControlLaw) -> list[StateReading]:
+    """Records whose velocities are the rates of their places, with the layer that says what was wrong.
+
+    There are several where mistakes explain a contradiction alike: rates of the other sign are coordinates of the
+    other sign. A contradiction without a known cause is no layer: rows that are far apart contradict themselves, too.
+    """
+    readings = [_Reading(record)]
     for name, measured, known in (
-        ("v", _of_joints, _of_joint_columns()),
-        ("w_WB", _of_spin, _of_spins()),
-        ("v_WB", _of_velocity, _of_velocities(law)),
+        ("v", _of_joints, [*_of_joint_columns()]),
+        ("w_WB", _of_spin, [*_of_spins()]),
+        ("v_WB", _of_velocity, [*_of_velocities(law)]),
     ):
-        apart = measured(record)
-        if apart is None or apart.off <= max(_TELLS * apart.way, _SAFETY * apart.rounding):
-            continue
-        trials = []
-        for number, mistake in enumerate(known):
-            count += 1
-            trial = mistake.changed(record)
-            left = measured(trial)
-            if left is not None and left.off <= _HELPS * min(apart.off, left.way):
-                trials.append((left.off, number, mistake, trial))
-        if trials:
-            after, _, mistake, record = min(trials, key=lambda item: item[:2])
-            proof = f"places off by {error(apart.off)}, by {error(after, 1)} with that"
-            causes.append(LayerCause(mistake.id, f"{mistake.words} ({proof})", None, after))
-            worst, column = max((worst, column), (apart, name))
-    if not causes:
-        return record, None
+        readings = [item for reading in readings for item in _explained(reading, name, measured, known)][:_READINGS]
+    return [StateReading(reading.record, _layer(reading)) for reading in readings]
+
+
+def _explained(
+    reading: _Reading, name: str, measured: Callable[[ControlRecord], _Off | None], known: Sequence[ColumnMistake]
+) -> list[_Reading]:
+    """The reading with each of the known mistakes that explain best what its velocities contradict."""
+    apart = measured(reading.record)
+    if apart is None or apart.off <= max(_TELLS * apart.way, _SAFETY * apart.rounding):
+        return [reading]
+    trials = []
+    for mistake in known:
+        trial = mistake.changed(reading.record)
+        left = measured(trial)
+        if left is not None and left.off <= _HELPS * min(apart.off, left.way):
+            trials.append((left.off, mistake, trial))
+    tried = reading.tried + len(known)
+    if not trials:
+        return [replace(reading, tried=tried)]
+    most = 2 * min(after for after, _, _ in trials) + _SAFETY * apart.rounding
+    worst, column = max((reading.worst, reading.column), (apart, name))
+    readings = []
+    for after, mistake, trial in (item for item in trials if item[0] <= most):
+        proof = f"places off by {error(apart.off)}, by {error(after, 1)} with that"
+        cause = LayerCause(mistake.id, f"{mistake.words} ({proof})", None, after)
+        readings.append(
+            _Reading(record=trial, causes=(*reading.causes, cause), worst=worst, column=column, tried=tried)
+        )
+    return readings
+
+
+def _layer(reading: _Reading) -> Layer | None:
+    """Layer of a reading; None: nothing was wrong."""
+    if not reading.causes:
+        return None
+    worst, tried = reading.worst, reading.tried
     bar = min(worst.rounding, 0.5 * worst.off)
-    layer = Layer("state", worst.off, bar, column, causes=tuple(causes), tried=count, known=count)
-    return record, layer
+    return Layer("state", worst.off, bar, reading.column, causes=reading.causes, tried=tried, known=tried)
 
 
 def _of_joints(record: ControlRecord) -> _Off | None:
@@ -123,6 +170,7 @@ def _of_joint_columns() -> Iterator[ColumnMistake]:
     yield ColumnMistake("degrees", "q.JOINT is in degrees: name it q.JOINT[deg]", _scaled("q.", _DEGREE))
     yield ColumnMistake("degrees", "v.JOINT is in degrees per second: name it v.JOINT[deg/s]", _scaled("v.", _DEGREE))
     yield ColumnMistake("sign", "v.JOINT has the other sign", _scaled("v.", -1.0))
+    yield ColumnMistake("sign", "q.JOINT has the other sign", _scaled("q.", -1.0))
     yield ColumnMistake("milliseconds", "the times are in milliseconds: name them time[ms]", _in_seconds)
 
 
@@ -131,6 +179,7 @@ def _of_spins() -> Iterator[ColumnMistake]:
     inverse = "q_WB is of the inverse rotation, of the world in the base"
     both = f"{last}, and of the inverse rotation, of the world in the base"
     yield ColumnMistake("base_axes", "w_WB is along the axes of the base: name it w_WB_B", _along_base("w_WB"))
+    yield ColumnMistake("sign", "w_WB has the other sign", _scaled("w_WB.", -1.0))
     yield ColumnMistake("quaternion", last, _requaternioned(_SCALAR_LAST))
     yield ColumnMistake("quaternion", inverse, _requaternioned(_INVERSE))
     yield ColumnMistake("quaternion", both, _requaternioned({**_SCALAR_LAST, **_INVERSE}))

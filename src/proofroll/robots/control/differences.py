@@ -201,7 +201,7 @@ def _action(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
     if isinstance(computed, str):
         return computed
     columns = [f"action.{name}" for name in law.joints]
-    late = int(record.time[0] > 0 and f"{OBSERVED}.last.{law.joints[0]}" not in record.columns)
+    late = int(record.time[0] != 0 and f"{OBSERVED}.last.{law.joints[0]}" not in record.columns)
     return _compared(columns, record.time[late:], recorded[late:], computed[late:])
 
 

@@ -17,6 +17,7 @@ Flags = NDArray[np.bool_]
 _ROWS = 2  # rows for each number of a joint at least
 _SAME = 1e-3  # relative difference of two numbers of joints that are told as one, and least one that is told
 _SMALL = 1e-9  # part of a column that is round-off
+_RANK = 1e-4  # least part of the inputs of a servo along which they vary, for its numbers to be known
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tupl
     for words, order in orders(law.joints):
         if (after := left(right[:, order])) <= most:
             yield 0, LayerCause("effort_order", f"efforts are of joints in another order ({words})", None, after)
-    fit = _ServoFit.of(rows, law)
+    fit = _ServoFit.of(rows, law, np.asarray((np.abs(right - rows.effort) > most * sizes).any(axis=0), bool), most)
     if fit is not None and (after := left(fit.efforts(rows))) <= most and (clauses := fit.clauses(law)):
         size = fit.size if len(clauses) == 1 else None
         yield len(clauses), LayerCause("servo", "; ".join(clauses), size, after)
@@ -83,8 +84,12 @@ def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tupl
 
 @dataclass
 class _ServoFit:
-    """Servos whose numbers were fitted, each (joints,): effort = bias + clamped(kp (target - q) - kd v)."""
+    """Servos whose numbers were fitted, each (joints,): effort = bias + clamped(kp (target - q) - kd v).
 
+    ``other``: joints whose efforts are not the law's; the numbers of the rest are the law's.
+    """
+
+    other: Flags
     kp: Array
     kd: Array
     bias: Array
@@ -92,21 +97,32 @@ class _ServoFit:
     size: float | None = None
 
     @classmethod
-    def of(cls, rows: ServoRows, law: ControlLaw) -> _ServoFit | None:
-        """The fit; None: too few rows are beside a clamp."""
-        count = len(law.joints)
-        fit = cls(kp=law.kp.copy(), kd=law.kd.copy(), bias=np.zeros(count), limit=np.full(count, np.inf))
-        for k in range(count):
+    def of(cls, rows: ServoRows, law: ControlLaw, other: Flags, most: float) -> _ServoFit | None:
+        """The fit; None: too few rows are beside a clamp, or they do not tell the numbers of a joint.
+
+        Args:
+            rows: of the record.
+            law: as it should be.
+            other: joints whose efforts are not its own.
+            most: largest difference that a fit may leave, in parts of the largest effort of each joint.
+        """
+        fit = cls(
+            other=other, kp=law.kp.copy(), kd=law.kd.copy(), bias=np.zeros(len(other)), limit=np.array(law.limit, float)
+        )
+        for k in np.flatnonzero(other).tolist():
             effort = rows.effort[:, k]
             columns = np.stack([rows.target[:, k] - rows.q[:, k], -rows.v[:, k], np.ones(len(effort))], axis=1)
             free = ~_at_ends(effort)
             if free.sum() < _ROWS * columns.shape[1]:
                 return None
             scale = np.maximum(np.abs(columns[free]).max(axis=0), 1e-300)
-            numbers = np.linalg.lstsq(columns[free] / scale, effort[free], rcond=_SMALL)[0] / scale
-            fit.kp[k], fit.kd[k], fit.bias[k] = numbers
-            if not free.all():
-                fit.limit[k] = float(np.abs(effort[~free] - numbers[2]).min())
+            numbers, _, rank, _ = np.linalg.lstsq(columns[free] / scale, effort[free], rcond=_RANK)
+            if rank < columns.shape[1]:
+                return None
+            fit.kp[k], fit.kd[k], fit.bias[k] = numbers / scale
+            unbounded = float(np.abs(columns @ (numbers / scale) - effort).max())
+            clamped = unbounded > most * float(np.abs(effort).max())
+            fit.limit[k] = float(np.abs(effort[~free] - fit.bias[k]).max(initial=0.0)) if clamped else np.inf
         return fit
 
     def efforts(self, rows: ServoRows) -> Array:
@@ -118,12 +134,12 @@ class _ServoFit:
         """Clauses on the numbers that are not the law's; efforts that are all one part of the right ones have one."""
         parts = {"kp": (self.kp, law.kp), "kd": (self.kd, law.kd)}
         factors = {name: _factors(found, right) for name, (found, right) in parts.items() if right.any()}
-        clamped = np.isfinite(self.limit)
+        clamped = np.isfinite(self.limit) & self.other
         factors["limit"] = np.where(clamped, _factors(np.where(clamped, self.limit, 1.0), law.limit), 1.0)
         biased = np.abs(self.bias) > _SAME * np.where(np.isfinite(law.limit), law.limit, np.abs(law.kp))
         gains = np.concatenate([factors[name] for name in parts if name in factors])
         scaled = np.concatenate([gains, np.sign(gains[:1]) * factors["limit"][clamped]])
-        if len(factors) > 2 and not biased.any() and _alike(scaled) and abs(scaled[0] - 1) > _SAME:
+        if self.other.all() and len(factors) > 2 and not biased.any() and _alike(scaled) and abs(scaled[0] - 1) > _SAME:
             self.size = float(scaled.mean())
             if np.isclose(self.size, -1, atol=_SAME):
                 return ["efforts have the other sign"]

@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordin
 from proofroll.elements.mechanism.run.step_limits import servo_steps
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
-from proofroll.robots.control.columns import state_layer
+from proofroll.robots.control.columns import state_readings
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.layers import BETWEEN, record_layers
 from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
@@ -135,8 +135,12 @@ def judge_record(
         model = ControlledScenes(control).of_record(robot, free=free)
     law = ControlLaw.of(model.mechanism)
     law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
-    read, state = state_layer(read, law)
-    layers = record_layers(read, law, model.mechanism, grounded=model.grounded)
+    judged = [
+        (read, [*([state] if state else []), *record_layers(read, law, model.mechanism, grounded=model.grounded)])
+        for read, state in state_readings(read, law)
+    ]
+    # Of readings that explain the state alike, layers behind it tell the right one.
+    read, layers = min(judged, key=lambda item: sum(not layer.holds for layer in item[1]))
     return RecordJudgement(
         record=str(record),
         robot=str(robot),
@@ -144,7 +148,7 @@ def judge_record(
         base="free" if free else "fixed",
         rows=len(read.time),
         step=_step(read),
-        layers=layers if state is None else [state, *layers],
+        layers=layers,
         remarks=[*_too_fast(read, model.speeds)],
         step_bound=_step_bound(model.mechanism, _step(read)),
     )

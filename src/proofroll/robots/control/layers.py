@@ -52,7 +52,6 @@ BETWEEN = "no cause is known; taken for the program's own steps between the rows
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
 _HELPS = 0.1
-_FITS = 1e-2  # the same of causes with several fitted numbers
 
 
 def record_layers(record: ControlRecord, law: ControlLaw, mechanism: Mechanism, *, grounded: bool) -> list[Layer]:
@@ -272,6 +271,8 @@ def _offset(evidence: _Evidence, name: str) -> LayerCause | str:
     compared = evidence.difference("target")
     if isinstance(compared, str):
         return compared
+    if not len(compared.difference):
+        return "no row counts"
     offsets = compared.difference.mean(axis=0)
     law = evidence.law
     pose = law.pose + law.signs * offsets

@@ -106,7 +106,9 @@ def begun_later(variables: Mapping[str, GivenVariable], from_start: Mapping[str,
     """
     wrong = [name for name, item in variables.items() if item.wrong]
     closed = [
-        from_start[name].off <= CLOSES * item.off or not from_start[name].wrong for name, item in variables.items()
+        name in from_start and (from_start[name].off <= CLOSES * item.off or not from_start[name].wrong)
+        for name, item in variables.items()
+        if name in from_start or item.wrong  # the truth has no number of others at the times from the start
     ]
     if not wrong or not all(closed):
         return ""

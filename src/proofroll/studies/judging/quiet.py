@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.scene import Scene
 
 _STILL = 1e-12  # part of the size of an element by which it moves in round-off
+_SAME = 1e-6  # relative difference of two intervals of time that is round-off
 
 
 def untouched(scene: Scene, variables: Any, events: Sequence[Any]) -> bool:
@@ -33,10 +34,13 @@ def quiet(scene: Scene, variables: Any, events: Sequence[Any]) -> str:
         variables: of it, a mapping by name, ``time`` among them.
         events: of it.
     """
-    end = float(variables["time"].values[-1])
-    if end > 0 and not events and _still(scene, variables):
+    times = np.asarray(variables["time"].values, dtype=float)
+    end = float(times[-1])
+    if len(times) < 2 or times[0] > (1 + _SAME) * (times[1] - times[0]):
+        return ""  # what happened before the first sample is not known
+    if not events and _still(scene, variables):
         return f"Nothing moves up to {end:g} s: every body stays where it starts."
-    if end > 0 and untouched(scene, variables, events):
+    if untouched(scene, variables, events):
         return f"Nothing touches up to {end:g} s: no contact and no impact is part of the answer."
     return ""
 
@@ -44,11 +48,18 @@ def quiet(scene: Scene, variables: Any, events: Sequence[Any]) -> str:
 def _still(scene: Scene, variables: Any) -> bool:
     """True if no body of any element moves or turns."""
     for element in scene.elements:
-        for name, size in (("p_WB", element.length), ("q_WB", 1.0)):
+        rate = 1 / element.natural_time
+        for name, size, rests in (
+            ("p_WB", element.length, False),
+            ("q_WB", 1.0, False),
+            ("v_WB", rate * element.length, True),
+            ("w_WB", rate, True),
+        ):
             item = variables.get(scene.label(element, name))
             if item is None:
                 return False
             values = np.asarray(item.values)
-            if len(values) < 2 or not np.abs(values - values[:1]).max(initial=0.0) <= _STILL * size:
+            least = 0.0 if rests else values[:1]
+            if not np.abs(values - least).max(initial=0.0) <= _STILL * size:
                 return False
     return True

@@ -323,17 +323,21 @@ class ContactWalks(ABC):
 
         return (*signs, *sides_ahead(state, equations.kinks, rates))
 
+    def _law_inside(self, state: Array, mode: ContactMode) -> StretchLaw:
+        """Equations for states inside a stretch, of which one is no step from another."""
+        return self._law(state, mode)
+
     def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
         """See the protocol."""
         if isinstance(stretch, BegunSlip | StoppingSlip):
             return np.array([self._equations.eliminated(state, stretch.mode) for state in stretch.at(times)])
         if isinstance(stretch, CompiledStretch) and stretch.by is not None:
-            return stretch.by.within(self._law(stretch.first, stretch.mode), stretch, times)
+            return stretch.by.within(self._law_inside(stretch.first, stretch.mode), stretch, times)
         if stretch.exact:
             return states_inside(stretch.dense, times).T
         if not stretch.visited:
             return np.array([stretch.first for _ in times])
-        return states_at(self._law(stretch.first, stretch.mode), stretch.visited, times, self._tolerance)
+        return states_at(self._law_inside(stretch.first, stretch.mode), stretch.visited, times, self._tolerance)
 
     def acting(self, stretch: Stretch[ContactMode], state: Array) -> ContactMode:
         """Mode at a state within a stretch, with the directions of slips that its integration took."""

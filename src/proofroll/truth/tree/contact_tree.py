@@ -49,6 +49,9 @@ class ContactTree(ContactStretches):
         law = super()._law(state, mode, signs)
         return law._replace(corrected=self.dynamics.equations.watching(law.corrected))
 
+    def _law_inside(self, state: Array, mode: ContactMode) -> StretchLaw:
+        return super()._law(state, mode)
+
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
         rough = self._moved_on(self.start, self.dynamics.rough_start())

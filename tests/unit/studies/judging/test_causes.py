@@ -16,7 +16,7 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.parts import Point
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.judging.causes import GivenVariable, causes_of, mapping
+from proofroll.studies.judging.causes import GivenVariable, begun_later, causes_of, mapping
 
 TIMES = np.linspace(0.0, 2.0, 41)
 ONE, TWO = np.sin(3 * TIMES) + 0.3, np.cos(2 * TIMES) - 0.1
@@ -164,6 +164,14 @@ def test_a_clock_that_begins_later_is_no_delay_less_some_periods() -> None:
     ]
     later = truth(scene.fully_asked, np.concatenate([[0.0], 3.0 + times]))
     assert proofroll.judge({"time": 3.0 + times, "q.pivot": later["q.pivot"].to_numpy()[1:]}, scene).agrees
+
+
+def test_what_the_truth_does_not_determine_from_the_start_hinders_no_answer() -> None:
+    """A variable without a true number at the times from the start leaves the clock undecided where it is wrong."""
+    times = np.linspace(0.0, 1.0, 20)
+    right, late = GivenVariable(times, times, "rad"), GivenVariable(times, times + 1.0, "rad")
+    assert begun_later({"q.a": late, "force": right}, {"q.a": right}, 1.0).startswith("the record is late by 1 s")
+    assert begun_later({"q.a": late, "force": late}, {"q.a": right}, 1.0) == ""
 
 
 def test_millimetres_are_named() -> None:

@@ -39,6 +39,17 @@ def test_a_judgement_of_a_body_at_rest_says_so() -> None:
     assert judged.content()["quiet"].startswith("Nothing moves")
 
 
+@pytest.mark.parametrize("begin", [0.0, 2.0])
+def test_a_motion_that_is_over_before_the_first_sample_is_not_told_to_rest(begin: float) -> None:
+    """A body that may have moved before the first sample, or moves between samples, is not told to rest."""
+    scene = load_scene("pendulum", angle=0.0)
+    data = truth(scene.fully_asked, np.linspace(0.0, 0.1, 6)).assign_coords(time=begin + np.linspace(0.0, 0.1, 6))
+    if begin:
+        assert quiet(scene, data.variables, ()) == ""
+    data["v_WB"] = data["v_WB"] + 1.0
+    assert quiet(scene, data.variables, ()) == ""
+
+
 def test_rows_without_a_number_are_counted() -> None:
     """Of several rows that are not finite, the answer has the number and the first."""
     times = np.linspace(0.0, 0.1, 6)

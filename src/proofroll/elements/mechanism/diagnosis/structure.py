@@ -16,6 +16,7 @@ from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of, stretch
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, residuals_of
 from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
 
@@ -125,7 +126,7 @@ def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
         )
         joints = (*mechanism.joints[:index], turned, *mechanism.joints[index + 1 :])
         try:
-            expected = _first(type(element)(replace(mechanism, joints=joints)))
+            expected = _first(MechanismElement(replace(mechanism, joints=joints)))
         except InputError:  # its loops do not close
             continue
         difference, remainder = (_apart(lines, values) for values in ({}, expected))  # in tolerances

@@ -85,6 +85,7 @@ class MechanismElement:
     local: LocalStart | None = None
 
     sample_type: ClassVar[type[MechanismSample]] = MechanismSample
+    softened: ClassVar[frozenset[str]] = frozenset(CAPS)
     caps: ClassVar[Mapping[str, Regularised]] = CAPS
     failing_events: ClassVar[Mapping[str, str]] = {}
     askable: ClassVar[Mapping[str, str]] = {}
@@ -103,11 +104,6 @@ class MechanismElement:
     def analysis(self) -> Analysis:
         """Rank, mobility, and which reactions are determinate."""
         return read_only(analyse(self.mechanism))
-
-    @property
-    def softened(self) -> frozenset[str]:
-        """See the protocol."""
-        return frozenset(self.caps)
 
     @property
     def failures(self) -> Mapping[str, str]:
