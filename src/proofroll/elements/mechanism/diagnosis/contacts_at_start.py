@@ -21,6 +21,7 @@ from proofroll.elements.mechanism.contact.start import TOUCHING
 from proofroll.elements.mechanism.diagnosis.contacts import FORCE, contact_cause
 from proofroll.elements.mechanism.diagnosis.equations import of_start
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.checks import WORLD
 from proofroll.elements.mechanism.scene.rotations import frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry
@@ -51,7 +52,7 @@ class _FirstAccelerations:
         """Accelerations [m/s²] of a mechanism with these contacts minus those of the run; inf if it is refused."""
         parts = {"pairs": tuple(pairs), "geometries": tuple(geometries or self.mechanism.geometries)}
         try:
-            motion = type(self.element)(replace(self.mechanism, **parts)).first_motion
+            motion = MechanismElement(replace(self.mechanism, **parts)).first_motion
         except Refused:
             return np.full(1, np.inf)
         turning = self.element.length * motion.angular_acceleration

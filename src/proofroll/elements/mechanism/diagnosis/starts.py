@@ -14,6 +14,7 @@ from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED
 from proofroll.elements.mechanism.run.dataset import quaternions
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.joint import Joint
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
 from proofroll.elements.mechanism.scene.model import Mechanism
@@ -46,7 +47,7 @@ def start_not_taken(evidence: Evidence) -> Iterator[Cause]:
     if not above_round_off(distance, longest(expected)):
         return
     for says, other_model in _other_starts(evidence.element.mechanism):
-        moved = _moved(evidence, other_model, times)
+        moved = _moved(other_model, times)
         if moved is None:
             continue
         remainder = largest_difference(poses[1:_FIRST], moved[1:])
@@ -125,14 +126,14 @@ def _away(joint: Joint) -> bool:
     return tuple(joint.q0) != _home(joint)
 
 
-def _moved(evidence: Evidence, mechanism: Mechanism, times: FloatArray) -> FloatArray | None:
+def _moved(mechanism: Mechanism, times: FloatArray) -> FloatArray | None:
     """Poses of the true motion of a mechanism at the first times; None: it cannot start so, or has no truth."""
     from proofroll.core.scene import Scene
     from proofroll.core.truth import truth
 
     try:
         check_contacts(mechanism)
-        true = truth(Scene("start", "", (type(evidence.element)(mechanism),)), times)
+        true = truth(Scene("start", "", (MechanismElement(mechanism),)), times)
     except ProofrollError:
         return None
     return _poses(true["p_WB"].to_numpy(), quaternions(true))
