@@ -2,14 +2,17 @@
 
 import numpy as np
 import pytest
+from scipy.special import ellipk
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.truth.bodies import maximal_taylor
 from proofroll.truth.smooth_truth import find_truth
 from proofroll.truth.switching import contact_taylor
 
 TIMES = np.array([0.0, 0.1, 0.2])
+G = 9.81
 
 
 @pytest.mark.parametrize("name", ["pendulum", "gear_pair", pytest.param("slider_crank", marks=pytest.mark.drill)])
@@ -40,3 +43,29 @@ def test_a_wrong_load_of_one_route_is_refused_from_the_start(scene, monkeypatch)
 def test_turns_of_a_fast_wheel_are_counted_in_each_route(scene):
     """A rotor that an elbow turns 50 times as fast holds the law of its gear in both routes, whole turns included."""
     assert find_truth(scene("arm_rotor", elbow=0.8), np.array([0.0, 0.2, 0.4])).laws.startswith("holds ")
+
+
+def test_a_body_at_rest_beside_one_that_swings_holds_the_laws():
+    """What round-off alone moves has no series that its points resolve; the laws hold of it as of the other body."""
+    joints = tuple(
+        Joint(name, "prismatic", "world", name, axis=(0, 0, 1), stiffness=100.0, q0=(start,))
+        for name, start in (("rests", -G / 100.0), ("swings", 0.3))
+    )
+    mechanism = Mechanism(tuple(Body(joint.name, 1.0) for joint in joints), joints, gravity=(0, 0, -G))
+    assert find_truth(mechanism, TIMES).laws.startswith("holds ")
+
+
+def test_a_mass_on_a_strut_is_known_however_far_its_samples_are_apart():
+    """From one sample to the next the strut may turn so far that its rows do not tell a singular pose between."""
+    angle, r = np.radians(80.0), 1.0
+    half_period = 2 * np.sqrt(r / G) * ellipk(np.sin(angle / 2) ** 2)
+    bodies = (Body("cart", 1e-3), Body("mass", 1.0))
+    joints = (
+        Joint("x", "prismatic", "world", "cart", axis=(1, 0, 0), q0=(r * np.sin(angle),)),
+        Joint("z", "prismatic", "cart", "mass", axis=(0, 0, 1), q0=(-r * np.cos(angle),), dependent=True),
+    )
+    strut = Loop("strut", "distance", "world", "mass", length=r)
+    mechanism = Mechanism(bodies, joints, loops=(strut,), gravity=(0, 0, -G))
+    found = find_truth(mechanism, np.array([0.0, half_period]))
+    assert found.end == np.inf
+    assert found.laws.startswith("holds ")
