@@ -9,6 +9,7 @@ from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.dynamics.commands import has_held
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.dynamics.switches import NEAR as NEAR_STOP
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import breaks
@@ -59,7 +60,8 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         return find_truth(mechanism, times)
     rubs = any(joint.friction for joint in equations.switched)
     if not bent and not rubs and _reaches_none(mechanism, times):
-        return find_truth(_unlimited(mechanism), times)
+        unlimited = _unlimited(mechanism)
+        return _with_idle_stops(find_truth(unlimited, times), unlimited, mechanism)
     return contact_truth(mechanism, times)
 
 
@@ -102,6 +104,17 @@ def _unlimited(mechanism: Mechanism) -> Mechanism:
     joints = tuple(replace(joint, limits=None) for joint in mechanism.joints)
     actuators = tuple(replace(actuator, limit=None) for actuator in mechanism.actuators)
     return replace(mechanism, joints=joints, actuators=actuators)
+
+
+def _with_idle_stops(motion: TwoRouteMotion, unlimited: Mechanism, mechanism: Mechanism) -> TwoRouteMotion:
+    """The motion with the named forces of stops that nothing reaches, which are zero."""
+    record, names = motion.record, [item.name for item in named_forces(unlimited)]
+    columns = [
+        record.named[:, names.index(item.name)] if item.name in names else np.zeros(len(record.time))
+        for item in named_forces(mechanism)
+    ]
+    named = np.stack(columns, axis=1) if columns else record.named
+    return replace(motion, record=replace(record, named=named))
 
 
 def _narrower(mechanism: Mechanism) -> Mechanism:

@@ -55,7 +55,7 @@ class StateReading(NamedTuple):
 
     Attributes:
         record: with velocities that are the rates of its places.
-        layer: what was wrong; None: nothing.
+        layer: the mistakes of the columns; None: there are none.
     """
 
     record: ControlRecord

@@ -324,7 +324,7 @@ class ContactWalks(ABC):
         return (*signs, *sides_ahead(state, equations.kinks, rates))
 
     def _law_inside(self, state: Array, mode: ContactMode) -> StretchLaw:
-        """Equations for states inside a stretch, of which one is no step from another."""
+        """Equations for states inside a stretch, which are no successive steps."""
         return self._law(state, mode)
 
     def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contact.acting import Acting, ContactMode
+from proofroll.elements.mechanism.contact.acting import REST, Acting, ContactMode, slip_velocity
 from proofroll.elements.mechanism.contact.touching import Touching, lying
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
@@ -97,11 +97,11 @@ def leaving(mode: ContactMode, k: int, force: Array, normal: Array) -> ContactMo
 def refuse_lying(
     contacts: Sequence[BodyContact], touching: Sequence[Touching], closed_mask: Sequence[bool], time: float
 ) -> None:
-    """Raises Refused if a closed contact of bodies is along an edge or a line at a time [s].
+    """Raises Refused if a closed contact of bodies is along an edge or a line at a time [s], and slides.
 
     No one point of an edge holds it: the nearest would jump to and fro with the last digits of the tilt, in steps
-    without end.
+    without end. At rest it does not.
     """
     for contact, point, closed in zip(contacts, touching, closed_mask, strict=False):
-        if closed and point.flat:
+        if closed and point.flat and np.linalg.norm(slip_velocity(point)) > REST:
             raise Refused(str(lying(contact, time)))
