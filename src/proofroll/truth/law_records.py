@@ -281,8 +281,8 @@ class LawRecorder:
 
         Where no motion is prescribed, which no state contains, those at both ends suffice.
         """
-        known = states.T if self._mechanism.prescribed else states.T[[0, -1]]
-        poses = [self._route.bodies(y) for y in known]
+        rows = states.T if self._mechanism.prescribed else states.T[[0, -1]]
+        poses = [self._route.bodies(y) for y in rows]
         turning = np.array([Rotation.from_quat(pose[2], scalar_first=True).as_matrix() for pose in poses]).T
         return turning, np.array([pose[3] for pose in poses])
 

@@ -97,14 +97,18 @@ def test_settings_without_options_are_matched() -> None:
 @pytest.mark.parametrize(("scene", "formulation"), [("pendulum", "null_space"), ("sled", "impulses")])
 def test_a_formulation_made_for_other_scenes_is_not_taken_unasked(scene: str, formulation: str) -> None:
     """Without a formulation it is one that is made for such scenes, if there is one, in whatever order they stand."""
-    engine = pytest.importorskip("proofroll.engines.pinocchio.adapter").Pinocchio
-    assert resolve_settings(engine, {}, load_scene(scene).requires).formulation == formulation
+    pytest.importorskip("pinocchio")
+    from proofroll.engines.pinocchio.adapter import Pinocchio
+
+    assert resolve_settings(Pinocchio, {}, load_scene(scene).requires).formulation == formulation
 
 
 def test_where_no_formulation_suffices_the_one_that_lacks_least_is_taken() -> None:
     """What a refusal then names is lacking in every formulation."""
-    engine = pytest.importorskip("proofroll.engines.pinocchio.adapter").Pinocchio
-    assert resolve_settings(engine, {}, {*load_scene("pendulum").requires, "a tendon"}).formulation == "null_space"
+    pytest.importorskip("pinocchio")
+    from proofroll.engines.pinocchio.adapter import Pinocchio
+
+    assert resolve_settings(Pinocchio, {}, {*load_scene("pendulum").requires, "a tendon"}).formulation == "null_space"
 
 
 def test_options_go_over_the_preset() -> None:

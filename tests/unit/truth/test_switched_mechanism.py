@@ -10,6 +10,7 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.dynamics.complementarity import complementary
+from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.drives import Coupling
 from proofroll.files.scene_file import load_scene
 from proofroll.truth import followed_paths
@@ -507,3 +508,11 @@ def test_many_joints_at_rest_on_a_body_that_spins() -> None:
     assert moving.any()
     assert not moving.all()
     assert found.bars["p_WB"][-1] < 1e-12
+
+
+def test_a_stop_that_nothing_reaches_has_no_force(scene):
+    """A motion that ends before its stop has that stop's force, which is zero, in its place among the others."""
+    mechanism = scene("stop")
+    named = truth_of(mechanism, np.array([0.0, 0.05])).record.named
+    assert named.shape == (2, len(named_forces(mechanism)))
+    assert not named[:, [item.name.startswith("stop.") for item in named_forces(mechanism)]].any()

@@ -193,8 +193,8 @@ def _of_velocities(law: ControlLaw) -> Iterator[ColumnMistake]:
     if law.centre.any():
         at_centre = "v_WB is the velocity of the base's centre of mass, not of its origin"
         yield ColumnMistake("point", at_centre, _to_origin(law.centre))
-        along = _after(_along_base("v_WB"), _to_origin(law.centre))
-        yield ColumnMistake("point", f"{at_centre}, along the axes of the base", along)
+        change = _after(_along_base("v_WB"), _to_origin(law.centre))
+        yield ColumnMistake("point", f"{at_centre}, along the axes of the base", change)
 
 
 def action_mistakes(law: ControlLaw, instants: Array) -> Iterator[ColumnMistake]:

@@ -50,11 +50,11 @@ def observation_causes(
     right = recorded - difference
     squares = (right**2).sum(axis=0)
     factors = np.where(squares > 0, (right * recorded).sum(axis=0) / np.where(squares > 0, squares, 1.0), 1.0)
-    after = float((np.abs(recorded - factors * right) / sizes).max())
-    other = np.asarray((np.abs(difference) > most * sizes).any(axis=0), bool)
-    if after <= most and len(recorded) > _ROWS:
-        words = f"parts are observed at another size: {_listed(factors, other, columns, ' of the right one')}"
-        yield int(other.sum()), LayerCause("observed_size", words, None, after)
+    residual = float((np.abs(recorded - factors * right) / sizes).max())
+    wrong_columns = np.asarray((np.abs(difference) > most * sizes).any(axis=0), bool)
+    if residual <= most and len(recorded) > _ROWS:
+        words = f"parts are observed at another size: {_listed(factors, wrong_columns, columns, ' of the right one')}"
+        yield int(wrong_columns.sum()), LayerCause("observed_size", words, None, residual)
 
 
 def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tuple[int, LayerCause]]:
@@ -204,9 +204,9 @@ def _of_before(
     ):
         columns = np.stack([new[1:].ravel(), previous.ravel()], axis=1)
         part, rest = np.linalg.lstsq(columns, moved[1:].ravel(), rcond=_SMALL)[0]
-        after = left(law.pose + part * new[1:] + rest * previous, slice(1, None))
-        if after <= most and abs(rest) > _SAME:
-            yield 2, LayerCause(name, words.format(new=part, old=rest), float(part), after)
+        residual = left(law.pose + part * new[1:] + rest * previous, slice(1, None))
+        if residual <= most and abs(rest) > _SAME:
+            yield 2, LayerCause(name, words.format(new=part, old=rest), float(part), residual)
 
 
 def _affine(targets: Array, actions: Array) -> tuple[Array, Array] | None:
@@ -248,12 +248,12 @@ def _alike(values: Array) -> bool:
 
 def _told(what: str, factors: Array, joints: Sequence[str]) -> list[str]:
     """Clause on factors that are not 1, one number for all joints where they are alike; empty where all are 1."""
-    other = np.abs(factors - 1) > _SAME
-    if not other.any():
+    wrong_joints = np.abs(factors - 1) > _SAME
+    if not wrong_joints.any():
         return []
-    if other.all() and _alike(factors):
+    if wrong_joints.all() and _alike(factors):
         return [f"{what} is {factors.mean():.5g} of the right one"]
-    return [f"{what} is another: {_listed(factors, other, joints, ' of the right one')}"]
+    return [f"{what} is another: {_listed(factors, wrong_joints, joints, ' of the right one')}"]
 
 
 def _listed(values: Array, chosen: Flags, joints: Sequence[str], unit: str = "") -> str:

@@ -236,14 +236,16 @@ def _fits(name: str, compared: LayerDifferences, evidence: _Evidence, most: floa
 def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:
     """A layer of actions with the mistake of their columns that explains it, and evidence without that mistake."""
     instants = instant_rows(evidence.record, evidence.law)
-    known = [*action_mistakes(evidence.law, instants)]
+    column_mistakes = [*action_mistakes(evidence.law, instants)]
     trials = []
-    for mistake in known:
+    for mistake in column_mistakes:
         corrected = dataclasses.replace(evidence, record=mistake.changed(evidence.record))
         left = _norm(corrected, layer.name, evidence.law)
         if left <= _HELPS * _norm(evidence, layer.name, evidence.law):
             trials.append((left, LayerCause(mistake.id, mistake.words, None, left), corrected))
-    tried = dataclasses.replace(layer, tried=layer.tried + len(known), known=layer.known + len(known))
+    tried = dataclasses.replace(
+        layer, tried=layer.tried + len(column_mistakes), known=layer.known + len(column_mistakes)
+    )
     if not trials:
         return tried, evidence
     _, cause, evidence = min(trials, key=lambda item: item[0])

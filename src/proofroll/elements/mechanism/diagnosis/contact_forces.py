@@ -73,10 +73,10 @@ def _causes(vector: ReportedVector, normals: FloatArray, evidence: Evidence, *, 
     ``read_back``: True if the engine's masses are known to be the scene's.
     """
     if vector.differs:
-        along = np.sum(vector.true * normals, axis=-1, keepdims=True) * normals
+        pressing_part = np.sum(vector.true * normals, axis=-1, keepdims=True) * normals
         says = "the friction has the wrong sign, and the normal forces are right"
         remedy = "give the friction on the first body, not on the second"
-        yield vector.cause("friction sign", says, 2 * along - vector.true, remedy)
+        yield vector.cause("friction sign", says, 2 * pressing_part - vector.true, remedy)
     yield from vector.causes(evidence.step)
     square = float(np.nansum(vector.true**2))
     factor = known_factor(float(np.nansum(vector.reported * vector.true)) / square) if square else None
