@@ -198,16 +198,20 @@ def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) ->
         assert len(gzip.decompress(base64.b64decode(numbers))) == bytes_said
     silent = next(i for i, ball in enumerate(content["cases"][0]["runs"]) if ball["name"].startswith("beta"))
     held = {name for name, ball, *_ in content["cases"][0]["arrays"] if ball == silent}
-    assert held == {"p"}, "neither forces nor an orientation are invented"
+    assert held == {"p", "reading0", "reading1", "reading2"}, "neither forces nor an orientation are invented"
+    readings = [(reading["symbol"], reading["unit"]) for reading in content["cases"][0]["readings"]]
+    assert readings == [("γ", "rad"), ("z", "m"), ("energy", "J")]
 
 
-def moved(made: Any, engine: str, change: Callable[[Any], Any]) -> Any:
-    """The comparison with the ball of an engine's first run elsewhere."""
+def moved(made: Any, engine: str, change: Callable[[Any], Any], **shifts: float) -> Any:
+    """The comparison with the ball of an engine's first run elsewhere, and variables of the run shifted."""
     outcome, _ = made
     run = next(run for run in outcome.runs if run.row.engine == engine)
     dataset = run.trajectory.dataset
     elsewhere = StoredTrajectory(run.trajectory.file)
-    vars(elsewhere)["dataset"] = dataset.assign(p_WB=dataset["p_WB"].copy(data=change(dataset["p_WB"].to_numpy())))
+    changed = {"p_WB": change(dataset["p_WB"].to_numpy())}
+    changed |= {name: dataset[name].to_numpy() + shift for name, shift in shifts.items()}
+    vars(elsewhere)["dataset"] = dataset.assign({name: dataset[name].copy(data=changed[name]) for name in changed})
     runs = [dataclasses.replace(run, trajectory=elsewhere) if item is run else item for item in outcome.runs]
     return dataclasses.replace(outcome, runs=runs)
 
@@ -385,9 +389,9 @@ def test_the_replay_plays(written: Any, replayed: Visit) -> None:
 def test_errors_of_ghosts_stand_below_the_picture(
     made: Any, content: ReportContent, tmp_path: Path, visit: Visiting
 ) -> None:
-    """A curve for each ghost shows its distance, the line is at the time shown, a click goes there, ghosts hide."""
+    """A curve for each ghost shows its error in the quantity chosen; a click goes to its time, ghosts hide."""
     file, shift = tmp_path / "report.html", np.array([0.0, 0.0, 2e-3])
-    replay = replay_content([moved(made, "beta", lambda p: p + shift)], BallReport.replay())
+    replay = replay_content([moved(made, "beta", lambda p: p + shift, energy=0.02)], BallReport.replay())
     file.write_text(page(content, [[]], replay=replay), encoding="utf-8")
     with visit(file, viewport=SMALL) as opened:
         opened.near(".replay", "document.querySelector('.replay').dataset.ready === ''")
@@ -399,7 +403,12 @@ def test_errors_of_ghosts_stand_below_the_picture(
         opened.wait(f"{heights}.length === 2 && {heights}[1].every((height) => Math.abs(height - {at}) < 0.2)")
         assert set(opened.page.evaluate(heights)[0]) == {100}
         plot = part(opened, "errors").locator("svg")
-        assert plot.get_attribute("aria-label").endswith("at most 2 mm")
+        assert plot.get_attribute("aria-label").endswith("in place over time, logarithmic, at most 2 mm")
+        choice = part(opened, "errors").locator("select")
+        assert choice.locator("option").all_inner_texts() == ["place", "γ", "z", "energy"]
+        choice.select_option("energy")
+        opened.wait("document.querySelector('[data-part=errors] svg').ariaLabel.includes('energy')")
+        assert plot.get_attribute("aria-label").endswith("in energy over time, logarithmic, at most 0.02 J")
         plot.scroll_into_view_if_needed()
         box = plot.bounding_box()
         plot.click(position={"x": 0.75 * box["width"], "y": 0.5 * box["height"]})

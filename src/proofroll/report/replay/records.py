@@ -122,11 +122,13 @@ class ReplayKind(NamedTuple):
         name: name of the kind in the page's program.
         seen: largest invisible error of a position [m], as a function of the scene.
         draw: function that draws a truth and its ghosts.
+        readings: names and units of the coordinates listed beside the picture, as a function of the scene.
     """
 
     name: str
     seen: Callable[[Scene], float]
     draw: Drawer
+    readings: Callable[[Scene], list[tuple[str, str]]]
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,13 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.whole_turns import on_turns_of
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.summary import reported, runs_at
-from proofroll.report.labels import names
+from proofroll.report.labels import names, symbol, unit
 from proofroll.report.pages import packed
 from proofroll.report.replay.library import three
-from proofroll.report.replay.records import Ghost, Replay, ReplayCase, Replayed, ReplayedRun, ReplayKind
+from proofroll.report.replay.records import Ghost, PackedNumbers, Replay, ReplayCase, Replayed, ReplayedRun, ReplayKind
 from proofroll.report.styles import styles
 from proofroll.running.case import Status
 from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
@@ -24,6 +25,8 @@ LEAST_PER_SECOND, LEAST_FRAMES, MOST_FRAMES = 60, 120, 600
 # Turn of a body from one frame to the next [rad]: one that looks smooth, and the largest one, for beyond half a turn
 # interpolation goes the shorter, wrong way.
 SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
+# Most coordinates whose values are listed; rounding of a listed value, relative to its largest one.
+_MOST_READINGS, _ROUNDED = 6, 2.0**-20
 
 
 def replay_content(outcomes: list[Outcome], kind: ReplayKind, page_engines: Sequence[str] = ()) -> Replay:
@@ -92,6 +95,7 @@ def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]
     numbers, frames, drawn = kind.draw(replayed)
     furthest = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
     until, whole = numbers["until"], numbers["frames"]
+    readings = _readings(replayed, kind, np.linspace(0.0, until, whole), frames, drawn)
     runs = [
         ReplayedRun(name=replayed.solid, colour=-1, shown=True, frames=whole, message="", trajectory=replayed.file),
         *(
@@ -112,11 +116,38 @@ def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]
         label=replayed.label,
         kind=kind.name,
         scene=replayed.scene.title,
-        own=numbers,
+        own={**numbers, "readings": readings},
         runs=runs,
         arrays=drawn.arrays,
     )
     return case, packed(bytes(drawn.content))
+
+
+def _readings(
+    replayed: Replayed, kind: ReplayKind, times: FloatArray, counts: list[int], drawn: PackedNumbers
+) -> list[dict[str, object]]:
+    """Symbol, unit and size of each reading: coordinates of the kind, then the energy, as far as the truth has them.
+
+    Their values go to ``drawn`` as ``reading0``, …: of the truth at ``times`` [s], of each ghost at the first of its
+    count of frames, unless the ghost does not give it in full.
+    """
+    readings: list[dict[str, object]] = []
+    for name, text in [*kind.readings(replayed.scene)[:_MOST_READINGS], ("energy", "J")]:
+        if name not in replayed.true or not np.isfinite(values := replayed.true[name].to_numpy()).all():
+            continue
+        column = np.interp(times, replayed.true["time"], values)
+        size, packed_name = float(np.abs(column).max()), f"reading{len(readings)}"
+        readings.append({"symbol": symbol(name), "unit": unit(text), "size": size})
+        drawn.put(packed_name, 0, column, _ROUNDED * (size or 1.0))
+        for number, (ghost, count) in enumerate(zip(replayed.ghosts, counts, strict=True), start=1):
+            if name not in ghost.motion:
+                continue
+            run = ghost.motion[name].to_numpy()
+            shifted = on_turns_of(values[: len(run)], run, name, (replayed.true, ghost.motion))
+            if shifted is not None and np.isfinite(shifted).all():
+                column = np.interp(times[:count], ghost.motion["time"], shifted)
+                drawn.put(packed_name, number, column, _ROUNDED * (size or 1.0))
+    return readings
 
 
 def in_sight(off: npt.NDArray[np.bool_]) -> int | None:

@@ -14,8 +14,8 @@
     return element;
   };
 
-  let cases, library, shown, kind, time = 0, playing = false, last = 0, queued = false;
-  const strip = errorStrip(ui.errors, (to) => { stop(); go(to); });
+  let cases, library, shown, kind, readings = [], time = 0, playing = false, last = 0, queued = false;
+  const strip = errorStrip(ui.errors, (to) => { stop(); go(to); }, largest);
   let view = null, stage = null;         // the camera, and what is drawn; null until there is something
 
   // ---- numbers ----
@@ -69,15 +69,18 @@
   const fixed = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1").replace("-", "−") : "–");
   const digits = (size, least) => Math.max(0, least - 1 - Math.floor(Math.log10(Math.max(size, 1e-12))));
 
-  // The cells of the values of the truth, in the order of their names.
+  // Puts the values of the truth beside the picture: its readings, then what the kind of scene adds; returns the cells
+  // of the latter, in the order of their names.
   function values(names) {
-    ui.values.replaceChildren();
-    return names.map((name) => {
-      const cell = make("dd");
-      ui.values.append(make("dt", {}, name), cell);
-      return cell;
-    });
+    const cells = [...shown.readings.map(({ symbol }) => symbol), ...names].map((name) => [make("dt", {}, name), make("dd")]);
+    ui.values.replaceChildren(...cells.flat());
+    readings = cells.slice(0, shown.readings.length).map(([, cell]) => cell);
+    return cells.slice(shown.readings.length).map(([, cell]) => cell);
   }
+
+  // How far a run is from the truth now: in millimetres of place (`number` −1), or in the unit of a reading.
+  const away = (run, number) => (number < 0 ? 1000 * kind.compare(run, true).off
+    : run[`reading${number}`] ? Math.abs(smooth(run[`reading${number}`])[0] - smooth(shown.runs[0][`reading${number}`])[0]) : null);
 
   function rows() {
     const columns = kind.columns(), head = ({ name, unit, number, title }) => {
@@ -120,7 +123,11 @@
     ui.clock.textContent = `${time.toFixed(shown.until < 0.1 ? 5 : 3)} of ${Number(shown.until.toPrecision(6))} s`;
     if (document.activeElement !== ui.time || playing) ui.time.value = time;
     ui.time.setAttribute("aria-valuetext", `${time.toFixed(shown.until < 0.1 ? 5 : 3)} seconds`);
-    kind.write();
+    readings.forEach((cell, k) => {
+      const { unit, size } = shown.readings[k];
+      cell.textContent = `${fixed(smooth(shown.runs[0][`reading${k}`])[0], Math.min(6, digits(size || 1, 4)))} ${unit}`;
+    });
+    kind.write?.();
     strip.now(time);
     for (const line of document.querySelectorAll("[data-now]")) line.style.left = `${(100 * time) / shown.until}%`;
     for (const run of shown.runs.slice(1)) {
@@ -301,12 +308,18 @@
     kind = kinds[shown.kind];
     time = 0;
     rows();
-    const worst = strip.show(shown, (run, moment) => {
-      time = moment;
-      return there(run) ? kind.compare(run, true).off : null;
-    });
-    time = 0;
+    strip.choices(shown.readings);
     if (view) { build(); reset(); }
+    largest();
+  }
+
+  // Draws the errors of the quantity that is chosen, and goes to the largest one in sight.
+  function largest() {
+    const worst = strip.show(shown, (run, number, moment) => {
+      time = moment;
+      return there(run) ? away(run, number) : null;
+    });
+    stop();
     go(worst);
   }
 

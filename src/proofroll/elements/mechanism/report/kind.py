@@ -96,10 +96,10 @@ class MechanismReport(ReportKind):
     @staticmethod
     def replay() -> ReplayKind:
         """Replay of bodies and joints in motion."""
-        from proofroll.elements.mechanism.report.replay import draw_mechanism, seen
+        from proofroll.elements.mechanism.report.replay import draw_mechanism, readings, seen
         from proofroll.report.replay.records import ReplayKind
 
-        return ReplayKind("mechanism", seen, draw_mechanism)
+        return ReplayKind(name="mechanism", seen=seen, draw=draw_mechanism, readings=readings)
 
 
 def _reactions(element: MechanismElement, truth: xr.Dataset) -> list[Observable]:

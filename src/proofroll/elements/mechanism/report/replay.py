@@ -22,7 +22,6 @@ from proofroll.elements.mechanism.scene.joint_kinds import SLIDING, JointKind
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, DeclaredGeometry, Geometry
 from proofroll.elements.mechanism.scene.shapes.shapes import SphereShape, Wall
 from proofroll.files.json_data import plain
-from proofroll.report.labels import symbol, unit
 from proofroll.report.replay.records import SPEEDS, PackedNumbers, Replayed, present
 from proofroll.report.replay.replay import frame_times, in_sight
 
@@ -37,7 +36,6 @@ _LASTS = 4.0  # least duration of a replay [s]
 _TAIL = 0.15  # part of the motion over which a path is drawn
 _ASIDE = (0.3, 0.25)  # angles of the camera beside the drawing's view, to show depth [rad]
 _STEEPEST = 1.3  # of the camera above the horizon [rad]
-_MOST_READINGS = 6
 _MOTION = ("time", "p_WB", "v_WB", "w_WB", "q_WB")
 
 
@@ -67,9 +65,8 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
     ]
     signs = np.repeat([1.0] * (len(joints) - len(touching)) + [sign for *_, sign in touching], 3)
     names = [f"force.{name}.{axis}" for name, *_ in joints for axis in "xyz"]
-    readings = _readings(element)
     slips = [f"slip.{contact.name}" for contact in mechanism.contacts]
-    true = present(replayed.true, [*_MOTION, *names, *slips, *(name for name, _ in readings)])
+    true = present(replayed.true, [*_MOTION, *names, *slips])
     if not np.isfinite(true["p_WB"]).all():
         raise Refused("no true motion is known, so there is none to draw")
     fastest = float(np.linalg.norm(true["w_WB"], axis=-1).max())
@@ -89,8 +86,6 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
     )
     numbers.put("middle", -1, com.mean(axis=1), least)
     numbers.put("extent", 0, np.stack([reached.min(axis=0), reached.max(axis=0)]), least)
-    shown = _columns(true, [name for name, _ in readings], times)
-    numbers.put("readings", 0, shown, 2.0**-20 * (float(np.abs(shown).max(initial=0.0)) or 1.0))
     force = _columns(true, names, times) * signs
     largest = float(np.abs(force).max(initial=0.0))
     numbers.put("force", 0, force if largest else None, _ROUNDED * largest)
@@ -111,8 +106,6 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
         "off": "largest distance of a tracked point from the true one",
         "scale": _SCALE * length,
         "events": [],
-        "readings": [{"symbol": symbol(name), "unit": unit(text), "size": float(np.abs(shown[:, column]).max())}
-                     for column, (name, text) in enumerate(readings)],
         "bodies": [{"com": coms.get(name), "rods": rods.get(name, [])} for name in bodies],
         "joints": [{"body": index[body], "at": position} for _, body, position in joints],
         "contacts": len(touching),
@@ -210,12 +203,13 @@ def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatA
     return shape | {"wire": (geometry.radius or 0.0) / geometry.ring_radius} if geometry.ring_radius else shape
 
 
-def _readings(element: MechanismElement) -> list[tuple[str, str]]:
-    """Name and unit of the values listed beside the picture: of tracked points, then of joints."""
+def readings(scene: Scene) -> list[tuple[str, str]]:
+    """Names and units of the coordinates listed beside the picture: of tracked points, then of joints."""
+    element = the_mechanism(scene)
     points = [(f"{point.name}.{axis}", "m") for point in element.mechanism.points for axis in "xyz"]
     units = {JointKind.REVOLUTE: "rad", JointKind.PRISMATIC: "m"}
     joints = [(f"q.{joint.name}", units[joint.kind]) for joint in element.mechanism.joints if joint.kind in units]
-    return (points + joints)[:_MOST_READINGS]
+    return points + joints
 
 
 def _camera(element: MechanismElement) -> tuple[float, float]:

@@ -61,7 +61,7 @@ class BallReport(ReportKind):
     @staticmethod
     def replay() -> ReplayKind:
         """Drawing of balls on their wall in the replay."""
-        from proofroll.papers.blajer_2006.report.replay import draw_ball, seen
+        from proofroll.papers.blajer_2006.report.replay import draw_ball, readings, seen
         from proofroll.report.replay.records import ReplayKind
 
-        return ReplayKind("ball", seen, draw_ball)
+        return ReplayKind(name="ball", seen=seen, draw=draw_ball, readings=readings)

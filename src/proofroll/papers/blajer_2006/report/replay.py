@@ -18,7 +18,6 @@ from proofroll.files.json_data import plain
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.report.replay_wall import middle, wall
-from proofroll.report.labels import symbol, unit
 from proofroll.report.replay.records import PackedNumbers, Replayed, present
 from proofroll.report.replay.replay import frame_times, in_sight
 
@@ -147,6 +146,12 @@ def seen(scene: Scene) -> float:
     return _SEEN * rolling_ball(scene).ball.radius
 
 
+def readings(scene: Scene) -> list[tuple[str, str]]:
+    """Names and units of the coordinates listed beside the picture: those of the wall."""
+    surface = rolling_ball(scene).surface
+    return list(zip(surface.coordinates, surface.units, strict=True))
+
+
 def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
     """Drawing of a ball in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
     body = rolling_ball(replayed.scene)
@@ -162,7 +167,6 @@ def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumb
     numbers.put("points", -1, built.points.reshape(-1, 3), LENGTH)
     numbers.put("outward", -1, built.normals.reshape(-1, 3), TURN)
     numbers.put("middle", -1, middle(body, u), LENGTH)
-    numbers.put("coordinates", 0, u, LENGTH)
     numbers.put("contact", 0, true.contact, LENGTH)
     numbers.put("normal", 0, true.normal, TURN)
     numbers.put("friction", 0, true.friction, FORCE)
@@ -183,10 +187,6 @@ def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumb
         "off": "distance of its centre from the true ball's",
         "scale": body.ball.radius,
         "friction": plain({"static": contact.mu_static, "kinetic": contact.mu_kinetic}),
-        "coordinates": [
-            {"symbol": symbol(name), "unit": unit(text)}
-            for name, text in zip(coordinates, body.surface.units, strict=True)
-        ],
         "events": [{"kind": kind, "time": plain(time)} for kind, time in _events(sampled)],
         "wall": {"rows": len(built.points), "columns": built.points.shape[1], "lines": list(built.lines)},
     }

@@ -1,7 +1,7 @@
 // A mechanism in the replay: bodies as rods between their joints, shapes that touch, springs, tracked points, forces.
 replayed.mechanism = (replay) => {
-  const { ui, css, straight, smooth, fixed, digits, colour } = replay;
-  let cells, stage;
+  const { ui, css, straight, smooth, colour } = replay;
+  let stage;
 
   // ---- words ----
   const columns = () => [];
@@ -9,15 +9,7 @@ replayed.mechanism = (replay) => {
   function rows(notes) {
     const { shown } = replay;
     if (!shown.runs[0].force) notes.push("No reaction is determinate here, so none is drawn.");
-    cells = replay.values(shown.readings.map(({ symbol }) => symbol));
-  }
-
-  function write() {
-    const { shown } = replay, read = shown.runs[0].readings ? smooth(shown.runs[0].readings) : [];
-    read.forEach((value, k) => {
-      const { unit, size } = shown.readings[k];
-      cells[k].textContent = `${fixed(value, Math.min(6, digits(size || 1, 4)))} ${unit}`;
-    });
+    replay.values([]);
   }
 
   const compare = (run) => {
@@ -168,5 +160,5 @@ replayed.mechanism = (replay) => {
     return size > (falls ? 40 : 75) * scale ? Math.min(size, Math.max(30 * scale, 1.6 * widest)) : size;
   };
 
-  return { columns, rows, write, compare, build, draw, key, reach };
+  return { columns, rows, compare, build, draw, key, reach };
 };

@@ -26,14 +26,13 @@ replayed.ball = (replay) => {
       }
     }
     ui.strip.style.background = known ? `linear-gradient(90deg, ${stops.join(", ")}, ${stops.at(-1).split(" ")[0]} 100%)` : "";
-    cells = replay.values([...shown.coordinates.map(({ symbol }) => symbol), "N", "F", "F/N", "contact"]);
+    cells = replay.values(["N", "F", "F/N", "contact"]);
     meter = make("span", { class: "replay-meter", "aria-hidden": "true" }, make("i"), make("b"));
   }
 
   function write() {
-    const { shown } = replay, truth = shown.runs[0], u = smooth(truth.coordinates);
-    shown.coordinates.forEach(({ unit }, k) => { cells[k].textContent = `${fixed(u[k], 4)} ${unit}`; });
-    const [, , press, pull, ratio, contact] = cells;
+    const { shown } = replay, truth = shown.runs[0];
+    const [press, pull, ratio, contact] = cells;
     const { static: most, kinetic } = shown.friction;
     if (truth.press) {
       const N = straight(truth.press)[0], F = straight(truth.pull)[0], needed = F / N;
