@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import ENDED, ENDS, LAWS
 from proofroll.core.element import Element
-from proofroll.core.errors import Diverged, InputError
+from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.events import with_events
 from proofroll.core.heyoka_library import available
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
@@ -25,9 +25,12 @@ from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.motion import BallMotion
 from proofroll.papers.blajer_2006.ball.rolling_equations import closed_form
 from proofroll.papers.blajer_2006.truth import series
+from proofroll.papers.blajer_2006.truth.ball_laws import checked_motion
 from proofroll.papers.blajer_2006.truth.onset import edge_between, onset
 from proofroll.papers.blajer_2006.truth.rolling import reduced, unreduced
 from proofroll.truth import SAFETY
+from proofroll.truth.laws.check import sentence, verdict
+from proofroll.truth.laws.residuals import LawResiduals
 from proofroll.truth.plug_in import MechanismTruth
 
 if TYPE_CHECKING:
@@ -62,6 +65,7 @@ class BallOnSurfaceTruth:
 
         Raises:
             Diverged: a route could not be integrated, or a value is not finite.
+            Refused: a route violates a law from the start.
         """
         assert isinstance(element, MechanismElement)  # by ``covers``
         body, instants = ball_of(element), np.asarray(times, dtype=np.float64)
@@ -71,11 +75,15 @@ class BallOnSurfaceTruth:
         by_series = available() and (not body.contact.rolling_resistance or bool(body.udot0[0]))
         first_route, second_route = (series.reduced, series.unreduced) if by_series else (reduced, unreduced)
         with np.errstate(invalid="ignore", divide="ignore"):  # values that are not finite are refused by name below
-            exact = closed_form(body, instants)
-            first, second = exact or first_route(body, instants), second_route(body, instants)
+            exact = closed_form(body, instants) is not None
+            (first, first_laws), (second, second_laws) = (
+                checked_motion(element, body, route, instants, coarse=not (by_series or route is _exact))
+                for route in (_exact if exact else first_route, second_route)
+            )
             result, check = (_dataset(element, instants, route) for route in (first, second))
         _put_error_bars(result, check, _ROUND_OFF if exact or by_series else _SHARED)
         result.attrs |= {"route": first.route, "second_route": second.route}
+        result = _up_to_violation(result, {first.route: first_laws, second.route: second_laws})
         result = _with_orientation(result, element, times, asks) if "orientation" in asks else result
         return with_events(result, ())
 
@@ -147,6 +155,29 @@ def _put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None
         if large is not None:  # plus the round-off of the large variable
             difference += _ROUND_OFF * np.max(np.abs(result[large].to_numpy()), initial=0.0)
         values.attrs["error_bar"] = float(SAFETY * (difference + floor * np.max(np.abs(mine), initial=0.0)))
+
+
+def _exact(body: RollingBall, times: FloatArray) -> BallMotion:
+    """Closed form of a motion that has one."""
+    motion = closed_form(body, times)
+    assert motion is not None
+    return motion
+
+
+def _up_to_violation(dataset: xr.Dataset, checked: Mapping[str, LawResiduals]) -> xr.Dataset:
+    """The dataset with the outcome of its law check, up to the first violation.
+
+    Raises:
+        Refused: a law is violated from the start.
+    """
+    result = verdict(checked)
+    text = sentence(result, len(checked))
+    if result.violation is None:
+        return dataset.assign_attrs({LAWS: text} if text else {})
+    end = result.violation.time
+    if not end > float(dataset["time"][0]):
+        raise Refused(text)
+    return dataset.isel(time=slice(int((dataset["time"] < end).sum()))).assign_attrs({ENDS: end, ENDED: text})
 
 
 def _with_orientation(
