@@ -107,6 +107,9 @@ def test_without_a_report_no_option_is_blamed_that_was_not_given(proofroll: Proo
     [
         (["arm", "cart"], "has no such scene, comparison or group; the groups there are trees"),
         (["arm", "ball", "--measure"], "--measure"),
+        (["arm", "ball", "--lines"], "it is for one scene; name one of arm, ball"),
+        (["arm", "--lines", "--tolerance", "1e-9 of path"], "nothing that was measured holds the tolerance"),
+        (["arm", "--lines"], "alpha"),
         (["arm", "ball", "--engine", "nobody"], "nobody"),
         (["arm", "ball", "--tolerance", "1 kg"], "its unit is m"),
         (["arm", "ball", "--forces"], "motion and forces have different units; give a part"),
@@ -172,3 +175,14 @@ def test_a_kind_without_a_report_is_told_what_makes_one(proofroll: Proofroll, tm
         code, _, err = proofroll("recommend", name, "--out", str(tmp_path))
         assert code == 2
         assert f"report.json, which is not there; {command} makes it" in err
+
+
+def test_lines_of_a_choice_from_a_report(proofroll: Proofroll, tmp_path: Path) -> None:
+    """They are those of the engine that the report says to take, and nothing else is printed."""
+    mujoco = {"engine": "mujoco", "formulation": "joints", "preset": "tuned", "setting": "tuned", "step": 0.01}
+    made = {"environment": {"machine": "m", "versions": {}}, "date": "2026-01-01"}
+    table = LongTable([line(study="pendulum", scene="pendulum", error=1e-6, **mujoco)])
+    (tmp_path / "report.json").write_text(json.dumps(made | {"table": plain(table)}))
+    code, out, err = proofroll("recommend", "pendulum", "--lines", "--out", str(tmp_path))
+    assert (code, err) == (0, "")
+    assert out.startswith('<option timestep="0.01"')

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from proofroll.report.page.choice_matrix import ChoiceMatrix
     from proofroll.studies.tradeoff.claims import TradeoffClaims
     from proofroll.studies.tradeoff.curve import Question
-    from proofroll.studies.tradeoff.recommend import Recommendation
     from proofroll.studies.tradeoff.records import TradeoffStudy
 
+_NOTHING = "nothing that was measured holds the tolerance; without --lines the closest is told"
 # A part of the path, as the first screen of a report has it.
 _OF_PATH = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)\s*of\s+(?:the\s+)?path\s*")
 
@@ -56,7 +56,7 @@ def recommend(
     ] = False,
     lines: Annotated[
         bool,
-        typer.Option("--lines", help="Print only the lines that make the choice in a model of your own, from curves."),
+        typer.Option("--lines", help="Print only the lines that make the choice in a model of your own."),
     ] = False,
     forces: Annotated[bool, typer.Option("--forces", help="Forces count as the motion does; from a report.")] = False,
     every_setting: Annotated[
@@ -91,7 +91,6 @@ def recommend(
         "--over": over,
         "--until": until,
         "--measure": measure_first,
-        "--lines": lines,
     }
     asked = len(scenes) > 1 or forces or report is not None
     if asked or (not any(requirements.values()) and _is_in_report(scenes[0], report_file)):
@@ -102,7 +101,14 @@ def recommend(
 
         stored = EarlierReport.read(report or report_file, "--report" if report else "stored report")
         _from_report(
-            scenes, tolerance, engine or [], stored, forces=forces, every_setting=every_setting, as_json=as_json
+            scenes,
+            tolerance,
+            engine or [],
+            stored,
+            forces=forces,
+            every_setting=every_setting,
+            lines_alone=lines and not as_json,
+            as_json=as_json,
         )
     (scene,) = scenes
     _require_no_kind(scene, report_file)
@@ -125,32 +131,48 @@ def recommend(
     omitted = list(question.loaded.omitted) or None
     recommendation = replace(answered(study, required), not_measured=not_measured, omitted=omitted)
     if lines and not as_json:
-        typer.echo("\n".join(_own_lines(recommendation)))  # unbroken, as a program reads them
+        choice = recommendation.answer.choice
+        if choice is None:
+            raise ProofrollError(f"--lines: {_NOTHING}")
+        _print_lines(
+            choice.point.engine, {key: value for key, value in choice.point.settings.items() if value is not None}
+        )
     else:
         options.show(recommendation, as_json, lambda: answer_lines(recommendation), widest=WIDTH)
     raise typer.Exit(options.OK if recommendation.answer.choice and recommendation.affordable else options.CONTRADICTED)
 
 
-def _own_lines(recommendation: Recommendation) -> list[str]:
-    """Lines of the chosen engine's own file or program that make the settings of the choice.
+def _print_lines(name: str, settings: Mapping[str, Any]) -> None:
+    """Prints the lines of an engine's own file or program that make settings, unbroken, as a program reads them.
 
     Raises:
-        ProofrollError: nothing was chosen, or the engine's adapter tells no lines.
+        ProofrollError: the engine's adapter tells no lines.
     """
-    from proofroll.core.engine_abilities import TellsLines
-    from proofroll.core.errors import ProofrollError
-    from proofroll.core.plugins import load_engine, resolve_settings
+    from proofroll.report.page.model_lines import own_lines
 
-    choice = recommendation.answer.choice
-    if choice is None:
-        raise ProofrollError(
-            "--lines: nothing that was measured holds the tolerance; without --lines the closest is told"
-        )
-    engine = load_engine(choice.point.engine)
-    if not isinstance(engine, TellsLines):
-        raise ProofrollError(f"--lines: the adapter of {choice.point.engine} tells none")
-    options_set = {name: value for name, value in choice.point.settings.items() if value is not None}
-    return engine.lines(resolve_settings(engine, options_set))
+    try:
+        typer.echo("\n".join(own_lines(name, settings)))
+    except ProofrollError as error:
+        raise ProofrollError(f"--lines: {name}: {error}") from error
+
+
+def _spec_of_one(matrix: ChoiceMatrix, tolerance: float, *, forces: bool) -> str:
+    """Setting to take, as a command has it, in the one scene of a matrix.
+
+    Raises:
+        InputError: there are several scenes.
+        ProofrollError: nothing holds the tolerance.
+    """
+    from proofroll.report.page.answer import answer
+
+    single = [item for item in answer(matrix, tolerance, forces).columns if not item.column.whole]
+    if len(single) > 1:
+        names = ", ".join(item.column.name for item in single)
+        raise InputError("--lines", "given", f"it is for one scene; name one of {names}")
+    taken = single[0].taken
+    if taken is None or taken.run is None:
+        raise ProofrollError(f"--lines: {_NOTHING}")
+    return taken.run.spec
 
 
 def _require_no_kind(name: str, path: Path) -> None:
@@ -186,6 +208,7 @@ def _from_report(
     *,
     forces: bool,
     every_setting: bool,
+    lines_alone: bool,
     as_json: bool,
 ) -> NoReturn:
     """Prints advice for several scenes from a report's runs, and exits: 1 if in one nothing holds the tolerance."""
@@ -222,6 +245,12 @@ def _from_report(
         lines = [replace(line, scale=1.0) for line in lines if line.unit == unit or not line.quantity]
     part = bound.value
     matrix = choice_matrix(lines, studies, report.names)
+    if lines_alone:
+        from proofroll.core.plugins import parse_engine
+
+        setting = parse_engine(_spec_of_one(matrix, part, forces=forces))
+        _print_lines(setting.name, setting.options)
+        raise typer.Exit(options.OK)
     advised = advice(matrix, part, forces)
     costs = _engine_costs(matrix, part, forces=forces)
     durations = {line.scene: line.until for line in reversed(lines)}

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 from proofroll.core.engine_abilities import TellsLines
 from proofroll.core.errors import ProofrollError
@@ -58,14 +59,23 @@ def _sampled(run: Candidate) -> list[str]:
     return ["--every", f"{run.until / count:.12g}"]
 
 
+def own_lines(name: str, settings: Mapping[str, Any]) -> Sequence[str]:
+    """Lines of an engine's own file or program that make settings.
+
+    Raises:
+        ProofrollError: the engine is missing, or its adapter tells no lines.
+    """
+    engine = load_engine(name)
+    if not isinstance(engine, TellsLines):
+        raise ProofrollError("its adapter tells no lines for a model of your own")
+    return engine.lines(resolve_settings(engine, settings))
+
+
 @cache
 def _own(spec: str) -> tuple[Sequence[str], str]:
-    """Lines of an engine's own file or program that make its settings, or why there are none."""
+    """The same for ``name[key=value,…]``, or why there are none."""
     try:
         asked = parse_engine(spec)
-        engine = load_engine(asked.name)
-        if isinstance(engine, TellsLines):
-            return engine.lines(resolve_settings(engine, asked.options)), ""
+        return own_lines(asked.name, asked.options), ""
     except ProofrollError as error:
         return (), str(error)
-    return (), "its adapter tells no lines for a model of your own"
