@@ -38,7 +38,7 @@ def judge(
     robot: Annotated[
         Path | None, typer.Option(help="The robot file (URDF, MJCF) of a record with actions or efforts.")
     ] = None,
-    control: Annotated[Path | None, typer.Option(help="With --robot: the controller's file (.toml).")] = None,
+    control: Annotated[Path | None, typer.Option(help="With --robot: the controller's file (.toml), if any.")] = None,
     layout: Annotated[
         str, typer.Option("--as", help="With --robot: whose arrays: playground, isaaclab, isaacgym, legged_gym.")
     ] = "",
@@ -52,7 +52,7 @@ def judge(
     """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs.
 
     With --robot and --control: test a record of a robot layer by layer, without a simulation: instants from the rate,
-    observation from the state, action, target, effort, and in the air acceleration.
+    observation from the state, action, target, effort, and in the air acceleration; without --control the last alone.
     """
     from proofroll.core.errors import InputError
     from proofroll.files.trajectory_file import CSV, NETCDF, STORED
@@ -65,7 +65,7 @@ def judge(
     if robot is not None or control is not None:
         _judge_record(run, robot, control, _names(columns), layout, as_json=as_json)
     if layout:
-        raise InputError("--as", layout, "it is for the record of a robot: give --robot and --control, too")
+        raise InputError("--as", layout, "it is for the record of a robot: give --robot, too")
     from proofroll.files.scene_file import load_scene
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.studies.judging import judge as judging
@@ -129,13 +129,12 @@ def _names(columns: list[str] | None) -> dict[str, str]:
 def _judge_record(
     record: Path, robot: Path | None, control: Path | None, names: Mapping[str, str], layout: str, *, as_json: bool
 ) -> None:
-    """Judges a record of a robot under a controller, and exits."""
+    """Judges a record of a robot, and exits."""
     from proofroll.core.errors import InputError
     from proofroll.files.scene_sources import JudgesRecords, source_of
 
-    if robot is None or control is None:
-        lacking, present = ("--robot", control) if robot is None else ("--control", robot)
-        raise InputError(lacking, None, f"a record needs the robot and its controller; {present} is one of both")
+    if robot is None:
+        raise InputError("--robot", None, f"a record needs the robot beside its controller, {control}")
     source = source_of(str(robot))
     if source is None or not isinstance(source[0], JudgesRecords):
         raise InputError("--robot", robot, "give the path of a robot file, .urdf or .xml")

@@ -1,9 +1,10 @@
-"""Commands ``new``: write a working example of a scene, a comparison, or a package with an engine."""
+"""Commands ``new``: write a working example of a scene, a comparison, a package with an engine, or a probe."""
 
 from __future__ import annotations
 
 import keyword
 import re
+import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,10 +17,11 @@ from proofroll.core.errors import InputError
 if TYPE_CHECKING:
     from proofroll.core.scene import Scene
 
-new = typer.Typer(help="Write a working start: a scene, a comparison, or an engine.", no_args_is_help=True)
+new = typer.Typer(help="Write a working start: a scene, a comparison, an engine, or a probe.", no_args_is_help=True)
 Name = Annotated[str, typer.Argument(help="Its name: letters, digits and _; the folder or file is named so.")]
 _TEMPLATES = Path(__file__).parent / "templates"
 _ANOTHER = "choose another name"
+_LAYOUTS = {"mujoco": "playground", "isaaclab": "isaaclab"}  # program of a probe -> whose arrays its record has
 _EXAMPLE, _CLASS = "tree_euler", "TreeEuler"  # an engine of docs/examples, and its class
 
 
@@ -75,6 +77,43 @@ def engine(
     source = example.replace(_CLASS, names["Class"]).replace(f'"{_EXAMPLE}"', f'"{name}"')
     _write(folder / "src" / package / "__init__.py", source)
     _say(folder, f"pip install --editable {folder}", f"pytest {folder}")
+
+
+@new.command()
+def probe(
+    robot: Annotated[Path, typer.Argument(help="The robot file: URDF, or MJCF for mujoco.")],
+    program: Annotated[str, typer.Option("--for", help="Simulator that runs the script: mujoco or isaaclab.")],
+    base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
+) -> None:
+    """Write a script that records a tenth of a second of a robot in the air in your simulator, for `judge`."""
+    from proofroll.core.errors import require_known
+    from proofroll.files.scene_sources import StartsProbes, source_of
+
+    require_known("--for", program, _LAYOUTS, "there is no probe for it; choose from")
+    require_known("--base", base, ("fixed", "free"), "choose one of")
+    source = source_of(str(robot))
+    if source is None or not isinstance(source[0], StartsProbes):
+        raise InputError("robot", robot, "give the path of a robot file, .urdf or .xml")
+    start = source[0].probe_start(robot, free=base == "free")
+    if program == "isaaclab" and start.kind != "urdf":
+        raise InputError("robot", robot, "Isaac Lab reads a URDF; give the robot's, or --for mujoco")
+    name = f"probe_{re.sub('[^a-z0-9_]', '_', robot.stem.lower())}_{program}"
+    judge = f"proofroll judge {name}.npz --robot {shlex.quote(str(robot))} --as {_LAYOUTS[program]}"
+    rows = (
+        f"    {_quoted(joint)}: ({', '.join(f'{number:.6g}' for number in row)}),\n"
+        for joint, row in start.joints.items()
+    )
+    numbers = start.base and f"[{', '.join(f'{number:.9g}' for number in start.base)}]"
+    texts = {
+        "robot": _quoted(str(robot.resolve())),
+        "base": str(numbers),
+        "urdf": str(start.kind == "urdf"),
+        "joints": f"{{\n{''.join(rows)}}}",
+    }
+    file = _fresh(name, f"{name}.py")
+    template = _TEMPLATES / "probe" / f"{program}.py.txt"
+    _write(file, _filled(template, texts | {"name": name, "judge": judge}))
+    _say(file, f"python {file}", judge)
 
 
 def _fresh(name: str, path: str) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, runtime_checkable
@@ -111,19 +112,48 @@ class JudgesRecords(Protocol):
 
     @staticmethod
     def judge_record(
-        record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None, layout: str = ""
+        record: Path, robot: Path, control: Path | None, names: Mapping[str, str] | None = None, layout: str = ""
     ) -> JudgedRecord:
         """Judgement of the record in a CSV file, or in a file of arrays.
 
         Args:
             record: path of the record.
             robot: path of the file of the scene.
-            control: path of the controller's file.
+            control: path of the controller's file; None: there is none.
             names: column of the record -> its name here, perhaps with its unit, ``q.hip[deg]``.
             layout: program whose arrays the file has; empty: it has columns.
 
         Raises:
             InputError: a file is wrong, or they do not fit.
+        """
+
+
+@dataclass(frozen=True)
+class ProbeStart:
+    """Start of a robot that moves in the air under known efforts.
+
+    Attributes:
+        kind: ``urdf`` or ``mjcf``.
+        base: place [m] and quaternion, scalar first, of a base that floats, velocity of its origin [m/s] and angular
+            velocity [rad/s] in the world's axes, (13,); None: it is fixed.
+        joints: joint -> coordinate, rate, constant and swinging part of its effort, damping in the file.
+    """
+
+    kind: str
+    base: tuple[float, ...] | None
+    joints: Mapping[str, tuple[float, ...]]
+
+
+@runtime_checkable
+class StartsProbes(Protocol):
+    """Ability of a reader of robots that can move in the air in a simulator of the user."""
+
+    @staticmethod
+    def probe_start(path: Path, *, free: bool) -> ProbeStart:
+        """Start of a robot; ``free``: nothing holds the root of a URDF.
+
+        Raises:
+            InputError: the file is wrong, or the robot is none that a probe moves.
         """
 
 

@@ -81,12 +81,19 @@ class RobotScenes:
 
     @staticmethod
     def judge_record(
-        record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None, layout: str = ""
+        record: Path, robot: Path, control: Path | None, names: Mapping[str, str] | None = None, layout: str = ""
     ) -> Any:
         """See :class:`proofroll.files.scene_sources.JudgesRecords`."""
         from proofroll.robots.control.judge import judge_record
 
         return judge_record(record, robot, control, names, layout)
+
+    @staticmethod
+    def probe_start(path: Path, *, free: bool) -> Any:
+        """See :class:`proofroll.files.scene_sources.StartsProbes`."""
+        from proofroll.robots.control.probe_start import probe_start
+
+        return probe_start(path, free=free)
 
 
 def _parameters(file: RobotFile, robot: Robot) -> dict[str, ParameterRow]:

@@ -178,10 +178,9 @@ def test_broken_records(
 
 
 def test_robot_and_control_belong_together(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
-    """One of both without the other, or a file that is no robot, is one clear line."""
-    record, robot, control = files
+    """A controller without its robot, or a file that is no robot, is one clear line."""
+    record, _, control = files
     for asked, said in (
-        (["--robot", robot], "--control"),
         (["--control", control], "--robot"),
         (["--robot", control, "--control", control], "give the path of a robot file"),
     ):

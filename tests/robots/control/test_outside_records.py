@@ -231,7 +231,7 @@ def test_a_search_that_ran_out_of_time_decides_nothing(
     assert "not decided: off by" in out
     assert proofroll("judge", str(record), *legs, "--as", "isaaclab", "--map", "a=q.b")[0] == 2
     code, out, err = proofroll("judge", str(record), "pendulum", "--as", "isaaclab")
-    assert (code, "give --robot and --control" in " ".join(err.split())) == (2, True)
+    assert (code, "give --robot, too" in " ".join(err.split())) == (2, True)
 
 
 @pytest.mark.parametrize(

@@ -56,8 +56,10 @@ class ControlledScenes:
 
     endings: ClassVar[tuple[str, ...]] = ENDINGS
 
-    def __init__(self, control: Path) -> None:
-        self._path = control
+    def __init__(self, control: Path | None) -> None:
+        """``control``: file of the controller; None: there is none, for :meth:`of_record` alone."""
+        self._path = control or Path()
+        self._controlled = control is not None
 
     def content(self, path: Path) -> dict[str, Any]:
         """Title, source and parameters of the scene."""
@@ -93,7 +95,7 @@ class ControlledScenes:
         Raises:
             InputError: the controller has no rate, does not fit the robot, or the robot cannot be moved.
         """
-        controller = read_controller(self._path)
+        controller = read_controller(self._path) if self._controlled else Controller(rate=1.0)
         if controller.rate is None:
             advice = "mistakes of bookkeeping are found at a controller's instants; give the rate in Hz"
             raise InputError(f"{self._path}: rate", None, advice)

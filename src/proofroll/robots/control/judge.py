@@ -17,9 +17,12 @@ from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
 from proofroll.robots.control.columns import state_readings
 from proofroll.robots.control.controlled import ControlledScenes
+from proofroll.robots.control.differences import DIFFERENCES
 from proofroll.robots.control.layers import BETWEEN, record_layers
 from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
+
+_SAME_STEP = 1e-3  # part of the interval between rows by which the step of the program may differ from it
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class RecordJudgement:
     """Layers of a record.
 
     Attributes:
-        record, robot, control: files.
+        record, robot, control: files; an empty ``control``: there is none.
         base: ``free`` or ``fixed``, as the record has columns of a base or not.
         rows: number of times.
         step: mean interval between them [s].
@@ -101,42 +104,55 @@ def _found(layer: Layer) -> str:
 
 
 def judge_record(
-    record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None, layout: str = ""
+    record: Path, robot: Path, control: Path | None, names: Mapping[str, str] | None = None, layout: str = ""
 ) -> RecordJudgement:
     """Judges a record by layers, without a simulation; a robot whose record has columns of a base is free.
 
     Args:
         record: file of the record.
         robot: file of the robot.
-        control: file of its controller.
+        control: file of its controller; None: its efforts are known from the record alone.
         names: column of the record -> its name here, perhaps with its unit, ``q.hip[deg]``.
         layout: program whose arrays the record has (:data:`.LAYOUTS`); empty: it has columns.
 
     Raises:
         InputError: a file is wrong, or they do not fit.
     """
+    scenes = ControlledScenes(control)
+    law_of = ControlLaw.of if control else ControlLaw.of_efforts
+    stepwise = False
     if layout:
         if names:
             raise InputError("--map", ", ".join(names), f"--as {layout} names the arrays; leave one of both out")
-        arrays, scenes = read_arrays(record), ControlledScenes(control)
+        arrays = read_arrays(record)
         fixed_robot = scenes.of_record(robot, free=False).mechanism
         free = floats(arrays, layout, sum(joint.nq == 1 for joint in fixed_robot.joints))
         model = scenes.of_record(robot, free=free)
-        driven = ControlLaw.of(model.mechanism).joints
+        driven = law_of(model.mechanism).joints
         time, columns = columns_of(record, arrays, layout, model.mechanism, driven)
         eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
         digits = max(eps, default=0.0) / 2
         read = record_of(time, columns, record, digits=digits)
+        stepwise = "sim_dt" in arrays and bool(np.isclose(np.ravel(arrays["sim_dt"])[0], _step(read), rtol=_SAME_STEP))
     else:
         if record.suffix in ARRAYS:
             raise InputError("--as", "", f"say whose arrays these are: {', '.join(LAYOUTS)}")
         read = read_record(record, names or {})
         free = any(name.startswith("q_WB.") for name in read.columns)
-        model = ControlledScenes(control).of_record(robot, free=free)
-    law = ControlLaw.of(model.mechanism)
+        model = scenes.of_record(robot, free=free)
+    law = law_of(model.mechanism)
     law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
+    names_of_layers = DIFFERENCES if control else ()
     judged = [
-        (read, [*([state] if state else []), *record_layers(read, law, model.mechanism, grounded=model.grounded)])
+        (
+            read,
+            [
+                *([state] if state else []),
+                *record_layers(
+                    read, law, model.mechanism, grounded=model.grounded, names=names_of_layers, stepwise=stepwise
+                ),
+            ],
+        )
         for read, state in state_readings(read, law)
     ]
     # Of readings that explain the state alike, layers behind it tell the right one.
@@ -144,7 +160,7 @@ def judge_record(
     return RecordJudgement(
         record=str(record),
         robot=str(robot),
-        control=str(control),
+        control=str(control or ""),
         base="free" if free else "fixed",
         rows=len(read.time),
         step=_step(read),

@@ -54,7 +54,15 @@ _ROUNDINGS, _SAFETY = 6, 3.0
 _HELPS = 0.1
 
 
-def record_layers(record: ControlRecord, law: ControlLaw, mechanism: Mechanism, *, grounded: bool) -> list[Layer]:
+def record_layers(
+    record: ControlRecord,
+    law: ControlLaw,
+    mechanism: Mechanism,
+    *,
+    grounded: bool,
+    names: Collection[str] = DIFFERENCES,
+    stepwise: bool = False,
+) -> list[Layer]:
     """All layers of a record, with causes at those that do not hold.
 
     Args:
@@ -62,11 +70,13 @@ def record_layers(record: ControlRecord, law: ControlLaw, mechanism: Mechanism, 
         law: the law as it should be.
         mechanism: the robot.
         grounded: True if something else than servos and gravity acts on the robot.
+        names: of the layers before that of accelerations.
+        stepwise: True if the program has no steps between the rows.
     """
     evidence = _Evidence(record, law, mechanism)
     layers: list[Layer] = []
     time = SearchTime(SEARCH_TIME)
-    for name in DIFFERENCES:
+    for name in names:
         layer = _layer(name, evidence)
         if not layer.holds:
             skipped = {item.name for item in layers if item.residual is None}
@@ -79,7 +89,7 @@ def record_layers(record: ControlRecord, law: ControlLaw, mechanism: Mechanism, 
         layers.append(Layer("acceleration", reason="the robot touches the ground, whose forces no record has"))
         return layers
     lacking = {layer.name for layer in layers if layer.residual is None}
-    layers.append(_in_air(evidence, layers))
+    layers.append(_in_air(evidence, layers, stepwise=stepwise))
     if all(layer.holds for layer in layers) and lacking & {"target", "effort"}:
         layers.append(motion_layer(record, law, mechanism, lambda part: _fit_by_law(part, evidence), time))
     return layers
@@ -121,7 +131,7 @@ def _layer(name: str, evidence: _Evidence) -> Layer:
     )
 
 
-def _in_air(evidence: _Evidence, layers: Sequence[Layer]) -> Layer:
+def _in_air(evidence: _Evidence, layers: Sequence[Layer], *, stepwise: bool) -> Layer:
     """Layer of accelerations, from recorded efforts."""
     record, law = evidence.record, evidence.law
     efforts = record.stacked("effort", law.joints)
@@ -130,9 +140,11 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer]) -> Layer:
     fit = acceleration_fit(record, law, evidence.mechanism, efforts, held_rows(record, law))
     if isinstance(fit, str):
         return Layer("acceleration", reason=fit)
+    fit = dataclasses.replace(fit, between=fit.between and not stepwise)
     if fit.between and fit.off > _STEPS:
         off = f"the forces are off by {error(fit.off)} of the largest, and no cause is known"
         return Layer("acceleration", reason=f"{off}; steps between the rows may explain it: log every step to decide")
+    implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
     holds = (fit.off <= fit.bar and not fit.causes) or fit.between
     earlier = next((layer.name for layer in layers if not layer.holds), "")
     return Layer(
@@ -140,7 +152,7 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer]) -> Layer:
         residual=fit.off,
         bar=max(fit.off, fit.bar) if holds else min(fit.bar, 0.99 * fit.off),
         column="the forces",
-        reason=IMPLICIT if fit.imitated else BETWEEN if fit.between else "",
+        reason=implicit if fit.imitated else BETWEEN if fit.between else "",
         causes=fit.causes,
         tried=0 if earlier else fit.tried,
     )

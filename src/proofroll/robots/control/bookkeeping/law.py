@@ -139,13 +139,7 @@ class ControlLaw:
         geared = next((item for item in servos if item.gear != 1), None)
         if geared is not None:
             raise InputError(f"actuators.{geared.name}.gear", geared.gear, "give gains and targets at the joint")
-        joints = tuple(item.joint for item in servos)
-        of_joint = {joint.name: joint.armature for joint in mechanism.joints}
-        size = float(np.linalg.norm(mechanism.gravity))
-        base = next((joint.child for joint in mechanism.joints if joint.kind == JointKind.FREE), None)
-        centre = np.zeros(3) if base is None else np.array(mechanism.bodies[mechanism.body_index[base]].com)
-        return cls(
-            joints=joints,
+        return cls._servoed(mechanism, tuple(item.joint for item in servos)).change(
             rate=control.rate,
             delay=control.delay,
             scale=control.scale,
@@ -153,13 +147,43 @@ class ControlLaw:
             kp=np.array([item.kp for item in servos]),
             kd=np.array([item.kd for item in servos]),
             limit=np.array([item.bound for item in servos]),
-            armature=np.array([of_joint[joint] for joint in joints]),
             policy=control.policy,
             targets=tuple(item.target for item in servos),
+            hold_effort=control.held == EFFORT,
+        )
+
+    @classmethod
+    def of_efforts(cls, mechanism: Mechanism) -> ControlLaw:
+        """Law of a record whose efforts no file tells: no gains but the joints' own damping, no targets, no limits.
+
+        A program may take that damping at the velocity after a step, as it may the kd of a servo.
+        """
+        single = [joint for joint in mechanism.joints if joint.nq == 1]
+        law = cls._servoed(mechanism, tuple(joint.name for joint in single))
+        return law.change(kd=np.array([joint.damping for joint in single]))
+
+    @classmethod
+    def _servoed(cls, mechanism: Mechanism, joints: tuple[str, ...]) -> ControlLaw:
+        """Law of joints of a mechanism without gains, targets and limits."""
+        armature = {joint.name: joint.armature for joint in mechanism.joints}
+        size = float(np.linalg.norm(mechanism.gravity))
+        base = next((joint.child for joint in mechanism.joints if joint.kind == JointKind.FREE), None)
+        zeros = np.zeros(len(joints))
+        return cls(
+            joints=joints,
+            rate=1.0,
+            delay=0,
+            scale=1.0,
+            pose=zeros,
+            kp=zeros,
+            kd=zeros,
+            limit=np.full(len(joints), math.inf),
+            armature=np.array([armature[joint] for joint in joints]),
+            policy=None,
+            targets=(0.0,) * len(joints),
             down=np.array(mechanism.gravity) / (size or 1.0),
             signs=np.ones(len(joints)),
-            centre=centre,
-            hold_effort=control.held == EFFORT,
+            centre=np.zeros(3) if base is None else np.array(mechanism.bodies[mechanism.body_index[base]].com),
         )
 
     def change(self, **changes: object) -> ControlLaw:
