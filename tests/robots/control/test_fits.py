@@ -8,22 +8,30 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.robots.control.fits import ServoRows, servo_causes
+from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes
 
 KP, KD, LIMIT = np.array([30.0, 40.0, 50.0]), np.array([0.5, 0.6, 0.7]), 20.0
 TIMES = np.linspace(0.0, 1.0, 60)
 
 
-def law() -> Any:
+def law(limit: float = LIMIT) -> Any:
     """Servos of three joints as they should be."""
 
     def effort(target: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        return np.clip(KP * (target - q) - KD * v, -LIMIT, LIMIT)
+        return np.clip(KP * (target - q) - KD * v, -limit, limit)
 
-    return SimpleNamespace(joints=("a", "b", "c"), kp=KP, kd=KD, limit=np.full(3, LIMIT), effort=effort)
+    return SimpleNamespace(joints=("a", "b", "c"), kp=KP, kd=KD, limit=np.full(3, limit), effort=effort)
 
 
-def rows(kp: np.ndarray, *, limit: float = LIMIT, resting: bool = False, steps: bool = False) -> ServoRows:
+def rows(
+    kp: np.ndarray,
+    *,
+    kd: np.ndarray = KD,
+    limit: float = LIMIT,
+    resting: bool = False,
+    steps: bool = False,
+    digits: int = 17,
+) -> ServoRows:
     """Rows of servos with other gains or another limit; the last joint may rest, and efforts may have few levels."""
     q = np.stack([np.sin(7 * TIMES), np.cos(5 * TIMES), np.sin(3 * TIMES) ** 2], axis=1)
     v = np.stack([7 * np.cos(7 * TIMES), -5 * np.sin(5 * TIMES), 3 * np.sin(6 * TIMES)], axis=1)
@@ -33,12 +41,13 @@ def rows(kp: np.ndarray, *, limit: float = LIMIT, resting: bool = False, steps: 
     if steps:
         q[:, 0], v[:, 0] = np.round(q[:, 0], 1), np.round(v[:, 0], 0)
         target[:, 0] = q[:, 0] + 0.1 * np.sign(np.cos(11 * TIMES))
-    return ServoRows(target=target, q=q, v=v, effort=np.clip(kp * (target - q) - KD * v, -limit, limit))
+    effort = np.round(np.clip(kp * (target - q) - kd * v, -limit, limit), digits)
+    return ServoRows(target=target, q=q, v=v, effort=effort)
 
 
-def told(changed: ServoRows) -> list[str]:
+def told(changed: ServoRows, most: float = 1e-6, limit: float = LIMIT) -> list[str]:
     """Clauses on the servos of these rows."""
-    return [cause.sentence for _, cause in servo_causes(changed, law(), 1e-6) if cause.id == "servo"]
+    return [cause.sentence for _, cause in servo_causes(changed, law(limit), most) if cause.id == "servo"]
 
 
 @pytest.mark.parametrize("resting", [False, True])
@@ -55,3 +64,28 @@ def test_efforts_that_repeat_are_no_limit() -> None:
 def test_a_limit_that_efforts_reach_is_told() -> None:
     """Where efforts stay at their ends, the limit is that of the ends."""
     assert told(rows(KP, limit=5.0)) == ["the limit of efforts is 0.25 of the right one"]
+
+
+def test_the_digits_of_a_record_say_what_is_a_difference() -> None:
+    """Half a thousandth of a gain is told where all digits are there, and not where two decimals are."""
+    assert told(rows(KP * [1.0005, 1.0, 1.0])) == ["kp is another: a 1.0005 of the right one"]
+    assert told(rows(KP * [1.3, 1.0, 1.0], kd=KD * [1.002, 1.0, 1.0], digits=1), 1e-2) == [
+        "kp is another: a 1.3 of the right one"
+    ]
+
+
+def test_gains_that_are_halved_are_not_the_efforts() -> None:
+    """Both gains of a half are told; efforts are named beside them only where no limit tells the two apart."""
+    assert told(rows(KP / 2, kd=KD / 2)) == ["kp and kd are both, or efforts are, 0.5 of the right ones"]
+    largest = float(np.abs(rows(KP / 2, kd=KD / 2).effort).max())
+    assert told(rows(KP / 2, kd=KD / 2), limit=1.1 * largest) == ["kp and kd are both 0.5 of the right ones"]
+
+
+def test_a_constant_that_is_added_is_no_size() -> None:
+    """A constant that is added to a column that hardly varies is named as one."""
+    right = 9.8 + 0.01 * np.sin(np.stack([TIMES, 3 * TIMES], axis=1))
+    difference = np.tile([0.5, 0.0], (len(TIMES), 1))
+    recorded = right + difference
+    causes = observation_causes(("x", "y"), recorded, difference, np.abs(recorded).max(axis=0), 1e-3)
+    best = min((cause for _, cause in causes), key=lambda cause: cause.after)
+    assert (best.id, best.sentence) == ("observed_offset", "parts are observed with a constant added: x 0.5")

@@ -16,6 +16,7 @@ from outside_records import (
     MISWRITTEN,
     OBSERVED,
     PROGRAMS,
+    SCALE,
     Loop,
     columns_of,
     miswritten,
@@ -140,6 +141,37 @@ def test_a_mistake_of_columns_accuses_nothing_else(name: str, judged: Judged) ->
     wrong = [item for item in judgement.layers if not item.holds and item.name != "acceleration"]
     assert [item.name for item in wrong] == [layer]
     assert wrong[0].causes[0].sentence.startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("columns_of_actions", "words"),
+    [("scaled", "have the scale of the controller already"), ("late", "are one instant")],
+)
+def test_columns_of_actions_do_not_accuse_the_last_one(columns_of_actions: str, words: str, judged: Judged) -> None:
+    """Where columns of actions are wrong and the observed last action is right, the columns are named, once."""
+    record = Loop().record(PROGRAMS["pinocchio"])
+    last = np.concatenate([np.zeros((20, 6)), record["action"][:-20]])
+    wrong = last if columns_of_actions == "late" else SCALE * record["action"]
+    judgement = judged(columns_of({**record, "observed.last": last, "action": wrong}))
+    causes = [cause.sentence for layer in judgement.layers if not layer.holds for cause in layer.causes]
+    assert len(causes) == 1
+    assert words in causes[0]
+
+
+def test_late_targets_at_times_of_four_digits(legs: list[str], judged: Judged, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Instants that are written to a part of a step belong to the targets of an instant before."""
+    monkeypatch.setattr("outside_records.RATE", 75)
+    Path(legs[3]).write_text(CONTROL.replace("rate = 50", "rate = 75\ndelay = 1"))
+    columns = columns_of(Loop(step=1 / 1500, late=1).record(PROGRAMS["pinocchio"]))
+    columns["time"] = np.array([float(f"{time:.4g}") for time in columns["time"]])
+    judgement = judged(columns)
+    assert judgement.agrees, "\n".join(judgement.lines())
+
+
+def test_digits_that_show_no_force_decide_nothing(judged: Judged) -> None:
+    """Accelerations whose rounding is larger than all forces are not judged."""
+    layer = judged(recorded("no gravity"), "1").layers[-1]
+    assert (layer.residual, layer.reason) == (None, "the rounding of the record is larger than the forces")
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

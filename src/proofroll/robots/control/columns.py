@@ -89,6 +89,19 @@ def state_readings(record: ControlRecord, law: ControlLaw) -> list[StateReading]
     return [StateReading(reading.record, _layer(reading)) for reading in readings]
 
 
+def reading_in_degrees(record: ControlRecord) -> StateReading | None:
+    """Record with joints in degrees and degrees per second, which no integral shows; None: no angle passes a turn."""
+    places = {name: np.abs(item) for name, item in record.columns.items() if name.startswith("q.")}
+    column = max(places, key=lambda name: float(places[name].max()), default="")
+    if not column or places[column].max() <= 2 * np.pi:
+        return None
+    largest = float(places[column].max())
+    words = "q.JOINT and v.JOINT are in degrees: name them q.JOINT[deg] and v.JOINT[deg/s]"
+    cause = LayerCause("degrees", f"{words} (all other layers hold with that)", _DEGREE, 0.0)
+    layer = Layer("state", (1 - _DEGREE) * largest, float(record.rounding[column].max()), column, causes=(cause,))
+    return StateReading(_after(_scaled("q.", _DEGREE), _scaled("v.", _DEGREE))(record), layer)
+
+
 def _explained(
     reading: _Reading, name: str, measured: Callable[[ControlRecord], _Off | None], known: Sequence[ColumnMistake]
 ) -> list[_Reading]:
@@ -189,6 +202,7 @@ def _of_spins() -> Iterator[ColumnMistake]:
 
 
 def _of_velocities(law: ControlLaw) -> Iterator[ColumnMistake]:
+    yield ColumnMistake("late", "v_WB is one row late", _sooner("v_WB."))
     yield ColumnMistake("base_axes", "v_WB is along the axes of the base: name it v_WB_B", _along_base("v_WB"))
     if law.centre.any():
         at_centre = "v_WB is the velocity of the base's centre of mass, not of its origin"
@@ -199,30 +213,17 @@ def _of_velocities(law: ControlLaw) -> Iterator[ColumnMistake]:
 
 def action_mistakes(law: ControlLaw, instants: Array) -> Iterator[ColumnMistake]:
     """Mistakes of the columns of actions; ``instants``: rows at which the controller acts."""
-    pose = dict(zip(law.joints, law.pose.tolist(), strict=True))
+    pose = {f"action.{joint}": place for joint, place in zip(law.joints, law.pose.tolist(), strict=True)}
 
-    def scaled(name: str, values: Array, offset: float) -> Array:
-        return np.asarray((values - offset * pose.get(name.removeprefix("action."), 0.0)) / law.scale)
+    def from_pose(record: ControlRecord) -> ControlRecord:
+        columns = {name: item - pose.get(name, 0.0) for name, item in record.columns.items()}
+        return ControlRecord(record.path, columns, record.rounding, record.time)
 
-    def of_actions(change: Callable[[str, Array], Array]) -> Changed:
-        def changed(record: ControlRecord) -> ControlRecord:
-            columns = {
-                name: change(name, item) if name.startswith("action.") else item
-                for name, item in record.columns.items()
-            }
-            factor = np.abs(1 / law.scale)
-            rounding = {
-                name: item * (factor if name.startswith("action.") else 1.0) for name, item in record.rounding.items()
-            }
-            return ControlRecord(record.path, columns, rounding, record.time)
-
-        return changed
-
+    scaled = _scaled("action.", 1 / law.scale)
     if law.scale != 1:
-        words = "the columns of actions have the scale of the controller already"
-        yield ColumnMistake("scaled_action", words, of_actions(lambda name, item: scaled(name, item, 0.0)))
+        yield ColumnMistake("scaled_action", "the columns of actions have the scale of the controller already", scaled)
     words = "the columns of actions are targets, the default pose and the scale included"
-    yield ColumnMistake("action_target", words, of_actions(lambda name, item: scaled(name, item, 1.0)))
+    yield ColumnMistake("action_target", words, _after(from_pose, scaled))
 
     def sooner(record: ControlRecord) -> ControlRecord:
         """The record up to its last instant, with the actions of the next one."""
@@ -311,6 +312,18 @@ def _scaled(start: str, factor: float) -> Changed:
     def changed(record: ControlRecord) -> ControlRecord:
         rounding = {name: np.abs(item) for name, item in scaled(record.rounding).items()}
         return ControlRecord(record.path, scaled(record.columns), rounding, record.time)
+
+    return changed
+
+
+def _sooner(start: str) -> Changed:
+    """Change of columns that are one row late; the last row, for which there is none, goes."""
+
+    def changed(record: ControlRecord) -> ControlRecord:
+        rows: Any = np.arange(len(record.time) - 1)
+        part = record.part(rows)
+        later = {name: item[1:] for name, item in record.columns.items() if name.startswith(start)}
+        return ControlRecord(record.path, {**part.columns, **later}, part.rounding, part.time)
 
     return changed
 

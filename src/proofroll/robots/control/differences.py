@@ -17,6 +17,7 @@ from proofroll.robots.model import Array
 # Least residual that counts, in parts of the largest number of its column: round-off of a sum of some terms.
 ROUND_OFF = 1e-9
 SAME_TIME = 1e-6  # part of the time between instants that is round-off
+_NEAR = 0.1  # part of it by which an instant may be off and is the same
 
 
 @dataclass(frozen=True)
@@ -42,14 +43,14 @@ def _compared(columns: list[str], time: Array, recorded: Array, computed: Array)
     )
 
 
-def _told(record: ControlRecord) -> list[str]:
+def _of_instants(record: ControlRecord) -> list[str]:
     """Columns that change at instants."""
     return [name for name in record.columns if name.startswith(("action.", "target."))]
 
 
 def instant_rows(record: ControlRecord, law: ControlLaw) -> Any:
     """Rows at which a record's action or target changes, and the first row if an instant can lie there."""
-    names = _told(record)
+    names = _of_instants(record)
     if not names:
         near = np.abs(record.time * law.rate - np.round(record.time * law.rate)) < SAME_TIME
         return np.flatnonzero(near)
@@ -83,7 +84,7 @@ def due_rows(record: ControlRecord, law: ControlLaw) -> Any:
 
 
 def _instants(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
-    if not _told(record):
+    if not _of_instants(record):
         return "the record has no columns action.JOINT or target.JOINT, which change at instants"
     time = record.time[instant_rows(record, law)]
     if len(time) < 2:
@@ -116,7 +117,7 @@ def at_instants(record: ControlRecord, law: ControlLaw) -> ControlRecord:
 def held_rows(record: ControlRecord, law: ControlLaw) -> Any:
     """True at rows at which no action or target changes."""
     mask = np.ones(len(record.time), bool)
-    if _told(record) or law.policy is not None:
+    if _of_instants(record) or law.policy is not None:
         mask[instant_rows(record, law)[1:]] = False
     return mask
 
@@ -192,17 +193,24 @@ def _actions(record: ControlRecord, law: ControlLaw) -> Array | str:
     return np.array(actions)
 
 
+def _of_joints(
+    kind: str, record: ControlRecord, law: ControlLaw, recorded: Array, computed: Array | str, counts: Any = True
+) -> LayerDifferences | str:
+    """Differences of ``kind.JOINT`` at the rows that count and are computed, or the reason why none is."""
+    if isinstance(computed, str):
+        return computed
+    rows = counts & np.isfinite(computed).all(axis=1)
+    return _compared([f"{kind}.{name}" for name in law.joints], record.time[rows], recorded[rows], computed[rows])
+
+
 def _action(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
     record = at_instants(record, law)
     recorded = record.stacked("action", law.joints)
     if law.policy is None or recorded is None:
         return "the controller has no policy" if law.policy is None else "the record has no columns action.JOINT"
-    computed = _actions(record, law)
-    if isinstance(computed, str):
-        return computed
-    columns = [f"action.{name}" for name in law.joints]
-    late = int(record.time[0] != 0 and f"{OBSERVED}.last.{law.joints[0]}" not in record.columns)
-    return _compared(columns, record.time[late:], recorded[late:], computed[late:])
+    counts = np.ones(len(record.time), bool)
+    counts[:1] = record.time[0] == 0 or f"{OBSERVED}.last.{law.joints[0]}" in record.columns
+    return _of_joints("action", record, law, recorded, _actions(record, law), counts)
 
 
 def _targets(record: ControlRecord, law: ControlLaw) -> Array | str:
@@ -223,8 +231,8 @@ def _targets(record: ControlRecord, law: ControlLaw) -> Array | str:
 
 def sources(record: ControlRecord, law: ControlLaw) -> Any:
     """Instant of a record of instants whose action acts at each of them; -1: one before the record."""
-    # An action that equals the one before has no row of its own.
-    return np.searchsorted(record.time, record.time - (law.delay - SAME_TIME) / law.rate, side="right") - 1
+    # An action that equals the one before has no row of its own; times of few digits are off by a part of a step.
+    return np.searchsorted(record.time, record.time - (law.delay - _NEAR) / law.rate, side="right") - 1
 
 
 def _target(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
@@ -232,13 +240,9 @@ def _target(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
     recorded = record.stacked("target", law.joints)
     if recorded is None:
         return "the record has no columns target.JOINT"
-    computed = _targets(record, law)
-    if isinstance(computed, str):
-        return computed
     late = record.time - record.time[0] > (law.delay - 0.5) / law.rate
     counts = np.ones(len(late), bool) if record.time[0] == 0 else late
-    columns = [f"target.{name}" for name in law.joints]
-    return _compared(columns, record.time[counts], recorded[counts], computed[counts])
+    return _of_joints("target", record, law, recorded, _targets(record, law), counts)
 
 
 def efforts_of(record: ControlRecord, law: ControlLaw) -> Array | str:
@@ -260,7 +264,7 @@ def servo_rows(record: ControlRecord, law: ControlLaw) -> tuple[Array, Array, Ar
     target, rows, instants = record.stacked("target", law.joints), np.arange(len(q)), instant_rows(record, law)
     places = np.searchsorted(instants, rows, side="right") - 1
     if target is None:
-        if record.time[0] != 0 or (law.policy is None and not _told(record) and not len(instants)):
+        if record.time[0] != 0 or (law.policy is None and not _of_instants(record) and not len(instants)):
             return "the record has no columns target.JOINT"
         computed = _targets(at_instants(record, law), law)
         if isinstance(computed, str):
@@ -275,12 +279,7 @@ def _effort(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
     recorded = record.stacked("effort", law.joints)
     if recorded is None:
         return "the record has no columns effort.JOINT"
-    computed = efforts_of(record, law)
-    if isinstance(computed, str):
-        return computed
-    rows = np.isfinite(computed).all(axis=1)
-    columns = [f"effort.{name}" for name in law.joints]
-    return _compared(columns, record.time[rows], recorded[rows], computed[rows])
+    return _of_joints("effort", record, law, recorded, efforts_of(record, law))
 
 
 # Layer -> its differences, or the reason why there are none.

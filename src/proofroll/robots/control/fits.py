@@ -17,6 +17,8 @@ Flags = NDArray[np.bool_]
 _ROWS = 2  # rows for each number of a joint at least
 _SAME = 1e-3  # relative difference of two numbers of joints that are told as one, and least one that is told
 _SMALL = 1e-9  # part of a column that is round-off
+_LEAST = 1e-6  # relative difference of a number of a servo that is told, where the record is as sharp
+_SAFETY = 5.0  # on the errors of fitted numbers
 _RANK = 1e-4  # least part of the inputs of a servo along which they vary, for its numbers to be known
 
 
@@ -38,7 +40,7 @@ class ServoRows:
 def observation_causes(
     columns: Sequence[str], recorded: Array, difference: Array, sizes: Array, most: float
 ) -> Iterator[tuple[int, LayerCause]]:
-    """Columns of an observation that are each a part of the right ones, with their number.
+    """Columns of an observation that are each a part of the right ones, or differ by a constant, with their number.
 
     Args:
         columns: their names.
@@ -50,11 +52,16 @@ def observation_causes(
     right = recorded - difference
     squares = (right**2).sum(axis=0)
     factors = np.where(squares > 0, (right * recorded).sum(axis=0) / np.where(squares > 0, squares, 1.0), 1.0)
-    residual = float((np.abs(recorded - factors * right) / sizes).max())
     wrong_columns = np.asarray((np.abs(difference) > most * sizes).any(axis=0), bool)
-    if residual <= most and len(recorded) > _ROWS:
-        words = f"parts are observed at another size: {_listed(factors, wrong_columns, columns, ' of the right one')}"
-        yield int(wrong_columns.sum()), LayerCause("observed_size", words, None, residual)
+    added = difference.mean(axis=0)
+    for name, words, explained, numbers, unit in (
+        ("observed_size", "parts are observed at another size: ", factors * right, factors, " of the right one"),
+        ("observed_offset", "parts are observed with a constant added: ", right + added, added, ""),
+    ):
+        residual = float((np.abs(recorded - explained) / sizes).max())
+        if residual <= most and len(recorded) > _ROWS:  # of a column that hardly varies, what leaves less goes before
+            listed = _listed(numbers, wrong_columns, columns, unit)
+            yield int(wrong_columns.sum()), LayerCause(name, words + listed, None, residual)
 
 
 def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tuple[int, LayerCause]]:
@@ -77,7 +84,8 @@ def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tupl
         if (after := left(right[:, order])) <= most:
             yield 0, LayerCause("effort_order", f"efforts are of joints in another order ({words})", None, after)
     fit = _ServoFit.of(rows, law, np.asarray((np.abs(right - rows.effort) > most * sizes).any(axis=0), bool), most)
-    if fit is not None and (after := left(fit.efforts(rows))) <= most and (clauses := fit.clauses(law)):
+    clauses = [] if fit is None else fit.clauses(law, lambda size: left(size * right) <= most)
+    if fit is not None and clauses and (after := left(fit.efforts(rows))) <= most:
         size = fit.size if len(clauses) == 1 else None
         yield len(clauses), LayerCause("servo", "; ".join(clauses), size, after)
 
@@ -86,7 +94,8 @@ def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tupl
 class _ServoFit:
     """Servos whose numbers were fitted, each (joints,): effort = bias + clamped(kp (target - q) - kd v).
 
-    ``other``: joints whose efforts are not the law's; the numbers of the rest are the law's.
+    ``other``: joints whose efforts are not the law's; the numbers of the rest are the law's. ``bars``: of the gains and
+    the bias, (3, joints).
     """
 
     other: Flags
@@ -94,6 +103,7 @@ class _ServoFit:
     kd: Array
     bias: Array
     limit: Array
+    bars: Array
     size: float | None = None
 
     @classmethod
@@ -107,7 +117,12 @@ class _ServoFit:
             most: largest difference that a fit may leave, in parts of the largest effort of each joint.
         """
         fit = cls(
-            other=other, kp=law.kp.copy(), kd=law.kd.copy(), bias=np.zeros(len(other)), limit=np.array(law.limit, float)
+            other=other,
+            kp=law.kp.copy(),
+            kd=law.kd.copy(),
+            bias=np.zeros(len(other)),
+            limit=np.array(law.limit, float),
+            bars=np.zeros((3, len(other))),
         )
         for k in np.flatnonzero(other).tolist():
             effort = rows.effort[:, k]
@@ -120,6 +135,9 @@ class _ServoFit:
             if rank < columns.shape[1]:
                 return None
             fit.kp[k], fit.kd[k], fit.bias[k] = numbers / scale
+            noise = float(np.abs(columns[free] @ (numbers / scale) - effort[free]).max())
+            inverse = np.linalg.inv(columns[free].T @ columns[free] / np.outer(scale, scale))
+            fit.bars[:, k] = _SAFETY * noise * np.sqrt(np.diag(inverse)) / scale
             unbounded = float(np.abs(columns @ (numbers / scale) - effort).max())
             clamped = unbounded > most * float(np.abs(effort).max())
             fit.limit[k] = float(np.abs(effort[~free] - fit.bias[k]).max(initial=0.0)) if clamped else np.inf
@@ -130,24 +148,32 @@ class _ServoFit:
         plain = self.kp * (rows.target - rows.q) - self.kd * rows.v
         return np.asarray(self.bias + np.clip(plain, -self.limit, self.limit))
 
-    def clauses(self, law: ControlLaw) -> list[str]:
-        """Clauses on the numbers that are not the law's; efforts that are all one part of the right ones have one."""
+    def clauses(self, law: ControlLaw, whole: Callable[[float], bool]) -> list[str]:
+        """Clauses on the numbers that are not the law's; efforts that are all one part of the right ones have one.
+
+        ``whole``: True if a size of all efforts, limits included, explains them.
+        """
         parts = {"kp": (self.kp, law.kp), "kd": (self.kd, law.kd)}
         factors = {name: _factors(found, right) for name, (found, right) in parts.items() if right.any()}
         clamped = np.isfinite(self.limit) & self.other
         factors["limit"] = np.where(clamped, _factors(np.where(clamped, self.limit, 1.0), law.limit), 1.0)
-        biased = np.abs(self.bias) > _SAME * np.where(np.isfinite(law.limit), law.limit, np.abs(law.kp))
+        largest = np.where(np.isfinite(law.limit), law.limit, np.abs(law.kp))
+        biased = np.abs(self.bias) > np.maximum(self.bars[2], _LEAST * largest)
+        bars = {"kp": _relative(self.bars[0], law.kp), "kd": _relative(self.bars[1], law.kd)}
         gains = np.concatenate([factors[name] for name in parts if name in factors])
         scaled = np.concatenate([gains, np.sign(gains[:1]) * factors["limit"][clamped]])
         if self.other.all() and len(factors) > 2 and not biased.any() and _alike(scaled) and abs(scaled[0] - 1) > _SAME:
             self.size = float(scaled.mean())
+            if not clamped.any() and self.size > 0:
+                way = ", or efforts are," if whole(self.size) else ""
+                return [f"kp and kd are both{way} {self.size:.5g} of the right ones"]
             if np.isclose(self.size, -1, atol=_SAME):
                 return ["efforts have the other sign"]
             return [f"efforts are {self.size:.5g} of the right ones"]
         clauses = []
         words = {"kp": "kp", "kd": "kd", "limit": "the limit of efforts"}
         for name, values in factors.items():
-            clauses += _told(words[name], values, law.joints)
+            clauses += _factor_clause(words[name], values, law.joints, bars.get(name, _SAME))
         if biased.any():
             clauses.append("efforts have a constant part beside the servo's: " + _listed(self.bias, biased, law.joints))
         return clauses
@@ -175,12 +201,12 @@ def target_causes(
     if q is not None and (after := left(q + law.scale * actions)) <= most:
         words = "actions are added to the present coordinates, not to the default pose"
         yield 0, LayerCause("added", words, None, after)
-    yield from _of_before(targets, actions, law, most, left)
+    yield from _remembering(targets, actions, law, most, left)
     affine = _affine(targets, actions)
     if affine is None:
         return
     scale, offset = affine
-    clauses = _told("the scale of actions", scale / law.scale, law.joints)
+    clauses = _factor_clause("the scale of actions", scale / law.scale, law.joints)
     if np.allclose(scale / law.scale, -1, atol=_SAME) and np.abs(offset - law.pose).max() <= _SAME:
         clauses = ["actions have the other sign"]
     moved = offset - law.pose
@@ -191,7 +217,7 @@ def target_causes(
         yield len(clauses), LayerCause("affine_target", "; ".join(clauses), size, after)
 
 
-def _of_before(
+def _remembering(
     targets: Array, actions: Array, law: ControlLaw, most: float, left: Callable[[Array, slice], float]
 ) -> Iterator[tuple[int, LayerCause]]:
     """Targets that keep a part of the target before, or of the action before."""
@@ -242,13 +268,20 @@ def _factors(found: Array, right: Array) -> Array:
     return np.where(sensible, found / np.where(sensible, right, 1.0), 1.0)
 
 
+def _relative(bars: Array, right: Array) -> Array:
+    return np.where(right != 0, bars / np.where(right != 0, np.abs(right), 1.0), 0.0)
+
+
 def _alike(values: Array) -> bool:
     return bool(len(values)) and float(np.ptp(values)) <= _SAME * float(np.abs(values).max())
 
 
-def _told(what: str, factors: Array, joints: Sequence[str]) -> list[str]:
-    """Clause on factors that are not 1, one number for all joints where they are alike; empty where all are 1."""
-    wrong_joints = np.abs(factors - 1) > _SAME
+def _factor_clause(what: str, factors: Array, joints: Sequence[str], bars: Array | float = _SAME) -> list[str]:
+    """Clause on factors that are not 1, one number for all joints where they are alike; empty where all are 1.
+
+    ``bars``: of the factors.
+    """
+    wrong_joints = np.abs(factors - 1) > np.maximum(bars, _LEAST)
     if not wrong_joints.any():
         return []
     if wrong_joints.all() and _alike(factors):
@@ -266,4 +299,4 @@ def _listed(values: Array, chosen: Flags, joints: Sequence[str], unit: str = "")
                 break
         else:
             groups.append((float(values[k]), [joints[k]]))
-    return "; ".join(f"{', '.join(names)} {value:.4g}{unit}" for value, names in groups)
+    return "; ".join(f"{', '.join(names)} {value:.5g}{unit}" for value, names in groups)

@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordin
 from proofroll.elements.mechanism.run.step_limits import servo_steps
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
-from proofroll.robots.control.columns import state_readings
+from proofroll.robots.control.columns import StateReading, reading_in_degrees, state_readings
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
 from proofroll.robots.control.layers import BETWEEN, record_layers
@@ -143,20 +143,23 @@ def judge_record(
     law = law_of(model.mechanism)
     law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
     names_of_layers = DIFFERENCES if control else ()
-    judged = [
-        (
-            read,
-            [
-                *([state] if state else []),
-                *record_layers(
-                    read, law, model.mechanism, grounded=model.grounded, names=names_of_layers, stepwise=stepwise
-                ),
-            ],
-        )
-        for read, state in state_readings(read, law)
-    ]
+
+    def layers_of(reading: StateReading) -> list[Layer]:
+        before = [] if reading.layer is None else [reading.layer]
+        mechanism, grounded = model.mechanism, model.grounded
+        return [
+            *before,
+            *record_layers(reading.record, law, mechanism, grounded=grounded, names=names_of_layers, stepwise=stepwise),
+        ]
+
+    judged = [(reading.record, layers_of(reading)) for reading in state_readings(read, law)]
     # Of readings that explain the state alike, layers behind it tell the right one.
     read, layers = min(judged, key=lambda item: sum(not layer.holds for layer in item[1]))
+    if not all(layer.holds for layer in layers) and (degrees := reading_in_degrees(read)) is not None:
+        behind = layers_of(degrees)
+        looked_at = any(layer.residual is not None for layer in behind[1:])
+        if looked_at and all(layer.holds for layer in behind[1:]):
+            read, layers = degrees.record, behind
     return RecordJudgement(
         record=str(record),
         robot=str(robot),

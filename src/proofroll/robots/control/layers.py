@@ -40,7 +40,7 @@ from proofroll.robots.control.differences import (
 )
 from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
-from proofroll.robots.control.record import ControlRecord, Layer, LayerCause
+from proofroll.robots.control.record import OBSERVED, ControlRecord, Layer, LayerCause
 from proofroll.robots.model import Array
 
 # Part of the largest forces up to which what is left without a cause is taken for the program's steps between the rows:
@@ -81,7 +81,7 @@ def record_layers(
         if not layer.holds:
             skipped = {item.name for item in layers if item.residual is None}
             layer = dataclasses.replace(layer, **_explained(layer, skipped, evidence, time))
-            if name == "action" and not layer.causes:
+            if name == "observation" or (name == "action" and not layer.causes):
                 layer, evidence = _of_columns(layer, evidence)
         layers.append(layer)
     record = evidence.record
@@ -141,6 +141,8 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], *, stepwise: bool) -> 
     if isinstance(fit, str):
         return Layer("acceleration", reason=fit)
     fit = dataclasses.replace(fit, between=fit.between and not stepwise)
+    if fit.bar >= 1 and not fit.causes:
+        return Layer("acceleration", reason="the rounding of the record is larger than the forces")
     if fit.between and fit.off > _STEPS:
         off = f"the forces are off by {error(fit.off)} of the largest, and no cause is known"
         return Layer("acceleration", reason=f"{off}; steps between the rows may explain it: log every step to decide")
@@ -207,7 +209,8 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
         ranked.append((2 * offset.after, offset))  # a pose has many numbers: a mistake with fewer goes before
     if all(item.after > rounding for item in several):
         ranked += [
-            ((1 + numbers) * cause.after, cause) for numbers, cause in _fits(layer.name, compared, evidence, most)
+            ((1 + numbers) * cause.after, cause)
+            for numbers, cause in _fitted_causes(layer.name, compared, evidence, most)
         ]
     causes = [cause for _, cause in sorted(ranked, key=lambda item: item[0])]
     if layer.name == "instants" and not causes:
@@ -221,7 +224,9 @@ def _shows(mistake: Mistake, layers: Sequence[str]) -> bool:
     return mistake.layer in layers or (mistake.later and order.index(mistake.layer) + 1 == order.index(layers[-1]))
 
 
-def _fits(name: str, compared: LayerDifferences, evidence: _Evidence, most: float) -> Iterator[tuple[int, LayerCause]]:
+def _fitted_causes(
+    name: str, compared: LayerDifferences, evidence: _Evidence, most: float
+) -> Iterator[tuple[int, LayerCause]]:
     """Mistakes of some numbers that explain a layer, each with their count."""
     record, law = evidence.record, evidence.law
     if name == "observation":
@@ -246,14 +251,20 @@ def _fits(name: str, compared: LayerDifferences, evidence: _Evidence, most: floa
 
 
 def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:
-    """A layer of actions with the mistake of their columns that explains it, and evidence without that mistake."""
+    """A layer with the mistake of the columns of actions that explains it, and evidence without that mistake.
+
+    At an observation, which has the last action, it must explain the actions as well.
+    """
+    if layer.name == "observation" and not layer.column.startswith(f"{OBSERVED}.last."):
+        return layer, evidence
     instants = instant_rows(evidence.record, evidence.law)
     column_mistakes = [*action_mistakes(evidence.law, instants)]
     trials = []
     for mistake in column_mistakes:
         corrected = dataclasses.replace(evidence, record=mistake.changed(evidence.record))
         left = _norm(corrected, layer.name, evidence.law)
-        if left <= _HELPS * _norm(evidence, layer.name, evidence.law):
+        parts = {name: _norm(evidence, name, evidence.law) for name in {layer.name, "action"}}
+        if all(_norm(corrected, name, evidence.law) <= _HELPS * part for name, part in parts.items()):
             trials.append((left, LayerCause(mistake.id, mistake.words, None, left), corrected))
     tried = dataclasses.replace(
         layer, tried=layer.tried + len(column_mistakes), known=layer.known + len(column_mistakes)
