@@ -160,4 +160,6 @@ def integrate(
                 longest = min(solver.h_abs, longest, time - begun) / 2
                 if longest <= NEAREST * begun or begun == 0.0:
                     raise Diverged(str(stopped), begun) from None
+            else:
+                longest *= 2.0
         yield solver.y.copy()

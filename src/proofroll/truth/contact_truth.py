@@ -99,7 +99,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     (broken, text), laws, work_paths = held_to_laws(mechanism, units, recorded)
     if np.isfinite(broken):
         paths = cut_at(paths[0], broken, text), cut_at(paths[1], broken, text)
-    asked = times_known(paths, times)
+    reason = _reason(dynamics, paths)
+    asked = times_known(paths, times, reason)
     times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
     stretches = stretches_at(paths, times)
     others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
@@ -131,23 +132,25 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier, early_works)
         early = early._replace(record=on_same_turns(scaled, tree_states.record, early.record))
         left = _in_si(mechanism, units, early), cut[1]
-    motion = two_route_motion(
-        mechanism,
-        paths,
-        by_tree,
-        by_bodies,
-        _names(tree, bodies),
-        _reason(dynamics, paths),
-        units,
-        works,
-        unresolved=np.max([rest.max(axis=1, initial=0.0) for rest in unresolved], axis=0),
-        kinds=kinds,
-        pressed=(tree_states.pressed * units.force, forces_of_bodies * units.force) if scaled.contacts else None,
-        sums=(tree_states.sums * units.force, others_sums) if scaled.contacts else None,
-        until=until * units.time,
-        cut=left,
+    motion = replace(
+        two_route_motion(
+            mechanism,
+            paths,
+            by_tree,
+            by_bodies,
+            _names(tree, bodies),
+            reason,
+            units,
+            works,
+            unresolved=np.max([rest.max(axis=1, initial=0.0) for rest in unresolved], axis=0),
+            kinds=kinds,
+            pressed=(tree_states.pressed * units.force, forces_of_bodies * units.force) if scaled.contacts else None,
+            sums=(tree_states.sums * units.force, others_sums) if scaled.contacts else None,
+            until=until * units.time,
+            cut=left,
+        ),
+        laws=laws,
     )
-    motion = replace(motion, laws=laws)
     if not scaled.contacts:
         return motion
     last = min(until, *(path.stretches[-1].end for path in paths))

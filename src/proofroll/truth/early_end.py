@@ -30,19 +30,25 @@ class EarlyEnd:
             self.time, self.reason = time, _TIME.sub("", reason)
 
     def known(self, times: Array) -> Array:
-        """Times of rising ones [s] that lie before the end."""
+        """Times of rising ones [s] that lie before the end.
+
+        Raises:
+            Diverged: there is none.
+        """
+        if not times[0] < self.time:
+            raise Diverged(self.reason, self.time)
         return np.asarray(times[times < self.time])
 
     def run(self, route: Callable[[Array], _T], times: Array) -> _T:
         """Result of a route at the known ones of some times [s]; where it fails is an end.
 
         Raises:
-            Diverged: the route fails at the first of these times, or at a time that it does not tell.
+            Diverged: none of these times is known, or the route fails at a time that it does not tell.
         """
         while True:
             try:
                 return route(self.known(times))
             except Diverged as stopped:
-                if stopped.time is None or not times[0] < stopped.time < self.time:
+                if stopped.time is None or not 0.0 < stopped.time < self.time:
                     raise
                 self.at(stopped.time, str(stopped))

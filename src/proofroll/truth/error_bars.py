@@ -121,6 +121,12 @@ def _same_sign(best: Array, quaternions: Array) -> Array:
     return np.where((best * quaternions).sum(axis=-1, keepdims=True) < 0, -quaternions, quaternions)
 
 
+def differences_of(values: Array, others: Array) -> Array:
+    """Largest difference between values of two routes at each time, (times); inf where only the first knows one."""
+    difference = np.where(np.isnan(others) & ~np.isnan(values), np.inf, others - values)
+    return largest(difference)
+
+
 def largest(values: Array) -> Array:
     """Largest absolute value at each time, without NaN, (times)."""
     flat = np.abs(values.reshape(len(values), -1))

@@ -15,7 +15,15 @@ from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
-from proofroll.truth.error_bars import JUDGED, ROUND_OFF, TwoRouteMotion, fields_with_bars, largest, round_off
+from proofroll.truth.error_bars import (
+    JUDGED,
+    ROUND_OFF,
+    TwoRouteMotion,
+    differences_of,
+    fields_with_bars,
+    largest,
+    round_off,
+)
 from proofroll.truth.natural_units import Units
 from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, ModeT, Stretch, first_close, follow
 
@@ -112,12 +120,25 @@ def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
     return end, shortest.ended or next(filter(None, together), "")
 
 
-def times_known(paths: tuple[FollowedPath, FollowedPath], times: Array) -> Array:
-    """Times, in natural units, at which both paths are known, of rising ones whose first always is."""
-    end = end_of(paths)[0]
+def times_known(paths: tuple[FollowedPath, FollowedPath], times: Array, reason: str) -> Array:
+    """Times, in natural units, at which both paths are known, of rising ones; the start always is.
+
+    ``reason``: cause why a motion is not unique from its end on.
+
+    Raises:
+        Refused: none of them is.
+    """
+    end, ended = end_of(paths)
     in_time = times < end - time_accuracy(end) if np.isfinite(end) else np.ones(len(times), dtype=bool)
-    in_time[0] = True
+    in_time[0] |= times[0] == 0.0
+    if not in_time.any():
+        raise before_first(end, ended or reason)
     return np.asarray(times[in_time])
+
+
+def before_first(end: float, reason: str) -> Refused:
+    """Error that a truth ends before all times that were asked for; ``end``: in natural units."""
+    return Refused(f"the truth ends at t = {end:.6g} s, before the first time that was asked for: {reason}")
 
 
 def two_route_motion(
@@ -175,7 +196,7 @@ def two_route_motion(
     if left is None:
         left, step = _left_by_a_cut(mechanism, fields, cut, determinate), _of_a_step(mechanism, masked, units)
     for field, values in fields.items():
-        difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
+        difference = differences_of(values, others[field])
         size = left[field] + least[field]
         lasting = np.minimum(difference, [*difference[:1], *difference[:-1]]) if field in alone else difference
         errors = np.maximum.accumulate(SAFETY * lasting + size)
@@ -231,7 +252,7 @@ def _left_by_a_cut(
     others |= {"work": routed.works}
     others |= {"pressed": routed.pressed, "sums": routed.sums} if mechanism.contacts else {}
     for name, values in fields.items():
-        left[name] = np.where(counts, largest(others[name] - values), 0.0)
+        left[name] = np.where(counts, differences_of(values, others[name]), 0.0)
     return left
 
 

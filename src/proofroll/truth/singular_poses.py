@@ -11,11 +11,11 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.witnesses.closed_forms import ClosedForm
 
 BRANCHING = "the rows of the loops lose rank and the motion may branch: any change of the lengths may lead elsewhere"
-_TURN = 0.02  # step between poses of a closed form, rad or m of the fastest coordinate
+_TURN = 0.02  # step between poses of a closed form, rad or natural lengths of the fastest coordinate
 _FEW, _MOST = 50, 20_000  # limits of the number of poses
 
 
-def singular_poses(mechanism: Mechanism, until: float, step: float = 5e-3) -> list[float]:
+def singular_poses(mechanism: Mechanism, until: float, step: float) -> list[float]:
     """Times, s, at which the rows of the loops lose rank, accurate to a fraction of the step, s.
 
     The motion until ``until``, s, is integrated by Runge-Kutta 4 with a fixed rank, which passes singular poses.

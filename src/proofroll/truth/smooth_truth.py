@@ -26,8 +26,16 @@ from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
 from proofroll.truth.early_end import EarlyEnd
-from proofroll.truth.error_bars import NUDGE, TwoRouteMotion, check_start, fields_with_bars, largest, on_same_turns
-from proofroll.truth.followed_paths import FollowedPath, end_of, followed, time_accuracy, two_route_motion
+from proofroll.truth.error_bars import (
+    NUDGE,
+    TwoRouteMotion,
+    check_start,
+    differences_of,
+    fields_with_bars,
+    largest,
+    on_same_turns,
+)
+from proofroll.truth.followed_paths import FollowedPath, before_first, end_of, followed, time_accuracy, two_route_motion
 from proofroll.truth.law_verdict import Recorded, held_to_laws, of_bodies, of_tree
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, states_inside
@@ -38,11 +46,13 @@ from proofroll.truth.witnesses.closed_forms import ClosedForm, closed_form
 from proofroll.truth.work_of_steps import works_of_steps
 
 CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indistinguishable starts is chaos
-BRANCH = 1e-3  # m, 1: distance between routes that chaos causes only long after the horizon
+BRANCH = 1e-3  # natural lengths, 1: distance between routes that chaos causes only long after the horizon
 ENERGY = 1e-8  # change of energy relative to its parts, a thousand times that of routes through chaos, 1e-11
 _PIECES = 2  # of a route that are held to the laws: they cost a tenth of a truth of few samples
 _FORM_STEPS = 4  # parts of a run at which a closed form is held to the laws
 _FORM_STEP = 1.0  # length of each at most, in natural units
+_WITNESS_STEP = 2.0**-7  # length of the equal steps of a closed form's witness at most, in natural units
+_POSE_STEP = 2.0**-6  # length of steps that look for singular poses at most, in natural units
 
 
 def find_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
@@ -90,10 +100,25 @@ class _SmoothTruth:
             self._from_form(self._exact, self._seconds)  # it has finite numbers
         check_start(self._equations, self._second, self._units.length)
         try:
-            motion = self._by_routes()
+            return self._by_routes_or_form()
         except Diverged as stopped:
+            if stopped.time is not None and 0.0 < stopped.time <= self._times[0]:
+                raise before_first(stopped.time, self._reason(stopped.time, str(stopped))) from None
+            if self._exact is not None:
+                raise
+            raise Refused(f"no truth beyond the start: {stopped}") from None
+
+    def _by_routes_or_form(self) -> TwoRouteMotion:
+        """Motion that two routes follow, or in closed form where they fail and there is one.
+
+        Raises:
+            Diverged: none of the times is known.
+        """
+        try:
+            motion = self._by_routes()
+        except Diverged:
             if self._exact is None:
-                raise Refused(f"no truth beyond the start: {stopped}") from None
+                raise
             return self._by_form(self._exact)
         return motion if self._exact is None or np.isinf(motion.end) else self._by_form(self._exact)
 
@@ -101,7 +126,7 @@ class _SmoothTruth:
         """Motion that two routes follow, up to the first failure of either.
 
         Raises:
-            Diverged: there is none beyond the start.
+            Diverged: none of the times is known.
         """
         units, early, form = self._units, EarlyEnd(), self._exact
         paths = followed(self._tree, self._bodies, self._until, ())
@@ -120,8 +145,6 @@ class _SmoothTruth:
         self._check_branch(by_tree.first(count), by_bodies.first(count), chaotic, early)
         laws = self._held_to_laws(paths, early)
         count = len(early.known(self._times))
-        if not count:
-            raise Diverged(early.reason, 0.0)
         by_tree, by_bodies = by_tree.first(count), by_bodies.first(count)
         best, nearby = by_bodies, on_same_turns(self._mechanism, by_bodies, nearby.first(count))
         left = _apart_in_fields(self._mechanism, by_bodies, nearby, NUDGE / BESIDE)
@@ -133,7 +156,7 @@ class _SmoothTruth:
             best = on_same_turns(self._mechanism, by_tree, self._from_form(form, by_tree.time))
             left = _apart_in_fields(self._mechanism, by_bodies, best)
             names = (f"closed form: {form.title}", *names)
-            branches = self._branches(form)
+            branches = self._branches()
         late = np.flatnonzero(chaotic[:count])
         motion = two_route_motion(
             self._mechanism,
@@ -148,11 +171,10 @@ class _SmoothTruth:
             left=left,
             chaotic_from=float(self._seconds[late[0]]) if len(late) else np.inf,
         )
-        reason = _singular(self._mechanism, early.time * units.time) or early.reason if early.reason else ""
         return replace(
             motion,
             end=early.time * units.time,
-            ended=units.text_in_seconds(reason),
+            ended=units.text_in_seconds(self._reason(early.time, early.reason)),
             checked_by=self._checked_by(best),
             branches=branches,
             laws=laws,
@@ -168,7 +190,8 @@ class _SmoothTruth:
 
     def _by_form(self, form: ClosedForm) -> TwoRouteMotion:
         """Motion in closed form where routes fail; equal steps in joint coordinates are its witness."""
-        witness = JointCoordinates(self._mechanism, self._equations.rank).run_rk4(self._seconds)
+        states = self._equations.rk4_states(self._times, _WITNESS_STEP)
+        witness = self._in_seconds(self._equations.recorded(self._times, states))
         exact = on_same_turns(self._mechanism, witness, self._from_form(form, self._seconds))
         early = EarlyEnd()
         (broken, text), laws, _ = held_to_laws(self._mechanism, self._units, [self._recorded()], most=_PIECES)
@@ -187,11 +210,24 @@ class _SmoothTruth:
             left=dict.fromkeys(_apart_in_fields(self._mechanism, exact, exact), np.zeros(count)),
         )
         end = early.time * self._units.time
-        return replace(motion, end=end, ended=early.reason, branches=self._branches(form), laws=laws)
+        return replace(motion, end=end, ended=early.reason, branches=self._branches(), laws=laws)
 
-    def _branches(self, form: ClosedForm) -> list[float]:
+    def _branches(self) -> list[float]:
         """Times of singular poses along the closed form [s]."""
-        return singular_poses_of(form, JointCoordinates(self._mechanism), float(self._seconds[-1]))
+        assert self._scaled_form is not None
+        poses = singular_poses_of(self._scaled_form, self._equations, self._until)
+        return [time * self._units.time for time in poses]
+
+    def _reason(self, end: float, reason: str) -> str:
+        """Reason of an early end: the singular pose there, if there is one."""
+        step = min(_POSE_STEP, end / 200)
+        if not reason or not step > 0:
+            return reason
+        try:
+            poses = singular_poses(self._equations.mechanism, end + 2 * step, step)
+        except (Diverged, np.linalg.LinAlgError):  # the step is too large for the motion
+            return reason
+        return BRANCHING if any(abs(time - end) <= 2 * step for time in poses) else reason
 
     def _by_tree(self, path: FollowedPath, count: int) -> Record:
         """Record of the first route at the first times."""
@@ -253,8 +289,8 @@ class _SmoothTruth:
         for _ in range(3):  # Newton's method doubles the number of digits
             start = equations.eliminated(start)
         nearby = tree.walk(0.0, np.append(start, 0.0), stretch.mode, float(times[-1]))
-        records = [equations.recorded(times, tree.within(item, times)[:, :-1]) for item in (nearby, stretch)]
-        return _apart(*records) / BESIDE
+        moved, record = (equations.recorded(times, tree.within(item, times)[:, :-1]) for item in (nearby, stretch))
+        return _apart(moved, record) / BESIDE
 
     def _held_to_laws(self, paths: tuple[FollowedPath, FollowedPath], early: EarlyEnd) -> str:
         """Outcome of the law check; a violation ends the truth, and the outcome is empty."""
@@ -354,7 +390,7 @@ class _SmoothTruth:
 
     def _check_branch(self, record: Record, precise: Record, chaotic: NDArray[np.bool_], early: EarlyEnd) -> None:
         """Ends the truth where two routes part without chaos, for then they have taken different branches."""
-        parted = np.flatnonzero((_apart(record, precise) > BRANCH) & ~chaotic)
+        parted = np.flatnonzero((_apart(record, precise, self._units.length) > BRANCH) & ~chaotic)
         if len(parted):
             early.at(float(self._times[parted[0]]), "the two routes part, as at a singular pose")
 
@@ -362,20 +398,10 @@ class _SmoothTruth:
 def _apart_in_fields(mechanism: Mechanism, record: Record, second: Record, part: float = 1.0) -> dict[str, Array]:
     """Part of the largest difference of two motions in each field at each time."""
     fields, others = (fields_with_bars(mechanism, item) for item in (record, second))
-    apart = {name: part * largest(others[name] - values) for name, values in fields.items()}
-    return apart | {"work": np.zeros(len(record.time))}
+    differences = {name: part * differences_of(values, others[name]) for name, values in fields.items()}
+    return differences | {"work": np.zeros(len(record.time))}
 
 
-def _apart(record: Record, second: Record) -> Array:
-    """Largest difference of two motions at each time, in positions [m] and quaternions [1]."""
-    return np.maximum(largest(record.p_WB - second.p_WB), largest(record.q_WB - second.q_WB))
-
-
-def _singular(mechanism: Mechanism, end: float) -> str:
-    """Clause on a singular pose at the end of a truth [s]; empty if there is none."""
-    step = min(5e-3, end / 200)
-    try:
-        poses = singular_poses(mechanism, end + 2 * step, step)
-    except (Diverged, np.linalg.LinAlgError):  # the step is too large for the motion
-        return ""
-    return BRANCHING if any(abs(time - end) <= 2 * step for time in poses) else ""
+def _apart(record: Record, second: Record, unit: float = 1.0) -> Array:
+    """Largest difference of two motions at each time, in positions, which are in a ``unit``, and quaternions [1]."""
+    return np.maximum(largest(record.p_WB - second.p_WB) / unit, largest(record.q_WB - second.q_WB))

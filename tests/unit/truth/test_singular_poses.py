@@ -7,15 +7,17 @@ from lone_routes import by_joints
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.errors import Diverged
-from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
+from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism import Body, Force, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.dynamics.analysis import RowSign, analyse
 from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.numerics.hybrid import follow
 from proofroll.truth.plug_in import MechanismTruth
 from proofroll.truth.singular_poses import BRANCHING, singular_poses
 from proofroll.truth.smooth_truth import find_truth
+from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.tree.contact_tree import ContactTree
 from proofroll.truth.witnesses.closed_forms import closed_form
 
@@ -28,13 +30,13 @@ def test_four_bar_passes_when_its_links_are_in_line(scene):
     expected = [
         brentq(lambda t, a=angle: turned(np.array([t]))[0][0, 0] + a, 0.0, 1.5) for angle in (np.pi / 2, 3 * np.pi / 2)
     ]
-    assert singular_poses(mechanism, 1.5) == pytest.approx(expected, abs=1e-3)
+    assert singular_poses(mechanism, 1.5, 5e-3) == pytest.approx(expected, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", ["slider_crank", "bricard"])
 def test_regular_motion_passes_none(scene, name):
     """Minima of the singular value away from zero are not taken for singular poses."""
-    assert singular_poses(scene(name), 0.4) == []
+    assert singular_poses(scene(name), 0.4, 5e-3) == []
 
 
 @pytest.mark.parametrize("sizes", [[-0.2, -0.1, 0.1, 0.2], [0.2, 0.1, 0.1, 0.2]])
@@ -88,6 +90,61 @@ def test_a_parallelogram_without_a_closed_form_ends_there_with_the_same_words():
     assert found.record.time.tolist() == [0.0, 0.2]
 
 
+@pytest.mark.drill
+@pytest.mark.parametrize("faster", [2.0**10, 2.0**-10])
+def test_a_mechanism_that_runs_faster_or_slower_ends_at_the_same_pose(faster):
+    """Gravity, speeds and dampers that belong to another unit of time give the same end, to the last bit."""
+    here, times = parallelogram(0.1), np.array([0.0, 0.2, 0.5])
+    joints = (replace(joint, v0=(faster * joint.v0[0],), damping=faster * joint.damping) for joint in here.joints)
+    there = replace(here, joints=tuple(joints), gravity=(0.0, -9.81 * faster**2, 0.0))
+    truths = find_truth(here, times), find_truth(there, times / faster)
+    assert truths[1].ended == truths[0].ended == BRANCHING
+    assert faster * truths[1].end == truths[0].end
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("faster", [2.0**10, 2.0**-10])
+def test_the_witness_of_a_closed_form_is_as_good_in_another_unit_of_time(scene, faster):
+    """Its steps are as long for what moves, so that the bars behind a singular pose are the same."""
+    bars = [
+        find_truth(scene("four_bar", windows=1, gravity=9.81 * k**2, speed=k), np.array([0.0, 0.8]) / k).bars["points"]
+        for k in (1.0, faster)
+    ]
+    assert bars[1] == pytest.approx(bars[0], rel=1e-6)
+
+
+def pushed_ball():
+    """A ball that a force begins to slide on the floor, beside a parallelogram that comes to its singular pose."""
+    free = Joint("free", "free", "world", "ball", q0=(0.0, 0.1, 5.0, 1.0, 0.0, 0.0, 0.0))
+    linkage, ball = parallelogram(0.1), Body("ball", 1.0, inertia=(0.004,) * 3)
+    shapes = (Geometry("shell", "ball", "sphere", radius=0.1), Geometry("floor", "world", "plane", normal=(0, 1, 0)))
+    return replace(
+        linkage,
+        bodies=(*linkage.bodies, ball),
+        joints=(*linkage.joints, free),
+        geometries=shapes,
+        pairs=(Pair("touch", ("shell", "floor"), 0.3),),
+        forces=(Force("push", "ball", "force", (20.0, 0.0, 7.0)),),
+    )
+
+
+@pytest.mark.drill
+def test_a_slip_from_rest_that_ends_at_a_singular_pose_starts_at_rest():
+    """The stretch is known from its start on, not from where the slip has a direction."""
+    found = truth_of(pushed_ball(), np.array([0.0, 0.1, 0.3]))
+    assert "a singular pose of the loops" in found.ended
+    assert np.abs(found.record.v_WB[0, -1]).max() < 1e-15
+    assert found.bars["v_WB"].max() < 1e-11
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("mechanism", [parallelogram(0.1), pushed_ball()], ids=["smooth", "contact"])
+def test_a_truth_that_ends_before_all_times_is_refused_for_the_reason_of_its_end(mechanism):
+    """Where none of the times is known, the time of the end and its cause are said."""
+    with pytest.raises(Refused, match=r"ends at t = 0.2482\d* s, before the first time .* the loops"):
+        truth_of(mechanism, np.array([0.5]))
+
+
 def test_a_step_over_a_singular_pose_is_no_truth():
     """An error control so coarse that it passes the pose without a stall is stopped there."""
     with pytest.raises(Diverged, match=r"at t = 0\.\d+ s: a step passes a singular pose"):
@@ -96,7 +153,7 @@ def test_a_step_over_a_singular_pose_is_no_truth():
 
 def test_a_tree_has_none(scene):
     """Without loops there is nothing to lose rank."""
-    assert singular_poses(scene("chain"), 1.0) == []
+    assert singular_poses(scene("chain"), 1.0, 5e-3) == []
 
 
 @pytest.mark.arithmetic

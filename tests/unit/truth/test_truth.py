@@ -175,6 +175,20 @@ def test_singular_poses_are_passed_by_the_closed_form(scene):
 
 
 @pytest.mark.drill
+def test_what_the_witness_of_a_closed_form_does_not_know_is_not_known(scene, monkeypatch):
+    """A value that only one route has is no agreement."""
+    recorded = JointCoordinates.recorded
+
+    def lost(route, times, states):
+        record = recorded(route, times, states)
+        return replace(record, p_WB=np.where(times[:, None, None] > 0.0, np.nan, record.p_WB))
+
+    monkeypatch.setattr(JointCoordinates, "recorded", lost)
+    truth = find_truth(scene("four_bar", windows=1), np.array([0.0, 0.8]))
+    assert np.isinf(truth.bars["p_WB"]).tolist() == [False, True]
+
+
+@pytest.mark.drill
 def test_singular_poses_without_a_closed_form_end_a_truth(scene):
     """Values before the pose are kept; its time and the reason are said."""
     crank = {"crank": 0.3999999999999, "speed": 3.0}
@@ -223,8 +237,9 @@ def test_a_joint_that_swings_to_its_very_limit_stays_within(scene):
 
 
 @pytest.mark.drill
-def test_routes_on_different_branches_are_no_truth(scene, monkeypatch):
-    """Should one route change its branch without a word, the difference is not taken for an error bar."""
+@pytest.mark.parametrize("size", [1.0, 2.0**-10])
+def test_routes_on_different_branches_are_no_truth(scene, monkeypatch, size):
+    """Should one route change its branch without a word, the difference is no error bar, however small the lengths."""
     pytest.importorskip("heyoka")
     recorded = JointCoordinates.recorded
 
@@ -233,7 +248,8 @@ def test_routes_on_different_branches_are_no_truth(scene, monkeypatch):
         return replace(record, p_WB=record.p_WB + np.array([1e-2, 0, 0]) * (times > 0.6 * times[-1])[:, None, None])
 
     monkeypatch.setattr(JointCoordinates, "recorded", flipped)
-    found = find_truth(scene("slider_crank"), np.array([0.0, 0.05, 0.1]))
+    lengths = {"crank": 0.15 * size, "rod": 0.4 * size, "slider_edge": 0.1 * size, "gravity": 9.81 * size}
+    found = find_truth(scene("slider_crank", **lengths), np.array([0.0, 0.05, 0.1]))
     assert found.record.time.tolist() == [0.0, 0.05]
     assert found.end == pytest.approx(0.1, rel=1e-15)
     assert found.ended == "the two routes part, as at a singular pose"

@@ -284,7 +284,7 @@ def _known(error: Exception, walk: Callable[[float], SpanT], time: float, end: f
     if isinstance(error, StoppedWithin) and error.stretch is not None:
         return [error.stretch]
     for part in (close, *_BEFORE):
-        with suppress(Diverged):
+        with suppress(Diverged, Refused):
             if time < reached * (1 - part):
                 return [walk(reached * (1 - part))]
     return []
@@ -343,26 +343,22 @@ def integrate_to_guard(
 
     Raises:
         Diverged: the rates fail, at its ``time``, or it would take too many steps.
+        Refused: by the rates, at the start.
     """
     if not until > time:
         return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=None)
     solver = solver_from(lambda _, y: law.rates(y), time, state, float(np.min(tolerance)), tolerance)
     back, count, grazes = corrected_by(law.corrected), StepCount(time, until), list[float]()
-    visited = list[tuple[float, State]]()
-    dense = list[tuple[float, float, Callable[[FloatArray], FloatArray]]]()
+    visited, dense = list[tuple[float, State]](), list[DenseStep]()
 
-    def known(end: tuple[float, State]) -> Stretch[ModeT] | None:
-        """Stretch up to a step that fails."""
-        reached, last = end
-        if not reached > time:
-            return None
+    def stretch(end: float, last: State, guard: int | None = None) -> Stretch[ModeT]:
         return Stretch(
             start=time,
-            end=reached,
+            end=end,
             mode=mode,
             first=state,
             last=last,
-            guard=None,
+            guard=guard,
             visited=visited,
             grazes=grazes,
             dense=dense,
@@ -372,52 +368,34 @@ def integrate_to_guard(
         solver.h_abs = min(solver.h_abs, max(first_step, 16 * float(np.spacing(time))))
     longest = np.inf
     while solver.t < until:
-        begun = solver.t, solver.y.copy()
+        begun, seen = (float(solver.t), solver.y.copy()), len(grazes)
         try:
             controlled_step(solver, None, until, longest)
-        except Diverged as stopped:
-            longest = min(solver.h_abs, longest, until - begun[0]) / 2
-            if longest <= NEAREST * max(until - time, begun[0]):
-                raise StoppedWithin(str(stopped), float(begun[0]), known(begun)) from None
-            continue
+            inside = _lazy_dense(solver)
+            rise = len(law.noise) and locate_rise(
+                solver, law.guards, law.noise, solver.t_old == time, law.near, grazes, dense=inside
+            )
+            reached = float(solver.t), solver.y
+            if not rise:
+                go_on_from(solver, back(*reached))
+        except (Diverged, Refused) as stopped:  # the step leads where the motion does not
+            longest = (float(solver.t) - begun[0] or min(solver.h_abs, longest, until - begun[0])) / 2
+            del grazes[seen:]
+            if longest > NEAREST * max(until - time, begun[0]):
+                solver = solver_from(lambda _, y: law.rates(y), *begun, float(np.min(tolerance)), tolerance, longest)
+                continue
+            if begun[0] > time:
+                raise StoppedWithin(str(stopped), begun[0], stretch(*begun)) from None
+            if isinstance(stopped, Refused):
+                raise
+            raise StoppedWithin(str(stopped), begun[0]) from None
+        longest *= 2.0
         visited.append(begun)
+        dense.append((begun[0], reached[0], inside))
+        if rise:
+            return stretch(rise.time, law.corrected(rise.state), rise.guard)
         count.took(solver.t)
-        dense.append((float(solver.t_old), float(solver.t), _lazy_dense(solver)))
-        if len(law.noise) and (
-            rise := locate_rise(
-                solver, law.guards, law.noise, solver.t_old == time, law.near, grazes, dense=dense[-1][2]
-            )
-        ):
-            return Stretch(
-                start=time,
-                end=rise.time,
-                mode=mode,
-                first=state,
-                last=law.corrected(rise.state),
-                guard=rise.guard,
-                visited=visited,
-                grazes=grazes,
-                dense=dense,
-            )
-        try:
-            go_on_from(solver, back(solver.t, solver.y))
-        except Diverged as stopped:  # the step leads where the motion does not
-            longest = (solver.t - begun[0]) / 2
-            del visited[-1], dense[-1]
-            if longest <= NEAREST * max(until - time, begun[0]):
-                raise StoppedWithin(str(stopped), float(begun[0]), known(begun)) from None
-            solver = solver_from(lambda _, y: law.rates(y), *begun, float(np.min(tolerance)), tolerance, longest)
-    return Stretch(
-        start=time,
-        end=until,
-        mode=mode,
-        first=state,
-        last=np.asarray(solver.y),
-        guard=None,
-        visited=visited,
-        grazes=grazes,
-        dense=dense,
-    )
+    return stretch(until, np.asarray(solver.y))
 
 
 def _lazy_dense(solver: Any) -> Callable[[FloatArray], FloatArray]:

@@ -32,7 +32,14 @@ from proofroll.elements.mechanism.scene.kinks import JUMP
 from proofroll.elements.mechanism.scene.rotations import Array, cross, from_quaternion
 from proofroll.elements.mechanism.scene.signal import varies
 from proofroll.truth.followed_paths import CLOSE, TOLERANCES
-from proofroll.truth.numerics.hybrid import Stretch, StretchLaw, integrate_to_guard, states_at, states_inside
+from proofroll.truth.numerics.hybrid import (
+    StoppedWithin,
+    Stretch,
+    StretchLaw,
+    integrate_to_guard,
+    states_at,
+    states_inside,
+)
 from proofroll.truth.switching.contact_guards import (
     ContactGuard,
     SolvedContacts,
@@ -213,7 +220,13 @@ class ContactWalks(ABC):
         if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
             return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=share)
         start, begun = self._kicked(time, state, mode)
-        return replace(self._walked(begun, start, mode, until), start=time, first=state)
+        try:
+            stretch = self._walked(begun, start, mode, until)
+        except StoppedWithin as stopped:
+            if stopped.stretch is not None:
+                stopped.stretch = replace(stopped.stretch, start=time, first=state)
+            raise
+        return replace(stretch, start=time, first=state)
 
     def _begun(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """First instants of a slip from rest in the plane, which end before another contact changes."""

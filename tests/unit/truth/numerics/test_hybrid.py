@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Diverged, NotUnique, Refused
 from proofroll.truth.numerics.hybrid import (
+    StoppedWithin,
     Stretch,
     StretchLaw,
     Transition,
@@ -42,6 +43,47 @@ def test_a_crest_within_a_step_is_seen(below: float) -> None:
     assert stretch.guard == 0
     # what the guard is off by, over the rate at which it rises
     assert stretch.end == pytest.approx(np.arcsin(1.0 - below), abs=20 * TOLERANCE[0] / np.sqrt(2 * below))
+
+
+def test_steps_grow_again_behind_one_that_is_refused() -> None:
+    """Each projection that fails once for a step costs one more step, and crests that the step has seen come once."""
+    failures, tries = iter([True, True, True, True]), list[float]()
+
+    def corrected(y: FloatArray) -> FloatArray:
+        tries.append(y[0])
+        if len(tries) > 5 and next(failures, False):
+            raise Diverged("not there")
+        return y
+
+    law = StretchLaw(
+        lambda y: np.array([y[1], -y[0]]),
+        lambda y: np.array([y[0] - 1.0]),
+        corrected,
+        noise=np.full(1, 1e-9),
+        near=np.full(1, 1e-6),
+    )
+    start = np.array([0.0, 1.0])
+    undisturbed = integrate_to_guard(law._replace(corrected=lambda y: y), "on", 0.0, start, 30.0, TOLERANCE)
+    stretch = integrate_to_guard(law, "on", 0.0, start, 30.0, TOLERANCE)
+    assert next(failures, None) is None
+    assert len(stretch.visited) < len(undisturbed.visited) + 8
+    assert stretch.grazes == pytest.approx(undisturbed.grazes, abs=1e-5)
+
+
+def test_a_refusal_within_a_stretch_keeps_what_lies_before() -> None:
+    """Rates that refuse from a place on end a stretch just before it; at the start the refusal itself is told."""
+
+    def rates(y: FloatArray) -> FloatArray:
+        if y[0] > 0.5:
+            raise NotUnique("beyond the half")
+        return np.array([y[1], -y[0]])
+
+    law = swing(lambda _: np.zeros(0), 0)._replace(rates=rates)
+    with pytest.raises(StoppedWithin, match="beyond the half") as told:
+        integrate_to_guard(law, "on", 0.0, np.array([0.0, 1.0]), 3.0, TOLERANCE)
+    assert told.value.stretch.end == pytest.approx(np.arcsin(0.5), abs=1e-6)
+    with pytest.raises(NotUnique, match="beyond the half"):
+        integrate_to_guard(law, "on", 0.0, np.array([0.5, 1.0]), 3.0, TOLERANCE)
 
 
 def test_states_within_a_stretch_follow_from_its_steps() -> None:

@@ -35,7 +35,6 @@ from proofroll.elements.mechanism.scene.rotations import Array, skews, to_quater
 from proofroll.elements.mechanism.scene.signal import FUNCTIONS, value_at, varies
 
 _NEAR = 1e-7  # displacement of coordinates for finite differences of accelerations [m, 1]
-_EQUAL_STEP = 2e-3  # s
 _STEP = 0.05  # of DOP853, in times in which the fastest mode turns by 1 rad; chains of 5 to 80 links need no less
 
 
@@ -276,15 +275,11 @@ class JointCoordinates:
         q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
         return np.concatenate([self.tree.rate(q, v), self.solve(q, v, mode, time=time).acceleration])
 
-    def run_rk4(self, times: Array) -> Record:
-        """Record of the motion at the given times [s], by Runge-Kutta 4 in equal steps of at most 2 ms.
+    def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
+        """States (q, v) at the given times [s], by Runge-Kutta 4 in equal steps of at most ``step`` [s].
 
         Fixed steps pass singular poses, where adaptive steps would shrink to zero.
         """
-        return self.recorded(times, self.rk4_states(times, _EQUAL_STEP))
-
-    def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
-        """States (q, v) at the given times [s], by Runge-Kutta 4 in equal steps of at most ``step`` [s]."""
         y, now = np.concatenate(self.mechanism.start()), 0.0
         for time in times:
             steps = int(np.ceil((time - now) / step - 1e-9))
