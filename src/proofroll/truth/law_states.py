@@ -60,8 +60,8 @@ def by_the_bodies(route: ContactBodies, second: MaximalCoordinates, state: Array
     if _has_named(m):
         _, wrenches = equations.applied(bodies, force)
         second.take_functions(equations.equations.functions)
-        record = second.recorded(state[-1:], state[None, :-1], [equations.switched(state, mode)], [wrenches])
-        named, loops = stated_named(m, record.named[0]), record.wrench[0, len(m.joints) :].ravel()
+        reactions, forces = second.reactions(float(state[-1]), state[:-1], equations.switched(state, mode), wrenches)
+        named, loops = stated_named(m, forces), reactions[len(m.joints) :].ravel()
     p, v, quaternions, w = equations.equations.poses(state[:-1])
     rotations = np.array([from_quaternion(quaternion) for quaternion in quaternions])
     return _vector((p, rotations, v, w), equations.contacts, bodies.touching, force, named, loops)

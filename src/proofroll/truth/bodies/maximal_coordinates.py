@@ -71,10 +71,11 @@ class NumericEquations:
         self.rank = self._rank(self.equations.start())
 
     def switched(self, state: Array, switched: Switched) -> NumericEquations:
-        """Copy of the equations with joints held or pushed; their rank is that at ``state``."""
+        """Copy of the equations with joints held or pushed; rows of held ones give the rank at ``state``."""
         equations = copy(self)
         equations._switched = switched
-        equations.rank = equations._rank(state)
+        if switched.held:
+            equations.rank = equations._rank(state)
         return equations
 
     def _rank(self, state: Array) -> int:
@@ -308,8 +309,7 @@ class MaximalCoordinates:
         lean = self.lean.equations
         views = lean.views(state.tolist())
         whole = self._complete(views, state[lean.nx + lean.nu :])
-        equations = self._whole if switched is None else self._whole.switched(whole, switched)
-        solved = equations.solve(whole, time, applied)
+        solved = self._solved(time, whole, switched, applied)
         u = whole[self._whole.equations.nx :][: self._whole.equations.nu]
         opening = solved.equations.opening(solved.C @ u)
         n = len(self.mechanism.bodies)
@@ -325,6 +325,18 @@ class MaximalCoordinates:
             "named": self._named(solved, switched or Switched()),
             "residual": np.array([np.abs(solved.residual).max(initial=0.0), np.abs(opening).max(initial=0.0)]),
         }
+
+    def _solved(self, time: float, whole: Array, switched: Switched | None, applied: Array | None) -> Solved:
+        """Accelerations and multipliers of the rows in space at a state that is whole."""
+        equations = self._whole if switched is None else self._whole.switched(whole, switched)
+        return equations.solve(whole, time, applied)
+
+    def reactions(self, time: float, state: Array, switched: Switched, applied: Array) -> tuple[Array, Array]:
+        """Reactions (joints + loops, 6) and named forces at a state of :meth:`recorded` with unit quaternions."""
+        lean = self.lean.equations
+        whole = self._complete(lean.views(state.tolist()), state[lean.nx + lean.nu :])
+        solved = self._solved(time, whole, switched, applied)
+        return self._wrenches(solved), self._named(solved, switched)
 
     def powers(self, times: Array, states: Array) -> Array:
         """Power of each of :func:`.working` at states [W], (times, drives)."""

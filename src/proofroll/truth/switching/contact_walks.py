@@ -365,6 +365,8 @@ class ContactWalks(ABC):
 
     def _as_it_goes(self, state: Array, mode: ContactMode) -> ContactMode:
         """Mode with the present directions of slips in the plane, however slow."""
+        if not any(acting.kind == "slip" and acting.along is None for acting in mode):
+            return mode
         touching = self._touching(state, features_of(mode))
         return tuple(headed(acting, touch) for acting, touch in zip(mode, touching, strict=True))
 
