@@ -145,6 +145,20 @@ def test_a_truth_that_ends_before_all_times_is_refused_for_the_reason_of_its_end
         truth_of(mechanism, np.array([0.5]))
 
 
+def test_a_loop_that_holds_nothing_has_no_rank_in_a_turned_frame():
+    """Rows of a planar loop between bodies that move in one plane are round-off there, and no singular pose is near."""
+    turned = (0.381, 1.0, -1.03)
+    joints = (
+        Joint("crank", "revolute", "world", "a", orientation=turned, q0=(-0.573,), v0=(6.24,)),
+        Joint("pin", "revolute", "a", "b", (0.349, 0, 0), q0=(0.766,), v0=(0.0,)),
+        Joint("slide", "prismatic", "world", "c", axis=(1, 0, 0), orientation=turned, q0=(1.26,), v0=(0.0,)),
+    )
+    bodies = tuple(Body(name, 1.0, (0.2, 0, 0), (0.01, 0.01, 0.01)) for name in "abc")
+    mechanism = Mechanism(bodies, joints, (Loop("plane", "planar", "b", "c", (0.986, 0, 0)),), gravity=(0, 0, -9.81))
+    assert analyse(mechanism).rank == 0
+    assert np.isinf(find_truth(mechanism, np.array([0.0, 0.05])).end)
+
+
 def test_a_step_over_a_singular_pose_is_no_truth():
     """An error control so coarse that it passes the pose without a stall is stopped there."""
     with pytest.raises(Diverged, match=r"at t = 0\.\d+ s: a step passes a singular pose"):

@@ -15,6 +15,7 @@ from proofroll.elements.mechanism.scene.rotations import Array, cross
 # At a pose closed to 1e-12 a dependent row shows as a relative singular value near 1e-12 or below, an independent one
 # of the mechanisms seen so far above 1e-3; 1e-8 lies between, with room on both sides.
 RANK = 1e-8
+_LEAST = 1e-6  # m, 1: largest singular value of rows below which these are compared with it
 # Response of a coordinate or slide to forces, relative to that without loops and motions, up to which it is round-off:
 # loops and motions alone move it.
 NO_RESPONSE = 1e-13
@@ -96,8 +97,15 @@ def least_norm_solution(matrix: Array, right: Array) -> Array:
 
 
 def rank_of(values: Array) -> int:
-    """Number of singular values above round-off."""
-    return int((values > RANK * values.max(initial=0.0)).sum())
+    """Number of singular values above round-off, which is all there is of rows that hold nothing in a turned frame."""
+    return int((values > RANK * values.max(initial=_LEAST)).sum())
+
+
+def _inverse(C: Array) -> Array:
+    """Generalised inverse of constraint rows, in which round-off counts as zero as in :func:`rank_of`."""
+    values = singular_values(C)
+    least = RANK * values.max(initial=_LEAST)
+    return np.asarray(np.linalg.pinv(C, least / values[0] if values[:1].any() else 1.0), dtype=np.float64)
 
 
 class RowSign:
@@ -194,9 +202,9 @@ def general_place(
     """
     _, C = rows(start)
     direction = 1.0 + np.modf(np.arange(1, C.shape[1] + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike
-    direction -= np.linalg.pinv(C, RANK) @ (C @ direction)
+    direction -= _inverse(C) @ (C @ direction)
     state = moved(start, NEARBY * direction / max(np.abs(direction).max(initial=0.0), 1e-300))
     for _ in range(10 if C.size else 0):  # Newton's method doubles the digits; four rounds do from so near
         residual, C = rows(state)
-        state = moved(state, -np.linalg.pinv(C, RANK) @ residual)
+        state = moved(state, -_inverse(C) @ residual)
     return state
