@@ -8,6 +8,7 @@ from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.files.scene_file import load_scene
 from proofroll_drill.published import true_values
 
 pytest.importorskip("exudyn")
@@ -82,3 +83,10 @@ def test_shapes_and_impacts_that_exudyn_lacks_are_refused(geometry, pair, said):
     """Corners, ellipsoids and restitution are refused, each with its reason."""
     with pytest.raises(Refused, match=said):
         EXUDYN.build(touching(FLOOR, geometry, pairs=(Pair("p", ("g", "floor"), 0.3, **pair),), height=1.0), MATCHED)
+
+
+def test_what_sinks_in_beyond_its_wall_is_refused():
+    """A ball that its load at the start presses through the opposite side of its wall is refused, with the depth."""
+    heavy = load_scene("sphere_in_cylinder", mass=6e3, mu_static=0.35).elements[0].mechanism
+    with pytest.raises(Refused, match=r"ball_on_wall starts 0\.48 m deep in a contact of 1e\+06 N/m, beyond its wall"):
+        EXUDYN.build(heavy, MATCHED)

@@ -164,6 +164,9 @@ class Spheres(Redundant):
         elif isinstance(second, CurvedWall):
             hollow = self._add_hollow(second, partner, shape, body)
             self._following.append(hollow)
+            if sunk >= 2 * hollow.radius:
+                depth = f"{contact.name} starts {sunk:.3g} m deep in a contact of {stiffness:g} N/m"
+                raise Refused(f"{depth}, beyond its wall's other side; give a larger stiffness")
             made = items.ObjectContactSphereSphere(
                 markerNumbers=[hollow.sphere, hollow.marker],
                 spheresRadii=[shape.radius + sunk / 2, hollow.radius - sunk / 2],  # or what rolls would slip
