@@ -1,4 +1,4 @@
-"""Exudyn: redundant coordinates with constraints, joint trees, and balls on walls."""
+"""Exudyn: redundant coordinates with constraints, joint trees, and contacts of spheres and of discs."""
 
 from proofroll.engines.exudyn.adapter import Exudyn
 

@@ -41,7 +41,7 @@ _SOME = tuple(dict.fromkeys(name for names in _OWN.values() for name in names))
 
 @dataclass(frozen=True)
 class MujocoSettings:
-    """Formulation, time step and the options of contact that matter for rolling.
+    """Formulation, time step and the options of contact.
 
     Attributes:
         formulation: ``joints``: a mechanism of MuJoCo's joints, tendons and equality constraints, which has no contact

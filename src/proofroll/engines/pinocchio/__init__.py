@@ -1,8 +1,7 @@
-"""Pinocchio: its terms of the equations of motion, with rolling constraints and time integration added here.
+"""Pinocchio: its terms of the equations of motion, with time integration added here.
 
-Pinocchio has no rolling joint. It supplies mass matrix, bias, Jacobians, their drift, reactions and the arithmetic of
-configurations; this package adds the rows of rolling, and integrates the motion. Pinocchio's own frictional contact
-solver is the formulation ``impulses``.
+It supplies mass matrix, bias, Jacobians, their drift, reactions and the arithmetic of configurations; this package
+integrates the motion. Pinocchio's own frictional contact solver is the formulation ``impulses``.
 
 Needs Pinocchio 4 (``tangentMap``), which lists ``forwardDynamics`` and ``impulseDynamics`` among its unsupported
 algorithms: shipped, but without a promise.

@@ -23,7 +23,7 @@ _OF_PINOCCHIO_4 = {"constraint_dynamics", "impulses"}
 
 
 class Pinocchio:
-    """Adapter of Pinocchio: its equations of motion with rolling constraints, or its own frictional contact solver."""
+    """Adapter of Pinocchio: its equations of motion with the rows of joints and loops, or its own contact solver."""
 
     name: ClassVar[str] = "pinocchio"
     title: ClassVar[str] = "Pinocchio"

@@ -31,8 +31,7 @@ class Projection:
             formulations=tuple(PRESETS),
             on={"elimination": True},
             off={"elimination": False},
-            because="takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant "
-            "coefficients, as in the rotating frame, there is none",
+            because="takes away the violation of the constraints that a step leaves (Blajer 2002)",
         ),
     )
 

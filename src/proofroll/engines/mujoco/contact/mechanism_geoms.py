@@ -47,7 +47,7 @@ LACKING: Mapping[str, str] = {
 
 
 def family(settings: MujocoSettings) -> Mapping[str, str]:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`; the same for balls and for bodies of mechanisms."""
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
     elliptic = Family.HARD if settings.cone_correction else Family.CONVEX
     kind = Family.PYRAMID if settings.cone == "pyramidal" else elliptic
     return of_contact(kind, time=settings.contact_time if settings.time_constant is None else None)

@@ -61,7 +61,7 @@ _NARROW, _WIDER = 1.0, 3.0
 
 
 def family(settings: PinocchioSettings) -> Mapping[str, str]:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`; the same for balls and mechanisms."""
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
     return of_contact(Family.CONVEX if settings.convex else Family.HARD)
 
 
