@@ -50,7 +50,8 @@ LACKING: Mapping[str, str] = {
 # sphere in radii of that: the sphere moves by far less than one between two residuals.
 _WIDE, _FOLLOWS = 1e3, 10.0
 # Missing friction at the start, in units of the largest contact force: less than the first counts as none; the
-# tolerance of accelerations is at most the second, as for soft loops.
+# tolerance of accelerations is at most the second, as for soft loops. Where one contact lacks more, first forces prove
+# nothing.
 _LITTLE, _LARGEST = 1e-6, 0.5
 # Relative error of accelerations at the start that Exudyn differentiates numerically.
 _DIFFERENCED = 1e-5
@@ -107,25 +108,26 @@ class Spheres(Redundant):
             start = dynamics.solve(*mechanism.start(), dynamics.begin()[0])
         except NotUnique:  # the contact forces are not determined
             start = dynamics.solve(*mechanism.start(), (OPEN,) * len(dynamics.contacts))
-        lacking = 0.0
+        missing = [0.0]
         for number, contact in enumerate(mechanism.contacts):
             touch = start.state.touching[number]
             slip = touch.slide - touch.normal * (touch.normal @ touch.slide)
             pressed, speed = max(float(start.force[number] @ touch.normal), 0.0), float(np.linalg.norm(slip))
             self._contacts.append(self._add_contact(contact, touch.gap, pressed, speed, settings))
             if speed < settings.penalty[1]:
-                lacking += float(np.linalg.norm(start.force[number] - pressed * touch.normal))
+                missing.append(float(np.linalg.norm(start.force[number] - pressed * touch.normal)))
         moments = start.force[len(start.force) - len(dynamics.turning) :]
         for friction, moment in zip(dynamics.turning, moments, strict=True):
-            lacking += self._add_turning(friction, moment, start.state.touching[friction.pressed_by], settings)
+            missing.append(self._add_turning(friction, moment, start.state.touching[friction.pressed_by], settings))
         if self._events:
             self.system.SetPostStepUserFunction(self._observe)
         if self._following:
             self.system.SetPreNewtonResidualUserFunction(self._follow)
         load = float(np.abs(start.force[: len(mechanism.contacts)]).max(initial=0.0))
-        self._builds_up = lacking > _LITTLE * load
+        self._builds_up = sum(missing) > _LITTLE * load
         if self._builds_up:
-            self._softness = min(_LARGEST, 2 * lacking / load)
+            most = np.inf if max(missing) > _LARGEST * load else _LARGEST
+            self._softness = min(most, 2 * sum(missing) / load)
 
     def _add_contact(
         self, contact: BodyContact, gap: float, pressed: float, slip: float, settings: ExudynSettings

@@ -28,7 +28,9 @@ from proofroll.engines.mujoco.smooth.mechanism import MujocoMechanism
 _CAPABILITY = MechanismCapability
 # Rounds for the lift of slip; each at least halves its error.
 _ROUNDS = 40
-_MARGIN = 1.1
+# Margin of what hard contacts would change. With J̇v they start as deep as the soft ones and keep half of the slip that
+# this depth makes, so as much again is missing.
+_MARGIN, _OF_DEPTH = 1.1, 2.0
 # Evaluations of a start with velocities that lag: each halves the error along the rows of contacts.
 _LAGS = 41
 # Factor on the share of the load that the impedance does not carry, for it acts on the bodies with lever arms.
@@ -230,15 +232,16 @@ class MujocoGeoms(MujocoMechanism):
             * max(_OF_LOAD, times_softer(self._mechanism))
             * float(np.linalg.norm(self._mechanism.gravity))
         )
+        margin = _MARGIN * (_OF_DEPTH if self._settings.curvature else 1.0)
         for name, expected in hard.items():
             size = longest(expected) or np.finfo(float).tiny
             rest = load / (longest(hard["acceleration"]) or np.finfo(float).tiny)
             difference = longest(expected - getattr(plain, name)) / size
-            softened[name] = Regularised(_MARGIN * difference + rest + DEPENDENT, _SOFT)
+            softened[name] = Regularised(margin * difference + rest + DEPENDENT, _SOFT)
         least = max(softened[name].tolerance for name in hard)
         for name, expected in hard_forces.items():
             size = np.nanmax(np.abs(expected)) or np.finfo(float).tiny
-            share = max(_MARGIN * float(np.nanmax(np.abs(expected - forces[name])) / size), least)
+            share = max(margin * float(np.nanmax(np.abs(expected - forces[name])) / size), least)
             loops = plain.regularised.get(name)
             softened[name] = Regularised(share + (0.0 if loops is None else loops.tolerance), _SOFT)
         return replace(plain, **contacts, regularised=softened)
