@@ -99,3 +99,9 @@ def test_friction_above_half_the_load_builds_up_unseen():
     lines = element.certify(run.built(), run.sample())
     assert [str(line) for line in lines if not line.holds] == []
     assert next(line for line in lines if line.quantity == "forces of contact").difference is None
+
+
+def test_friction_beyond_the_coefficient_that_stands_for_unbounded_is_refused():
+    """A ball that hardly presses needs 200 times its normal force, which that coefficient does not hold."""
+    with pytest.raises(Refused, match=r"ball_on_wall needs a friction of .* a coefficient of 100 stands for unbounded"):
+        EXUDYN.build(load_scene("sphere_in_cylinder", speed=0.05), MATCHED)

@@ -108,6 +108,7 @@ class Spheres(Redundant):
             start = dynamics.solve(*mechanism.start(), dynamics.begin()[0])
         except NotUnique:  # the contact forces are not determined
             start = dynamics.solve(*mechanism.start(), (OPEN,) * len(dynamics.contacts))
+        load = float(np.abs(start.force[: len(mechanism.contacts)]).max(initial=0.0))
         missing = [0.0]
         for number, contact in enumerate(mechanism.contacts):
             touch = start.state.touching[number]
@@ -115,7 +116,11 @@ class Spheres(Redundant):
             pressed, speed = max(float(start.force[number] @ touch.normal), 0.0), float(np.linalg.norm(slip))
             self._contacts.append(self._add_contact(contact, touch.gap, pressed, speed, settings))
             if speed < settings.penalty[1]:
-                missing.append(float(np.linalg.norm(start.force[number] - pressed * touch.normal)))
+                held = float(np.linalg.norm(start.force[number] - pressed * touch.normal))
+                if contact.friction > _GRIP and held > max(_GRIP * pressed, _LITTLE * load):
+                    needed = f"{contact.name} needs a friction of {held:.3g} N at {pressed:.3g} N of normal force"
+                    raise Refused(f"{needed}; here a coefficient of {_GRIP:g} stands for unbounded friction")
+                missing.append(held)
         moments = start.force[len(start.force) - len(dynamics.turning) :]
         for friction, moment in zip(dynamics.turning, moments, strict=True):
             missing.append(self._add_turning(friction, moment, start.state.touching[friction.pressed_by], settings))
@@ -123,7 +128,6 @@ class Spheres(Redundant):
             self.system.SetPostStepUserFunction(self._observe)
         if self._following:
             self.system.SetPreNewtonResidualUserFunction(self._follow)
-        load = float(np.abs(start.force[: len(mechanism.contacts)]).max(initial=0.0))
         self._builds_up = sum(missing) > _LITTLE * load
         if self._builds_up:
             most = np.inf if max(missing) > _LARGEST * load else _LARGEST
