@@ -52,7 +52,8 @@ def judge(
     """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs.
 
     With --robot and --control: test a record of a robot layer by layer, without a simulation: instants from the rate,
-    observation from the state, action, target, effort, and in the air acceleration; without --control the last alone.
+    observation from the state, action, target, effort, and in the air acceleration. Without --control: state and
+    acceleration.
     """
     from proofroll.core.errors import InputError
     from proofroll.files.trajectory_file import CSV, NETCDF, STORED

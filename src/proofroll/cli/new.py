@@ -95,6 +95,8 @@ def probe(
     if source is None or not isinstance(source[0], StartsProbes):
         raise InputError("robot", robot, "give the path of a robot file, .urdf or .xml")
     start = source[0].probe_start(robot, free=base == "free")
+    if start.kind != "urdf" and base == "free":
+        raise InputError("--base", base, "an MJCF says itself what carries its root; leave it out")
     if program == "isaaclab" and start.kind != "urdf":
         raise InputError("robot", robot, "Isaac Lab reads a URDF; give the robot's, or --for mujoco")
     name = f"probe_{re.sub('[^a-z0-9_]', '_', robot.stem.lower())}_{program}"

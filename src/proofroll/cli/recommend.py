@@ -166,7 +166,7 @@ def _spec_of_one(matrix: ChoiceMatrix, tolerance: float, *, forces: bool) -> str
     from proofroll.report.page.answer import answer
 
     single = [item for item in answer(matrix, tolerance, forces).columns if not item.column.whole]
-    if len(single) > 1:
+    if len(single) != 1:
         names = ", ".join(item.column.name for item in single)
         raise InputError("--lines", "given", f"it is for one scene; name one of {names}")
     taken = single[0].taken

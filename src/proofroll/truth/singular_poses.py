@@ -21,7 +21,7 @@ def singular_poses(mechanism: Mechanism, until: float, step: float) -> list[floa
     The motion until ``until``, s, is integrated by Runge-Kutta 4 with a fixed rank, which passes singular poses.
     """
     equations = JointCoordinates(mechanism)
-    if not equations.rank:
+    if not (mechanism.loops and equations.rank):
         return []
     times = np.linspace(0.0, until, max(round(until / step), 5) + 1)
     return _passed(equations, times, (y[: mechanism.nq] for y in equations.rk4_states(times, float(times[1]))))
@@ -29,7 +29,7 @@ def singular_poses(mechanism: Mechanism, until: float, step: float) -> list[floa
 
 def singular_poses_of(form: ClosedForm, equations: JointCoordinates, until: float) -> list[float]:
     """Times, s, of singular poses along a motion in closed form until ``until``, s."""
-    if not equations.rank or form.motion is None or not until:
+    if not (equations.mechanism.loops and equations.rank) or form.motion is None or not until:
         return []
     fastest = float(np.abs(form.motion(np.linspace(0.0, until, _FEW))[1]).max())
     times = np.linspace(0.0, until, int(np.clip(until * fastest / _TURN, _FEW, _MOST)) + 1)

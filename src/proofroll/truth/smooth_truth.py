@@ -53,6 +53,7 @@ _FORM_STEPS = 4  # parts of a run at which a closed form is held to the laws
 _FORM_STEP = 1.0  # length of each at most, in natural units
 _WITNESS_STEP = 2.0**-7  # length of the equal steps of a closed form's witness at most, in natural units
 _POSE_STEP = 2.0**-6  # length of steps that look for singular poses at most, in natural units
+_MOST_STEPS = 20_000  # of either, above which they are longer
 
 
 def find_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
@@ -190,7 +191,8 @@ class _SmoothTruth:
 
     def _by_form(self, form: ClosedForm) -> TwoRouteMotion:
         """Motion in closed form where routes fail; equal steps in joint coordinates are its witness."""
-        states = self._equations.rk4_states(self._times, _WITNESS_STEP)
+        step = max(_WITNESS_STEP, self._until / _MOST_STEPS)
+        states = self._equations.rk4_states(self._times, step)
         witness = self._in_seconds(self._equations.recorded(self._times, states))
         exact = on_same_turns(self._mechanism, witness, self._from_form(form, self._seconds))
         early = EarlyEnd()
@@ -220,7 +222,7 @@ class _SmoothTruth:
 
     def _reason(self, end: float, reason: str) -> str:
         """Reason of an early end: the singular pose there, if there is one."""
-        step = min(_POSE_STEP, end / 200)
+        step = max(min(_POSE_STEP, end / 200), end / _MOST_STEPS)
         if not reason or not step > 0:
             return reason
         try:

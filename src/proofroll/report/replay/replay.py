@@ -25,8 +25,9 @@ LEAST_PER_SECOND, LEAST_FRAMES, MOST_FRAMES = 60, 120, 600
 # Turn of a body from one frame to the next [rad]: one that looks smooth, and the largest one, for beyond half a turn
 # interpolation goes the shorter, wrong way.
 SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
-# Most coordinates whose values are listed; rounding of a listed value, relative to its largest one.
-_MOST_READINGS, _ROUNDED = 6, 2.0**-20
+# Most coordinates whose values are listed; rounding of a listed value, relative to its size; part of the largest value
+# of any run that this size is at least, as packed numbers have at most 2^30 steps; least size, in the value's unit.
+_MOST_READINGS, _ROUNDED, _PACKED, _LEAST = 6, 2.0**-20, 1e-3, 1e-9
 
 
 def replay_content(outcomes: list[Outcome], kind: ReplayKind, page_engines: Sequence[str] = ()) -> Replay:
@@ -132,13 +133,16 @@ def _readings(
     count of frames, unless the ghost does not give it in full.
     """
     readings: list[dict[str, object]] = []
+    motions = [ghost.motion for ghost in replayed.ghosts]
     for name, text in [*kind.readings(replayed.scene)[:_MOST_READINGS], ("energy", "J")]:
         if name not in replayed.true or not np.isfinite(values := replayed.true[name].to_numpy()).all():
             continue
         column = np.interp(times, replayed.true["time"], values)
-        size, packed_name = float(np.abs(column).max()), f"reading{len(readings)}"
+        furthest = [float(np.nanmax(np.abs(run[name].to_numpy()), initial=0.0)) for run in motions if name in run]
+        size = max(float(np.abs(column).max()), *(_PACKED * value for value in furthest if np.isfinite(value)), _LEAST)
+        packed_name = f"reading{len(readings)}"
         readings.append({"symbol": symbol(name), "unit": unit(text), "size": size})
-        drawn.put(packed_name, 0, column, _ROUNDED * (size or 1.0))
+        drawn.put(packed_name, 0, column, _ROUNDED * size)
         for number, (ghost, count) in enumerate(zip(replayed.ghosts, counts, strict=True), start=1):
             if name not in ghost.motion:
                 continue
@@ -146,7 +150,7 @@ def _readings(
             shifted = on_turns_of(values[: len(run)], run, name, (replayed.true, ghost.motion))
             if shifted is not None and np.isfinite(shifted).all():
                 column = np.interp(times[:count], ghost.motion["time"], shifted)
-                drawn.put(packed_name, number, column, _ROUNDED * (size or 1.0))
+                drawn.put(packed_name, number, column, _ROUNDED * size)
     return readings
 
 

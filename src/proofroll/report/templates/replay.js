@@ -1,6 +1,6 @@
 "use strict";
 // The replay: unpacks a case, follows the time, and lets the kind of scene write its values and draw its bodies. Without
-// WebGL it only writes. `replayed` holds what each kind of scene brings: columns, rows, write, compare, build, draw, key
+// WebGL it only writes. `replayed` holds what each kind of scene brings: columns, rows, compare, build, draw, key
 // and reach, made from the tools of `replay` below.
 (() => {
   const root = document.querySelector(".replay");

@@ -244,7 +244,7 @@ def _heavier(rows: _Rows, robot: AirRobot) -> Iterator[LayerCause]:
             place = ", ".join(f"{x:.3g}" for x in (numbers[1:] / numbers[0]).round(4).tolist())
             words = f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"
             heavier_bodies.append((distance, body, float(numbers[0]), words))
-        else:
+        elif mass + values[0] > 0:
             distance = _rms(rows.left - columns @ values)
             change = f"mass, centre and inertia of {body} are others, {values[0]:+.3g} kg"
             words = change if seen[0] else f"centre and inertia of {body} are others"

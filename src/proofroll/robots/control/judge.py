@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, error
@@ -133,7 +135,8 @@ def judge_record(
         eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
         digits = max(eps, default=0.0) / 2
         read = record_of(time, columns, record, digits=digits)
-        stepwise = "sim_dt" in arrays and bool(np.isclose(np.ravel(arrays["sim_dt"])[0], _step(read), rtol=_SAME_STEP))
+        if "sim_dt" in arrays:
+            stepwise = bool(np.isclose(_step_of(record, arrays["sim_dt"]), _step(read), rtol=_SAME_STEP))
     else:
         if record.suffix in ARRAYS:
             raise InputError("--as", "", f"say whose arrays these are: {', '.join(LAYOUTS)}")
@@ -192,6 +195,13 @@ def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[st
                 f"v.{joint} passes the velocity limit {limit:.4g} of the robot's file at {instant:.4g} s; a program "
                 "that clamps velocities moves it otherwise"
             )
+
+
+def _step_of(path: Path, values: NDArray[Any]) -> float:
+    """Step of the program that made a file of arrays [s]. Raises InputError if it is no number."""
+    if values.size != 1 or values.dtype.kind not in "fiu":
+        raise InputError("sim_dt", path, "it has to be one number, the step of the simulator in seconds")
+    return float(values.ravel()[0])
 
 
 def _step(record: ControlRecord) -> float:

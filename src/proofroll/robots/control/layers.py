@@ -264,7 +264,9 @@ def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:
         corrected = dataclasses.replace(evidence, record=mistake.changed(evidence.record))
         left = _norm(corrected, layer.name, evidence.law)
         parts = {name: _norm(evidence, name, evidence.law) for name in {layer.name, "action"}}
-        if all(_norm(corrected, name, evidence.law) <= _HELPS * part for name, part in parts.items()):
+        if all(
+            np.isfinite(part) and _norm(corrected, name, evidence.law) <= _HELPS * part for name, part in parts.items()
+        ):
             trials.append((left, LayerCause(mistake.id, mistake.words, None, left), corrected))
     tried = dataclasses.replace(
         layer, tried=layer.tried + len(column_mistakes), known=layer.known + len(column_mistakes)

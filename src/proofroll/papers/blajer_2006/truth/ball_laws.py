@@ -82,7 +82,8 @@ def _pieces(element: MechanismElement, ball: RollingBall, motion: BallMotion, ti
     moment = np.zeros_like(outward)
     if resistance:
         press = -np.sum(motion.force * outward, axis=-1, keepdims=True)
-        direction = motion.v_WB / np.linalg.norm(motion.v_WB, axis=-1, keepdims=True)
+        speed = np.linalg.norm(motion.v_WB, axis=-1, keepdims=True)
+        direction = np.divide(motion.v_WB, speed, out=np.zeros_like(motion.v_WB), where=speed > 0)
         moment = resistance * press * cross(direction, -outward)
 
     def of_ball(values: FloatArray) -> FloatArray:

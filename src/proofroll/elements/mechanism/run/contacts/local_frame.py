@@ -268,7 +268,8 @@ def local_bars(body: BodyOnWall, dataset: xr.Dataset, bars: Mapping[str, float])
     u = np.stack([dataset[name].to_numpy() for name in body.surface.coordinates], axis=-1)
     ways = np.linalg.norm(body.surface.tangents(u), axis=-2)
     bends = np.linalg.norm(body.surface.second(u), axis=-3) / (ways[:, :, None] * ways[:, None, :])
-    turned, a, least = float(bends.max()) * bars["p_WB"], body.ball.radius, ways.min(axis=0).tolist()
+    turned = float(bends.max()) * bars["p_WB"] if bends.any() else 0.0  # and not 0 * inf
+    a, least = body.ball.radius, ways.min(axis=0).tolist()
     speed, spin = (longest(dataset[name].to_numpy()[:, body.index]) for name in ("v_WB", "w_WB"))
     all_bars = {"attitude": bars["q_WB"], "gap": bars["p_WB"]}
     for name, way in zip(body.surface.coordinates, least, strict=True):
@@ -281,9 +282,8 @@ def local_bars(body: BodyOnWall, dataset: xr.Dataset, bars: Mapping[str, float])
         all_bars |= dict.fromkeys(FORCES, bars["pressed"] + turned * float(force.max()))
         normal, needed = dataset["N"].to_numpy(), dataset["needed_friction"].to_numpy()
         presses = normal > _NOTHING * all_bars["N"]
-        all_bars["needed_friction"] = float(
-            np.max(all_bars["N"] * (1 + needed[presses]) / normal[presses], initial=0.0)
-        )
+        of_friction = np.max(all_bars["N"] * (1 + needed[presses]) / normal[presses], initial=0.0)
+        all_bars["needed_friction"] = float(of_friction) if np.isfinite(all_bars["N"]) else np.inf
     values = {name: dataset[name].to_numpy() for name in all_bars}
     sizes = {name: float(np.max(np.abs(value[np.isfinite(value)]), initial=0.0)) for name, value in values.items()}
     return {name: bar + _ROUND_OFF * sizes[name] for name, bar in all_bars.items()}
