@@ -279,7 +279,7 @@ def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
             for name, capabilities in engine.provides.items()
             if scene.requires <= capabilities and offered(name, scene.requires, purposes)
         ]
-        none = f"no formulation of {engine.name} has {'all of that' if len(missing) > 1 else 'that'}"
+        none = f"no formulation of {engine.name}'s adapter has {'all of that' if len(missing) > 1 else 'that'}"
         instead = f"choose formulation={' or '.join(able)}" if able else none
         needs = ", ".join(f"{name}, and {reasons[name]}" if name in reasons else name for name in missing)
         raise Refused(f"needs {needs}; {instead}")

@@ -117,7 +117,7 @@ def test_two_kinds_that_no_engine_has_together(
     assert code == 3, err
     (row,) = json.loads(out)["rows"]
     assert (row["engine"], row["verdict"]) == ("reduced", "refused")
-    assert "needs revolute joints; no formulation of reduced has that" in row["reason"]
+    assert "needs revolute joints; no formulation of reduced's adapter has that" in row["reason"]
 
 
 @pytest.mark.drill

@@ -258,7 +258,7 @@ def test_capabilities_are_checked_before_anything_is_built(tmp_path: Path, make_
     result = run_one(case, tmp_path / "run.npz")
     assert result.status is Status.REFUSED
     assert result.message.startswith(
-        "needs friction of contacts against rolling and spinning; no formulation of oracle has"
+        "needs friction of contacts against rolling and spinning; no formulation of oracle's adapter has"
     )
 
 

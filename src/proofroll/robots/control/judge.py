@@ -148,10 +148,10 @@ def judge_record(
     names_of_layers = DIFFERENCES if control else ()
 
     def layers_of(reading: StateReading) -> list[Layer]:
-        before = [] if reading.layer is None else [reading.layer]
+        state_layers = [] if reading.layer is None else [reading.layer]
         mechanism, grounded = model.mechanism, model.grounded
         return [
-            *before,
+            *state_layers,
             *record_layers(reading.record, law, mechanism, grounded=grounded, names=names_of_layers, stepwise=stepwise),
         ]
 
@@ -159,10 +159,10 @@ def judge_record(
     # Of readings that explain the state alike, layers behind it tell the right one.
     read, layers = min(judged, key=lambda item: sum(not layer.holds for layer in item[1]))
     if not all(layer.holds for layer in layers) and (degrees := reading_in_degrees(read)) is not None:
-        behind = layers_of(degrees)
-        looked_at = any(layer.residual is not None for layer in behind[1:])
-        if looked_at and all(layer.holds for layer in behind[1:]):
-            read, layers = degrees.record, behind
+        _, *later_layers = layers_in_degrees = layers_of(degrees)
+        computed = any(layer.residual is not None for layer in later_layers)
+        if computed and all(layer.holds for layer in later_layers):
+            read, layers = degrees.record, layers_in_degrees
     return RecordJudgement(
         record=str(record),
         robot=str(robot),

@@ -59,8 +59,8 @@ def probe_start(path: Path, *, free: bool) -> ProbeStart:
         rate = np.zeros(len(M))
         rate[moved] = part * accelerations
         if air.base is not None:
-            own = air.base[1]
-            rate[own] = np.linalg.solve(M[own, own], (inner + weight - M @ rate)[own])
+            places = air.base[1]
+            rate[places] = np.linalg.solve(M[places, places], (inner + weight - M @ rate)[places])
         efforts.append((M @ rate - inner - weight)[moved])
     constant, swing = efforts[0], efforts[1] - efforts[0]
     limits = [np.inf if joints[name].effort is None else joints[name].effort for name in air.joints]

@@ -194,7 +194,10 @@ def _with_orientation(
         apart = float(np.abs(result[name] - turning[name]).max())
         if not apart <= result[name].attrs["error_bar"] + turning[name].attrs["error_bar"]:
             raise Diverged(f"{name} of two truths of the ball are {apart:.3g} apart, more than their error bars")
-    told = {"ill_posed"} if ENDS in result.attrs else {ENDS, ENDED, "ill_posed"}
-    ends = {name: turning.attrs[name] for name in told & turning.attrs.keys()}
+    ends = {name: turning.attrs[name] for name in ("ill_posed",) if name in turning.attrs}
+    ended = [item.attrs for item in (result, turning) if ENDS in item.attrs]
+    if ended:
+        first = min(ended, key=lambda attrs: float(attrs[ENDS]))
+        ends |= {name: first[name] for name in (ENDS, ENDED)}
     routes = {name: f"{result.attrs[name]}; orientation by {turning.attrs[name]}" for name in ("route", "second_route")}
     return result.assign(turning[["q_WB", "attitude", "attitudes"]].data_vars).assign_attrs(routes | ends)

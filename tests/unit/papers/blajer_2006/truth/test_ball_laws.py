@@ -45,15 +45,21 @@ def test_a_fault_that_both_routes_share_is_refused(name: str, monkeypatch: pytes
         truth(load_scene("sphere_in_cylinder", rolling_resistance=5e-4), TIMES)
 
 
-def test_values_before_a_violation_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where a route goes wrong at 1 s, samples before are there, and the end is at the first piece that shows it."""
-    kept = ball_laws._pieces
+@pytest.fixture
+def wrong_from_a_second_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forces that both routes state a thousandth too large from 1 s on."""
+    honest = ball_laws._pieces
 
-    def wrong_later(*given: object) -> ball_laws.Pieces:
-        pieces = kept(*given)  # type: ignore[arg-type] -- passed on as they come
+    def pieces_of(*arguments: object) -> ball_laws.Pieces:
+        pieces = honest(*arguments)  # type: ignore[arg-type] -- passed on as they come
         return replace(pieces, force=np.where(pieces.time[..., None, None] < 1.0, 1.0, 1.001) * pieces.force)
 
-    monkeypatch.setattr(ball_laws, "_pieces", wrong_later)
+    monkeypatch.setattr(ball_laws, "_pieces", pieces_of)
+
+
+@pytest.mark.usefixtures("wrong_from_a_second_on")
+def test_values_before_a_violation_are_kept() -> None:
+    """Where a route goes wrong at 1 s, samples before are there, and the end is at the first piece that shows it."""
     dataset = truth(load_scene("sphere_in_cylinder"), TIMES)
     assert 1.0 <= dataset.attrs[ENDS] < 1.3
     assert dataset["time"].to_numpy().tolist() == TIMES[dataset.attrs[ENDS] > TIMES].tolist()
@@ -78,3 +84,12 @@ def test_a_long_motion_is_looked_at_where_times_have_digits(monkeypatch: pytest.
     assert residuals.first is None
     monkeypatch.setattr(ball_laws, "_SPAN", np.inf)
     assert ball_laws.checked_motion(*given, coarse=False)[1].first is not None
+
+
+@pytest.mark.usefixtures("wrong_from_a_second_on")
+def test_with_its_orientation_a_violation_still_ends_the_truth() -> None:
+    """The general truth, which knows no end, adds the orientation up to that end and no line that says laws hold."""
+    dataset = truth(load_scene("sphere_in_cylinder").fully_asked, TIMES)
+    assert 1.0 <= dataset.attrs[ENDS] < 1.3
+    assert len(dataset["q_WB"]) == len(dataset["time"]) < len(TIMES)
+    assert LAWS not in dataset.attrs
