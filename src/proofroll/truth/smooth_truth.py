@@ -7,6 +7,7 @@ truth, the others give its error bar. If in both routes a start displaced by :da
 conservative mechanism has failed, and shows no chaos.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -17,7 +18,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.start import natural_scale
-from proofroll.elements.mechanism.dynamics.analysis import analyse
+from proofroll.elements.mechanism.dynamics.analysis import analyse, singular_values
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.link_forces import powers, working
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
@@ -53,6 +54,8 @@ _FORM_STEPS = 4  # parts of a run at which a closed form is held to the laws
 _FORM_STEP = 1.0  # length of each at most, in natural units
 _WITNESS_STEP = 2.0**-7  # length of the equal steps of a closed form's witness at most, in natural units
 _POSE_STEP = 2.0**-6  # length of steps that look for singular poses at most, in natural units
+_SINGULAR = 1e-3  # least singular value of rows relative to the largest, below which a pose counts as singular
+_END = 1e-6  # accuracy of the time from which a route is wrong, relative to it
 _MOST_STEPS = 20_000  # of either, above which they are longer
 
 
@@ -136,14 +139,14 @@ class _SmoothTruth:
         count = len(growth)
         by_tree, by_bodies = self._by_tree(paths[0], count), self._by_bodies(paths[1], count)
         by_bodies = on_same_turns(self._mechanism, by_tree, by_bodies)
-        self._check_energy(by_tree, "joint coordinates", early)
-        self._check_energy(by_bodies, "maximal coordinates", early)
+        self._check_energy(by_tree, "joint coordinates", early, paths[0], partial(self._tree_at, paths[0]))
+        self._check_energy(by_bodies, "maximal coordinates", early, paths[0], partial(self._bodies_at, paths[1]))
         chaotic = growth * NUDGE > CHAOS
         if chaotic.any():
             by_the_tree = early.run(partial(self._growth_of_tree, paths[0]), self._times)
             count = len(by_the_tree)
             chaotic = chaotic[:count] & (by_the_tree * NUDGE > CHAOS)
-        self._check_branch(by_tree.first(count), by_bodies.first(count), chaotic, early)
+        self._check_branch(by_tree.first(count), by_bodies.first(count), chaotic, early, paths)
         laws = self._held_to_laws(paths, early)
         count = len(early.known(self._times))
         by_tree, by_bodies = by_tree.first(count), by_bodies.first(count)
@@ -233,13 +236,21 @@ class _SmoothTruth:
 
     def _by_tree(self, path: FollowedPath, count: int) -> Record:
         """Record of the first route at the first times."""
-        states = self._tree.within(path.stretches[0], self._times[:count])
-        return self._in_seconds(self._equations.recorded(self._times[:count], states[:, :-1]))
+        return self._tree_at(path, self._times[:count])
+
+    def _tree_at(self, path: FollowedPath, times: Array) -> Record:
+        """Record of the first route at rising times."""
+        states = self._tree.within(path.stretches[0], times)
+        return self._in_seconds(self._equations.recorded(times, states[:, :-1]))
 
     def _by_bodies(self, path: FollowedPath, count: int) -> Record:
         """Record of the second route at the first times."""
-        states = self._bodies.within(path.stretches[0], self._times[:count])
-        return self._in_seconds(self._second.recorded(self._times[:count], states[:, :-1]))
+        return self._bodies_at(path, self._times[:count])
+
+    def _bodies_at(self, path: FollowedPath, times: Array) -> Record:
+        """Record of the second route at rising times."""
+        states = self._bodies.within(path.stretches[0], times)
+        return self._in_seconds(self._second.recorded(times, states[:, :-1]))
 
     def _from_form(self, form: ClosedForm, seconds: Array) -> Record:
         """Record of a closed form at times [s].
@@ -377,24 +388,60 @@ class _SmoothTruth:
         lasting = np.maximum.accumulate(SAFETY * largest(values[1] - values[0])) * np.diff(times, prepend=0.0)
         return works, np.cumsum(lasting) + unresolved.max(axis=1, initial=0.0)
 
-    def _check_energy(self, record: Record, route: str, early: EarlyEnd) -> None:
-        """Ends the truth where a route changes the energy of a conservative mechanism, for then it has failed."""
+    def _check_energy(
+        self, record: Record, route: str, early: EarlyEnd, path: FollowedPath, record_at: Callable[[Array], Record]
+    ) -> None:
+        """Ends the truth where a route changes the energy of a conservative mechanism, for then it has failed.
+
+        ``path``: of the first route; ``record_at``: record of the route at any times, in natural units, for an end does
+        not depend on where samples lie.
+        """
         mechanism = self._mechanism
         if not mechanism.conservative:
             return
         parts, scale = record.placed(mechanism).energies(), natural_scale(mechanism)
         change = np.abs(parts.sum(axis=1) - parts[0].sum())
         natural = mechanism.mass * (scale.length * scale.rate) ** 2  # a mechanism in balance may have no energy
-        lost = np.flatnonzero(change > ENERGY * max(natural, float(np.abs(parts).sum(axis=1).max())))
+        allowed = ENERGY * max(natural, float(np.abs(parts).sum(axis=1).max()))
+        lost = np.flatnonzero(change > allowed)
         if len(lost):
             reason = f"the route in {route} changes the energy by {change[lost[0]]:.2g} J"
-            early.at(float(self._times[lost[0]]), reason)
 
-    def _check_branch(self, record: Record, precise: Record, chaotic: NDArray[np.bool_], early: EarlyEnd) -> None:
+            def loses(time: Array) -> bool:
+                return bool(abs(record_at(time).placed(mechanism).energies().sum() - parts[0].sum()) > allowed)
+
+            end = self._first_time(loses, lost[0])
+            q = self._tree.within(path.stretches[0], np.array([end]))[0, : mechanism.nq]
+            values, rank = singular_values(self._equations.rows(q).C), self._equations.rank
+            at_pose = ", at a singular pose of the loops" if rank and values[rank - 1] < _SINGULAR * values[0] else ""
+            early.at(end, reason + at_pose)
+
+    def _check_branch(
+        self,
+        record: Record,
+        precise: Record,
+        chaotic: NDArray[np.bool_],
+        early: EarlyEnd,
+        paths: tuple[FollowedPath, FollowedPath],
+    ) -> None:
         """Ends the truth where two routes part without chaos, for then they have taken different branches."""
-        parted = np.flatnonzero((_apart(record, precise, self._units.length) > BRANCH) & ~chaotic)
+        unit = self._units.length
+        parted = np.flatnonzero((_apart(record, precise, unit) > BRANCH) & ~chaotic)
         if len(parted):
-            early.at(float(self._times[parted[0]]), "the two routes part, as at a singular pose")
+
+            def apart(time: Array) -> bool:
+                by_tree, by_bodies = self._tree_at(paths[0], time), self._bodies_at(paths[1], time)
+                return bool(_apart(by_tree, on_same_turns(self._mechanism, by_tree, by_bodies), unit)[0] > BRANCH)
+
+            early.at(self._first_time(apart, parted[0]), "the two routes part, as at a singular pose")
+
+    def _first_time(self, fails: Callable[[Array], bool], sample: int) -> float:
+        """Time from which a check fails, between a sample that fails and the one before, wherever the samples lie."""
+        end, held = float(self._times[sample]), float(self._times[sample - 1]) if sample else 0.0
+        while end - held > _END * end:
+            middle = (held + end) / 2
+            held, end = (held, middle) if fails(np.array([middle])) else (middle, end)
+        return end
 
 
 def _apart_in_fields(mechanism: Mechanism, record: Record, second: Record, part: float = 1.0) -> dict[str, Array]:
