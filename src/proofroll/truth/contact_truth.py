@@ -274,14 +274,15 @@ def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:
     q, v, begun = dynamics.parts(stretch.first)
     solution = dynamics.solve(q, v, stretch.mode, begun)
     pairs = zip(dynamics.contacts, solution.determinate, solution.state.touching, strict=True)
-    names = [
-        contact.name for contact, determinate, touch in pairs if not determinate[np.abs(touch.normal) > RANK].all()
-    ]
-    if not names:
+    sharing = [contact for contact, determinate, touch in pairs if not determinate[np.abs(touch.normal) > RANK].all()]
+    if not sharing:
         return ""
+    names = dict.fromkeys(contact.name for contact in sharing)
+    rolls = any(not friction.spins for friction in dynamics.turning if friction.name in names)
     return (
         f"{', '.join(names)} carry the load together in more ways than one, so that friction at each is not "
-        "determinate (a body on three points, or one that slides without turning, has a truth)"
+        f"determinate ({'without rolling_resistance ' if rolls else ''}a body on three points, or one that slides "
+        "without turning, has a truth)"
     )
 
 

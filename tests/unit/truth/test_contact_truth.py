@@ -915,6 +915,21 @@ def test_a_plate_slides_straight_on_eight_feet() -> None:
     assert found.record.p_WB[1, 0] == pytest.approx([0.6 * way, 0.8 * way, 0.1], abs=DIGITS)
 
 
+@pytest.mark.parametrize("spinning", [0.0, 0.01])
+def test_feet_that_resist_rolling_leave_the_turn_of_a_plate_open_unless_they_hold_its_spin(spinning: float) -> None:
+    """Moments against rolling split the load anyhow; friction then turns the plate, up to μ times their bound."""
+    plate = on_a_ring_of_feet(4, 1.0)
+    pairs = tuple(replace(pair, rolling_resistance=0.005, spinning_friction=spinning) for pair in plate.pairs)
+    found = truth_of(replace(plate, pairs=pairs), np.array([0.0, 0.02]))
+    if not spinning:
+        assert found.horizon == 0.0
+        assert "(without rolling_resistance a body on three points" in found.reason
+        return
+    way = 0.02 - 0.3 * 9.81 * 0.02**2 / 2
+    assert found.record.p_WB[1, 0] == pytest.approx([0.6 * way, 0.8 * way, 0.1], abs=DIGITS)
+    assert max(found.bars["p_WB"]) < DIGITS
+
+
 def test_a_plate_that_turns_on_thirty_two_feet_has_no_determinate_friction() -> None:
     """A true reason, and soon: feet that slide in different directions share the load in more ways than one."""
     found = truth_of(on_a_ring_of_feet(32, 1.0, spin=2.0), np.array([0.0, 0.05]))

@@ -101,15 +101,27 @@ class ContactBodies(ContactStretches):
             return self.equations.accelerated(bodies, tuple(directed))
 
         free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
-        if sticks == list(closed_mask) and not leaving:
-            actings = zip(provisional(self.equations, bodies, closed_mask), self._rubs, strict=True)
-            resting = tuple(
-                acting if rub or acting.kind == "open" else acting._replace(kind="slip") for acting, rub in actings
-            )
+        if any(sticks) and not leaving and not ways:
+            resting = self._resting(bodies, closed_mask, sticks)
             if all_held(self.equations, bodies, resting, free):
                 return resting, np.inf
         best = self._tried(bodies, closed_mask, sticks, ways, trial, free, leaving)[0]
         return self._completed(bodies, closed_mask, sticks, best, free)
+
+    def _resting(self, bodies: BodiesState, closed_mask: Sequence[bool], resting_mask: Sequence[bool]) -> ContactMode:
+        """Mode in which all that rests sticks, and the rest slips as it does."""
+        lines = provisional(self.equations, bodies, closed_mask)
+        mode = list[Acting]()
+        for acting, rub, rests, touch in zip(lines, self._rubs, resting_mask, bodies.touching, strict=True):
+            if acting.kind == "open" or (rub and rests):
+                mode.append(acting)
+            elif not rub:
+                mode.append(acting._replace(kind="slip"))
+            else:
+                slip = slip_velocity(touch)
+                way = direction_of(slip / (float(np.linalg.norm(slip)) or 1.0))
+                mode.append(Acting("slip", None if acting.along is None else way, way))
+        return tuple(mode)
 
     def _completed(
         self,
