@@ -45,7 +45,8 @@ class BodySymbols:
 
     def __init__(self, equations: ContactEquations) -> None:
         self._equations, self._bodies = equations, equations.equations.equations
-        self._kept = equations.equations.independent_rows()
+        self._kept = list(equations.equations.independent_rows())
+        self._moved_alone = equations.equations.moved_alone()
         self._touchings = len(equations.mechanism.contacts)
         self._laws = [contact for contact in equations.contacts if isinstance(contact, JointContact)]
         self._frictions = [contact for contact in equations.contacts if isinstance(contact, TurningFriction)]
@@ -152,8 +153,15 @@ class BodySymbols:
             within_limits=limits,
             poses=self._poses(motion.views)[:-1],
             efforts=[efforts.get(k, self._wanted(state, k, functions)) for k in range(len(e.mechanism.actuators))],
-            drives=None if e.mechanism.prescribed or e.mechanism.loops or e.mechanism.couplings else (),
+            drives=self._drives(motion.moved, answer),
         )
+
+    def _drives(self, moved: slice, answer: Sequence[Scalar]) -> list[Scalar] | None:
+        """Forces that impose motions; None where independent rows do not determine them, or of loops and couplings."""
+        e, rows = self._bodies, range(moved.start, moved.stop)
+        if e.mechanism.loops or e.mechanism.couplings or not (set(rows) <= set(self._kept) and self._moved_alone):
+            return None
+        return [answer[e.nu + self._kept.index(row)] for row in rows]
 
     def _poses(self, views: Sequence[BodyInScalars]) -> list[tuple[Vector, Sequence[Vector], Vector, Vector]]:
         """Place of its frame, rotation by rows, velocity and angular velocity of each body, and of the world."""
