@@ -26,14 +26,6 @@ def observables(content: ReportedComparison) -> dict[str, str]:
     return units
 
 
-def seconds_before(content: ReportedComparison) -> dict[int, float]:
-    """Number of each row -> longest time before its first step [s]; empty unless one of them exceeds 10 s."""
-    longest: dict[int, float] = {}
-    for run in content.runs:
-        longest[run.row] = max(longest.get(run.row, 0.0), run.build_seconds or 0.0)
-    return longest if max(longest.values(), default=0.0) > COMPILES else {}
-
-
 @dataclass(frozen=True)
 class Expectation:
     """Settings that share one expectation; ``further``: claims besides the verdict."""

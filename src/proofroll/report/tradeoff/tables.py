@@ -195,22 +195,6 @@ def point_table(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantitie
     return table
 
 
-def held_first(
-    study: TradeoffStudy, points: Sequence[MeasuredPoint], quantity: str
-) -> list[tuple[MeasuredPoint, bool | None]]:
-    """Points of a front, each with True if it holds ``FIRST_TOLERANCE``: these first, the cheapest of them first.
-
-    Then those that do not hold it, the most accurate first. None: the quantity has no scale, and the order is kept.
-    """
-    scale = study.quantities[quantity].scale if quantity in study.quantities else None
-    if scale is None:
-        return [(point, None) for point in points]
-    told: list[tuple[MeasuredPoint, bool | None]] = [
-        (point, point.envelope_of(quantity) <= FIRST_TOLERANCE * scale) for point in points
-    ]
-    return [pair for pair in told if pair[1]] + [pair for pair in reversed(told) if not pair[1]]
-
-
 def corner_table(study: TradeoffStudy, quantity: str) -> Table:
     """Table of points that were run over ranges of parameters: error at the defaults, and worst at the corners."""
     title = f"Over {_ranges(study)}: error of {quantity} [{study.quantities[quantity].unit}]"
