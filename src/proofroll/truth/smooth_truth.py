@@ -139,8 +139,8 @@ class _SmoothTruth:
         count = len(growth)
         by_tree, by_bodies = self._by_tree(paths[0], count), self._by_bodies(paths[1], count)
         by_bodies = on_same_turns(self._mechanism, by_tree, by_bodies)
-        self._check_energy(by_tree, "joint coordinates", early, paths[0], partial(self._tree_at, paths[0]))
-        self._check_energy(by_bodies, "maximal coordinates", early, paths[0], partial(self._bodies_at, paths[1]))
+        self._check_energy(by_tree, "joint coordinates", early, partial(self._tree_at, paths[0]))
+        self._check_energy(by_bodies, "maximal coordinates", early, partial(self._bodies_at, paths[1]))
         chaotic = growth * NUDGE > CHAOS
         if chaotic.any():
             by_the_tree = early.run(partial(self._growth_of_tree, paths[0]), self._times)
@@ -388,13 +388,10 @@ class _SmoothTruth:
         lasting = np.maximum.accumulate(SAFETY * largest(values[1] - values[0])) * np.diff(times, prepend=0.0)
         return works, np.cumsum(lasting) + unresolved.max(axis=1, initial=0.0)
 
-    def _check_energy(
-        self, record: Record, route: str, early: EarlyEnd, path: FollowedPath, record_at: Callable[[Array], Record]
-    ) -> None:
+    def _check_energy(self, record: Record, route: str, early: EarlyEnd, record_at: Callable[[Array], Record]) -> None:
         """Ends the truth where a route changes the energy of a conservative mechanism, for then it has failed.
 
-        ``path``: of the first route; ``record_at``: record of the route at any times, in natural units, for an end does
-        not depend on where samples lie.
+        ``record_at``: record of the route at any times, for an end does not depend on where samples lie.
         """
         mechanism = self._mechanism
         if not mechanism.conservative:
@@ -411,8 +408,8 @@ class _SmoothTruth:
                 return bool(abs(record_at(time).placed(mechanism).energies().sum() - parts[0].sum()) > allowed)
 
             end = self._first_time(loses, lost[0])
-            q = self._tree.within(path.stretches[0], np.array([end]))[0, : mechanism.nq]
-            values, rank = singular_values(self._equations.rows(q).C), self._equations.rank
+            rows = self._equations.rows(record_at(np.array([end])).q[0])
+            values, rank = singular_values(rows.C), self._equations.rank
             at_pose = ", at a singular pose of the loops" if rank and values[rank - 1] < _SINGULAR * values[0] else ""
             early.at(end, reason + at_pose)
 
