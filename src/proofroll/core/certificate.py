@@ -20,6 +20,8 @@ EXACT = 1e-12
 ROUNDINGS = 64.0
 # End of the reason (``because``) of a line whose tolerance was raised to those roundings.
 ROUNDED = "single precision"
+# What follows the reason of a softening that asks for more than is accepted.
+_CAPPED = "; of the "
 # A message names the scale of a difference if it exceeds the largest expected number by this factor.
 _OTHER = 1.2
 SAY_SINGLE = 'settings of the engine must say precision = "single"'
@@ -120,7 +122,7 @@ def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: floa
     if soft.tolerance <= cap.tolerance:
         return soft.tolerance, soft.because
     asked = number(soft.tolerance)
-    return cap.tolerance, f"{soft.because}; of the {asked} requested this much is allowed: {cap.because}"
+    return cap.tolerance, f"{soft.because}{_CAPPED}{asked} requested this much is allowed: {cap.because}"
 
 
 def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]) -> None:
@@ -161,6 +163,8 @@ def first_difference(lines: list[Line]) -> str | None:
         built, expected = distinct_texts(*worst_numbers(line))
         note = f" (the one of {len(line.found)} numbers that is furthest off)" if len(line.found) > _SHOWN else ""
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
+        if _CAPPED in line.because:
+            refused = f"; {line.because.partition(_CAPPED)[0]}"
         return (
             f"the engine's model differs from the scene: {line.quantity} is {built} instead of "
             f"{expected} {line.unit}{note} (relative difference {number(line.difference)}{_scale(line)}, "

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from proofroll.core.certificate import Line, first_difference
+from proofroll.core.certificate import Line, first_difference, tolerated
+from proofroll.core.engine import Regularised
 
 
 def test_of_many_numbers_the_one_furthest_off_is_shown() -> None:
@@ -23,3 +24,11 @@ def test_a_difference_names_its_scale() -> None:
     ):
         said = first_difference([Line("spin", "rad/s^2", (67.0,), (60.3,), 6.7 / scale, 1e-9)])
         assert told in str(said)
+
+
+def test_a_softening_beyond_what_is_accepted_is_told() -> None:
+    """An engine whose loops give way too much has no wrong number, and the sentence says what gives way."""
+    soft, cap = Regularised(1.9, "loops are soft"), Regularised(0.5, "a spring pulls in proportion to its opening")
+    tolerance, because = tolerated(soft, cap, 1e-9, "")
+    said = first_difference([Line("forces", "N", (265.0,), (12.0,), 0.95, tolerance, because)])
+    assert str(said).endswith("(relative difference 0.95, allowed 0.5); loops are soft")

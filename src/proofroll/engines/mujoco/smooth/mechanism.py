@@ -377,14 +377,13 @@ class MujocoMechanism(SteppedModel):
         for name, hard in self._accelerations(data).items():
             difference = longest(hard - soft[name]) / max(longest(hard), np.finfo(float).tiny)
             regularised[name] = Regularised(_MARGIN * difference + DEPENDENT, because)
-        if self._mechanism.couplings or self._mechanism.prescribed:
-            hard_forces = self._forces(data)
-            law_sizes = [np.abs(hard_forces[name]).max() for name in ("couplings", "drives") if name in hard_forces]
-            least = DEPENDENT * float(max(law_sizes)) or 1.0
-            for name, hard in hard_forces.items():
-                difference = float(np.nanmax(np.abs(hard - forces[name])))
-                size = max(float(np.nanmax(np.abs(hard))), least)
-                regularised[name] = Regularised(_MARGIN * difference / size + DEPENDENT, because)
+        hard_forces = self._forces(data)
+        law_sizes = [np.abs(hard_forces[name]).max() for name in ("couplings", "drives") if name in hard_forces]
+        least = DEPENDENT * float(max(law_sizes, default=0.0)) or 1.0
+        for name, hard in hard_forces.items():
+            difference = float(np.nanmax(np.abs(hard - forces[name])))
+            size = max(float(np.nanmax(np.abs(hard))), least)
+            regularised[name] = Regularised(_MARGIN * difference / size + DEPENDENT, because)
         return regularised
 
     def _forces(self, data: Any) -> dict[str, Array]:
