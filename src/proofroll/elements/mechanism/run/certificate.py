@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, longest
 from proofroll.core.certificate import ROUNDINGS, Line, require_shapes, tolerated
 from proofroll.core.engine import EPSILON, Regularised
 from proofroll.core.errors import Refused
@@ -288,7 +288,7 @@ def _turning(element: MechanismElement, soft: bool) -> float:
     """Scale of angular accelerations [rad/s²]: the largest, at least a part of the natural one (all, if soft)."""
     first_motion = element.first_motion
     least = (1.0 if soft else _LEAST) * first_motion.scale / element.length
-    return max(float(np.nanmax(np.abs(first_motion.angular_acceleration), initial=0.0)), least)
+    return max(longest(np.nan_to_num(first_motion.angular_acceleration)), least)
 
 
 def _axis(element: MechanismElement, joint: Joint) -> FloatArray:
