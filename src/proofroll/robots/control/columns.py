@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.number_format import error
+from proofroll.robots.control.base_frames import BaseFrame
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import BASE, ControlRecord, Layer, LayerCause, in_world
 from proofroll.robots.model import Array
@@ -56,10 +57,14 @@ class StateReading(NamedTuple):
     Attributes:
         record: with velocities that are the rates of its places.
         layer: the mistakes of the columns; None: there are none.
+        frame: that the program has for its base; None: the base's own.
+        reported: the record with that frame.
     """
 
     record: ControlRecord
     layer: Layer | None
+    frame: BaseFrame | None = None
+    reported: ControlRecord | None = None
 
 
 @dataclass(frozen=True)
@@ -89,17 +94,55 @@ def state_readings(record: ControlRecord, law: ControlLaw) -> list[StateReading]
     return [StateReading(reading.record, _layer(reading)) for reading in readings]
 
 
+def framed_readings(record: ControlRecord, law: ControlLaw, frames: Sequence[BaseFrame]) -> list[StateReading]:
+    """Readings of a record whose program reports one of some frames for its base, or its own: that is no mistake."""
+    readings = state_readings(record, law)
+    for frame in frames:
+        for reading in state_readings(frame.corrected(record), law):
+            reported = record if reading.layer is None else frame.reported(reading.record)
+            readings.append(reading._replace(frame=frame, reported=reported))
+    return readings
+
+
 def reading_in_degrees(record: ControlRecord) -> StateReading | None:
     """Record with joints in degrees and degrees per second, which no integral shows; None: no angle passes a turn."""
     places = {name: np.abs(item) for name, item in record.columns.items() if name.startswith("q.")}
     column = max(places, key=lambda name: float(places[name].max()), default="")
     if not column or places[column].max() <= 2 * np.pi:
         return None
-    largest = float(places[column].max())
     words = "q.JOINT and v.JOINT are in degrees: name them q.JOINT[deg] and v.JOINT[deg/s]"
-    cause = LayerCause("degrees", f"{words} (all other layers hold with that)", _DEGREE, 0.0)
-    layer = Layer("state", (1 - _DEGREE) * largest, float(record.rounding[column].max()), column, causes=(cause,))
-    return StateReading(_after(_scaled("q.", _DEGREE), _scaled("v.", _DEGREE))(record), layer)
+    off = (1 - _DEGREE) * float(places[column].max())
+    changed = _after(_scaled("q.", _DEGREE), _scaled("v.", _DEGREE))(record)
+    return _silent(changed, "degrees", words, off, column)
+
+
+def readings_by_frames(record: ControlRecord, frames: Sequence[BaseFrame]) -> Iterator[StateReading]:
+    """Readings of a record that has one of some frames in place of the base's own; no integral shows that."""
+    for frame in frames if "q_WB.w" in record.columns else ():
+        off = float(np.linalg.norm(frame.place))
+        reading = _silent(frame.corrected(record), "base_frame", frame.words, off, "p_WB")
+        yield reading._replace(frame=frame, reported=record)
+
+
+def readings_of_late_efforts(readings: Sequence[StateReading]) -> Iterator[StateReading]:
+    """The readings with efforts that are a row late, as where a program returns those of its last step."""
+    for reading in readings:
+        efforts = {name: np.abs(item) for name, item in reading.record.columns.items() if name.startswith("effort.")}
+        if not efforts:
+            continue
+        words = "the columns effort.JOINT are one row late: each row has those of the step before it"
+        column, sooner = max(efforts, key=lambda name: float(efforts[name].max())), _sooner("effort.")
+        late = _silent(sooner(reading.record), "late_effort", words, float(efforts[column].max()), column)
+        if reading.layer is not None and late.layer is not None:
+            late = late._replace(layer=replace(reading.layer, causes=(*reading.layer.causes, *late.layer.causes)))
+        reported = None if reading.reported is None else sooner(reading.reported)
+        yield late._replace(frame=reading.frame, reported=reported)
+
+
+def _silent(record: ControlRecord, name: str, words: str, off: float, column: str) -> StateReading:
+    """Reading by a mistake that is told by the layers behind it."""
+    cause = LayerCause(name, f"{words} (the layers behind it tell so)", None, 0.0)
+    return StateReading(record, Layer("state", off, 0.0, column, causes=(cause,)))
 
 
 def _explained(

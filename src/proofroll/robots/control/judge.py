@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,20 @@ from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.step_limits import servo_steps
+from proofroll.robots.control.air_fit import FITTED
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
-from proofroll.robots.control.columns import StateReading, reading_in_degrees, state_readings
+from proofroll.robots.control.columns import (
+    StateReading,
+    framed_readings,
+    reading_in_degrees,
+    readings_by_frames,
+    readings_of_late_efforts,
+    state_readings,
+)
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
-from proofroll.robots.control.layers import BETWEEN, record_layers
+from proofroll.robots.control.layers import BETWEEN, InAir, record_layers
 from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
@@ -101,7 +110,7 @@ def _found(layer: Layer) -> str:
     place = "" if layer.holds else f", most in {layer.column}"
     place += f" at {layer.time:.4g} s" if place and np.isfinite(layer.time) else ""
     remark = f"; {layer.reason}" if layer.reason else ""
-    rounding = "" if layer.reason == BETWEEN else f", rounding {error(layer.bar)}"
+    rounding = "" if layer.reason.startswith(BETWEEN) else f", rounding {error(layer.bar)}"
     return f"off by {error(layer.residual)}{rounding}{place}{remark}"
 
 
@@ -135,8 +144,8 @@ def judge_record(
         eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
         digits = max(eps, default=0.0) / 2
         read = record_of(time, columns, record, digits=digits)
-        if "sim_dt" in arrays:
-            stepwise = bool(np.isclose(_step_of(record, arrays["sim_dt"]), _step(read), rtol=_SAME_STEP))
+        sim_dt = _step_of(record, arrays["sim_dt"]) if "sim_dt" in arrays else LAYOUTS[layout].step
+        stepwise = sim_dt is not None and bool(np.isclose(sim_dt, _step(read), rtol=_SAME_STEP))
     else:
         if record.suffix in ARRAYS:
             raise InputError("--as", "", f"say whose arrays these are: {', '.join(LAYOUTS)}")
@@ -147,22 +156,44 @@ def judge_record(
     law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
     names_of_layers = DIFFERENCES if control else ()
 
-    def layers_of(reading: StateReading) -> list[Layer]:
+    def layers_of(reading: StateReading, *, imported: bool = False) -> list[Layer]:
         state_layers = [] if reading.layer is None else [reading.layer]
-        mechanism, grounded = model.mechanism, model.grounded
+        held = InAir(
+            held=model.held(reading.frame),
+            imported=partial(model.imported, reading.frame) if imported else tuple,
+            reported=reading.reported,
+            ranges=model.ranges,
+        )
         return [
             *state_layers,
-            *record_layers(reading.record, law, mechanism, grounded=grounded, names=names_of_layers, stepwise=stepwise),
+            *record_layers(
+                reading.record,
+                law,
+                model.mechanism,
+                grounded=model.grounded,
+                names=names_of_layers,
+                stepwise=stepwise,
+                in_air=held,
+            ),
         ]
 
-    judged = [(reading.record, layers_of(reading)) for reading in state_readings(read, law)]
+    inertial = bool(layout) and LAYOUTS[layout].inertial and free
+    frames = model.base_frames
+    readings = framed_readings(read, law, frames) if inertial else state_readings(read, law)
     # Of readings that explain the state alike, layers behind it tell the right one.
-    read, layers = min(judged, key=lambda item: sum(not layer.holds for layer in item[1]))
-    if not all(layer.holds for layer in layers) and (degrees := reading_in_degrees(read)) is not None:
-        _, *later_layers = layers_in_degrees = layers_of(degrees)
-        computed = any(layer.residual is not None for layer in later_layers)
-        if computed and all(layer.holds for layer in later_layers):
-            read, layers = degrees.record, layers_in_degrees
+    judged = [(reading, layers_of(reading)) for reading in readings]
+    reading, layers = min(judged, key=_open)
+    if any(_open(judged[0])) and (degrees := reading_in_degrees(reading.record)) is not None:
+        judged.append((degrees, layers_of(degrees)))
+    if min(map(_open, judged))[0] and not inertial:
+        judged += [(rival, layers_of(rival)) for rival in readings_by_frames(reading.record, frames)]
+    if min(map(_open, judged))[0] and not control:
+        late = readings_of_late_efforts([rival for rival, _ in judged])
+        judged += [(rival, layers_of(rival)) for rival in late]
+    if any(min(map(_open, judged))[::2]):
+        judged += [(rival, layers_of(rival, imported=True)) for rival, _ in judged]
+    reading, layers = min(judged, key=_open)
+    read = reading.record
     return RecordJudgement(
         record=str(record),
         robot=str(robot),
@@ -174,6 +205,15 @@ def judge_record(
         remarks=[*_too_fast(read, model.speeds)],
         step_bound=_step_bound(model.mechanism, _step(read)),
     )
+
+
+def _open(judged: tuple[StateReading, Sequence[Layer]]) -> tuple[int, int, int]:
+    """Number of layers that are not explained or not decided, that do not hold, and that a fitted inertia explains."""
+    _, layers = judged
+    undecided = [layer for layer in layers if layer.residual is None and layer.undecided]
+    failed = [layer for layer in layers if not layer.holds]
+    unexplained = len(undecided) + sum(not layer.causes for layer in failed)
+    return unexplained, len(failed), sum(cause.id == FITTED for layer in failed for cause in layer.causes)
 
 
 def _step_bound(mechanism: Mechanism, step: float) -> str:
