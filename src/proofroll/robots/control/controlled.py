@@ -48,6 +48,7 @@ class RecordedRobot:
         reductions: joint -> turns of its motor per turn of the joint, of the transmissions in its file.
         speeds: joint -> largest velocity of its drive, of its file [rad/s or m/s].
         ranges: joint -> its limits, of its file [rad or m].
+        refs: joint -> number that an MJCF gives it in its pose, where it is not 0 [rad or m].
         base_frames: frames that programs report in place of the frame of a base that floats.
         held: frame of these, or None -> the robot in the air, with that frame as that of its base.
         imported: the same -> robots that importers make of the file.
@@ -58,6 +59,7 @@ class RecordedRobot:
     reductions: Mapping[str, float]
     speeds: Mapping[str, float]
     ranges: Mapping[str, tuple[float, float]]
+    refs: Mapping[str, float]
     base_frames: tuple[BaseFrame, ...]
     held: Callable[[BaseFrame | None], HeldRobot]
     imported: Callable[[BaseFrame | None], Iterator[HeldRobot]]
@@ -140,6 +142,7 @@ class ControlledScenes:
                 for joint in robot.moving
                 if joint.lower is not None and joint.upper is not None and joint.lower < joint.upper
             },
+            refs={joint.name: joint.ref for joint in robot.moving if joint.ref},
             base_frames=base_frames(robot),
             held=partial(held, robot),
             imported=lambda frame: imported_robots(file, robot, partial(held, frame=frame)),

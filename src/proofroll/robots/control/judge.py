@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.step_limits import servo_steps
 from proofroll.robots.control.air_fit import FITTED
+from proofroll.robots.control.base_frames import BaseFrame
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
 from proofroll.robots.control.columns import (
@@ -24,8 +25,10 @@ from proofroll.robots.control.columns import (
     framed_readings,
     reading_in_degrees,
     readings_by_frames,
+    readings_of_early_rates,
     readings_of_late_efforts,
     state_readings,
+    untold_lags,
 )
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
@@ -33,6 +36,7 @@ from proofroll.robots.control.layers import BETWEEN, InAir, record_layers
 from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
+_Judged = tuple[StateReading, list[Layer]]
 _SAME_STEP = 1e-3  # part of the interval between rows by which the step of the program may differ from it
 
 
@@ -140,7 +144,9 @@ def judge_record(
         free = floats(arrays, layout, sum(joint.nq == 1 for joint in fixed_robot.joints))
         model = scenes.of_record(robot, free=free)
         driven = law_of(model.mechanism).joints
-        time, columns = columns_of(record, arrays, layout, model.mechanism, driven)
+        if control and LAYOUTS[layout].from_refs and model.refs:
+            _refuse_refs(control, model.refs)
+        time, columns = columns_of(record, arrays, layout, model.mechanism, driven, model.refs)
         eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
         digits = max(eps, default=0.0) / 2
         read = record_of(time, columns, record, digits=digits)
@@ -180,19 +186,7 @@ def judge_record(
     inertial = bool(layout) and LAYOUTS[layout].inertial and free
     frames = model.base_frames
     readings = framed_readings(read, law, frames) if inertial else state_readings(read, law)
-    # Of readings that explain the state alike, layers behind it tell the right one.
-    judged = [(reading, layers_of(reading)) for reading in readings]
-    reading, layers = min(judged, key=_open)
-    if any(_open(judged[0])) and (degrees := reading_in_degrees(reading.record)) is not None:
-        judged.append((degrees, layers_of(degrees)))
-    if min(map(_open, judged))[0] and not inertial:
-        judged += [(rival, layers_of(rival)) for rival in readings_by_frames(reading.record, frames)]
-    if min(map(_open, judged))[0] and not control:
-        late = readings_of_late_efforts([rival for rival, _ in judged])
-        judged += [(rival, layers_of(rival)) for rival in late]
-    if any(min(map(_open, judged))[::2]):
-        judged += [(rival, layers_of(rival, imported=True)) for rival, _ in judged]
-    reading, layers = min(judged, key=_open)
+    reading, layers = _best_reading(readings, layers_of, () if inertial else frames, controlled=control is not None)
     read = reading.record
     return RecordJudgement(
         record=str(record),
@@ -202,12 +196,63 @@ def judge_record(
         rows=len(read.time),
         step=_step(read),
         layers=layers,
-        remarks=[*_too_fast(read, model.speeds)],
+        remarks=[*_too_fast(read, model.speeds), *_untold(read)],
         step_bound=_step_bound(model.mechanism, _step(read)),
     )
 
 
-def _open(judged: tuple[StateReading, Sequence[Layer]]) -> tuple[int, int, int]:
+def _best_reading(
+    readings: Iterable[StateReading],
+    layers_of: Callable[..., list[Layer]],
+    frames: Sequence[BaseFrame],
+    *,
+    controlled: bool,
+) -> _Judged:
+    """Reading of a record of which layers are open least, and its layers.
+
+    Of readings that explain the state alike, layers behind it tell the right one. Mistakes that the state does not show
+    are tried where these are open.
+
+    Args:
+        readings: by the state.
+        layers_of: layers of a reading.
+        frames: that the record may have for its base.
+        controlled: True if a controller's law tells the efforts.
+    """
+    judged = [(reading, layers_of(reading)) for reading in readings]
+    reading, _ = min(judged, key=_open)
+    if any(_open(judged[0])) and (degrees := reading_in_degrees(reading.record)) is not None:
+        judged.append((degrees, layers_of(degrees)))
+    if _unexplained_forces(min(judged, key=_open)[1]):
+        judged += [(rival, layers_of(rival)) for rival in readings_by_frames(reading.record, frames)]
+    if _unexplained_forces(min(judged, key=_open)[1]) and not controlled:
+        late = readings_of_late_efforts([rival for rival, _ in judged])
+        judged += [(rival, layers_of(rival)) for rival in late]
+    if min(map(_open, judged))[0]:
+        early = [(rival, layers_of(rival)) for rival in readings_of_early_rates(reading.record)]
+        judged += [item for item in early if not _open(item)[0]]
+    if any(min(map(_open, judged))[::2]):
+        judged += [(rival, layers_of(rival, imported=True)) for rival, _ in judged]
+    return min(judged, key=_open)
+
+
+def _refuse_refs(control: Path, refs: Mapping[str, float]) -> None:
+    """Raises InputError: poses and observations of a controller count from elsewhere than the arrays."""
+    joint, ref = next(iter(refs.items()))
+    advice = (
+        f"{joint} has ref = {ref:.5g} in the robot's file: qpos counts from there, and a controller's poses, targets "
+        "and observations from the file's pose; give a .csv with q.JOINT and target.JOINT less ref, or omit --control"
+    )
+    raise InputError("--control", control, advice)
+
+
+def _unexplained_forces(layers: Sequence[Layer]) -> bool:
+    """True if accelerations or a motion differ, and nothing is known that explains it."""
+    last = (layer for layer in layers if layer.name in {"acceleration", "motion"})
+    return any(layer.undecided if layer.residual is None else not (layer.holds or layer.causes) for layer in last)
+
+
+def _open(judged: _Judged) -> tuple[int, int, int]:
     """Number of layers that are not explained or not decided, that do not hold, and that a fitted inertia explains."""
     _, layers = judged
     undecided = [layer for layer in layers if layer.residual is None and layer.undecided]
@@ -235,6 +280,12 @@ def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[st
                 f"v.{joint} passes the velocity limit {limit:.4g} of the robot's file at {instant:.4g} s; a program "
                 "that clamps velocities moves it otherwise"
             )
+
+
+def _untold(record: ControlRecord) -> Iterator[str]:
+    """A sentence on rates that may be a row late, if there are any."""
+    if names := [*untold_lags(record)]:
+        yield f"the digits of the record do not tell whether {' and '.join(names)} may be a row late"
 
 
 def _step_of(path: Path, values: NDArray[Any]) -> float:

@@ -32,6 +32,7 @@ class Layout:
         spin_in_base: True if its angular velocity is along its own axes.
         by_level: True if joints are in the order of their distance from the root, False if in that of the robot file.
         inertial: True if place, attitude and velocity of the base are those of the inertial frame of its link.
+        from_refs: columns that count from the ``ref`` of an MJCF.
         step: interval between rows that is the program's own step, where the file does not say [s]; None: unknown.
     """
 
@@ -41,6 +42,7 @@ class Layout:
     spin_in_base: bool = False
     by_level: bool = False
     inertial: bool = False
+    from_refs: tuple[str, ...] = ()
     step: float | None = None
 
 
@@ -59,6 +61,7 @@ LAYOUTS: Mapping[str, Layout] = {
         | {"effort": ("torque", "torques", "actuator_force", "qfrc_actuator")},
         quaternion="wxyz",
         spin_in_base=True,
+        from_refs=("q", "target"),
     ),
     "isaaclab": Layout(  # 2.x; its views give velocities of centres of mass
         names={"base": ("root_state_w",), "q": ("joint_pos",), "v": ("joint_vel",)}
@@ -135,7 +138,12 @@ def floats(arrays: Mapping[str, Array], layout: str, joints: int) -> bool:
 
 
 def columns_of(
-    path: Path, arrays: Mapping[str, Array], layout: str, mechanism: Mechanism, driven: Sequence[str]
+    path: Path,
+    arrays: Mapping[str, Array],
+    layout: str,
+    mechanism: Mechanism,
+    driven: Sequence[str],
+    refs: Mapping[str, float],
 ) -> tuple[Array, dict[str, Array]]:
     """Times [s] and columns of a record (:class:`.ControlRecord`) in arrays.
 
@@ -145,6 +153,7 @@ def columns_of(
         layout: of :data:`LAYOUTS`.
         mechanism: the robot.
         driven: its driven joints, in the order of its controller.
+        refs: joint -> what MuJoCo's qpos is in the pose of the file, where coordinates here are 0.
 
     Raises:
         InputError: an array is lacking, or has another number of columns than the robot has joints.
@@ -174,7 +183,8 @@ def columns_of(
         if width != len(labels):
             advice = f"it has {width} columns; the robot has {len(joints)} joints, of which {len(moved)} are driven"
             raise InputError(str(path), name, advice)
-        columns |= {f"{name}.{label}": quantities[name][:, k] for k, label in enumerate(labels)}
+        zeros = refs if name in kind.from_refs else {}
+        columns |= {f"{name}.{label}": quantities[name][:, k] - zeros.get(label, 0.0) for k, label in enumerate(labels)}
     if "base" in quantities:
         if not np.all(np.any(quantities["base"][:, 3:_POSE], axis=1)):
             raise InputError(str(path), "quaternion of the base", "it is zero in a row, which is no orientation")
