@@ -307,6 +307,8 @@ MISTAKES: Mapping[str, tuple[str, str, dict[str, Any]]] = {
     "sign of a joint": ("joint_sign", "target", {"signs": np.array([1.0, -1, 1, 1, 1, 1])}),
     "state before": ("state_before", "effort", {"lag": 1}),
     "gravity 9.80": ("gravity", "acceleration", {"gravity": 9.80}),
+    "gravity upwards": ("gravity", "acceleration", {"gravity": -9.81}),
+    "half of kd, other sign": ("kd", "effort", {"kd": -0.5 * KD, "steps": 60}),
     "no gravity": ("gravity", "acceleration", {"gravity": 0.0}),
     "half the rate": ("rate", "instants", {"periods": 2}),
     "a quarter of the rate": ("rate", "instants", {"periods": 4, "steps": 200}),

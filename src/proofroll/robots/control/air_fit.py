@@ -48,6 +48,7 @@ _NUMBERS: Mapping[str, tuple[str, str]] = {
         "1/s",
     ),
 }
+_SIGNED = ("gravity", "effort")  # numbers that may have the other sign
 
 
 @dataclass(frozen=True)
@@ -223,7 +224,10 @@ def _numbers(rows: _Rows, law: ControlLaw) -> Iterator[LayerCause]:
         remainder, value = rows.left - change * column, right.get(name, 0.0) + change
         distance, matched = _rms(remainder), rows.shown(column, remainder)
         bar = _SAFETY * (rows.rounding if matched else max(rows.rounding, distance)) / np.sqrt(square) + _ROUND_OFF
-        if not (matched or rows.explained(distance)) or abs(change) <= bar or (name != "effort" and value < -bar):
+        if not (matched or rows.explained(distance)) or abs(change) <= bar or (name not in _SIGNED and value < -bar):
+            continue
+        if name in _SIGNED and abs(value + 1) <= bar:
+            yield _cause(name, f"{words.removesuffix(' is')} has the other sign", -1.0, rows, distance)
             continue
         text, interval = with_bar(value, bar, 1)
         in_unit = "kg m² or kg" if name == "armature" and not law.armature.any() else unit

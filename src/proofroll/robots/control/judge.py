@@ -220,20 +220,38 @@ def _best_reading(
         controlled: True if a controller's law tells the efforts.
     """
     judged = [(reading, layers_of(reading)) for reading in readings]
-    reading, _ = min(judged, key=_open)
-    if any(_open(judged[0])) and (degrees := reading_in_degrees(reading.record)) is not None:
-        judged.append((degrees, layers_of(degrees)))
+    plain = min(judged, key=_open)
+    record = plain[0].record
+
+    def try_rivals(rivals: Iterable[StateReading], *, imported: bool = False) -> None:
+        """Adds readings that look at every layer that is open without them."""
+        trials = [(rival, layers_of(rival, imported=imported)) for rival in rivals]
+        judged.extend(item for item in trials if _open_layers(plain[1]) <= _looked_at(item[1]))
+
+    if any(_open(plain)) and (degrees := reading_in_degrees(record)) is not None:
+        try_rivals([degrees])
     if _unexplained_forces(min(judged, key=_open)[1]):
-        judged += [(rival, layers_of(rival)) for rival in readings_by_frames(reading.record, frames)]
+        try_rivals(readings_by_frames(record, frames))
     if _unexplained_forces(min(judged, key=_open)[1]) and not controlled:
-        late = readings_of_late_efforts([rival for rival, _ in judged])
-        judged += [(rival, layers_of(rival)) for rival in late]
+        try_rivals(readings_of_late_efforts([rival for rival, _ in judged]))
     if min(map(_open, judged))[0]:
-        early = [(rival, layers_of(rival)) for rival in readings_of_early_rates(reading.record)]
-        judged += [item for item in early if not _open(item)[0]]
+        try_rivals(readings_of_early_rates(record))
     if any(min(map(_open, judged))[::2]):
-        judged += [(rival, layers_of(rival, imported=True)) for rival, _ in judged]
+        try_rivals([rival for rival, _ in judged], imported=True)
     return min(judged, key=_open)
+
+
+def _open_layers(layers: Sequence[Layer]) -> set[str]:
+    """Names of layers that differ without a cause."""
+    return {
+        layer.name
+        for layer in layers
+        if (layer.undecided if layer.residual is None else not (layer.holds or layer.causes))
+    }
+
+
+def _looked_at(layers: Sequence[Layer]) -> set[str]:
+    return {layer.name for layer in layers if layer.residual is not None or layer.undecided}
 
 
 def _refuse_refs(control: Path, refs: Mapping[str, float]) -> None:
@@ -248,17 +266,15 @@ def _refuse_refs(control: Path, refs: Mapping[str, float]) -> None:
 
 def _unexplained_forces(layers: Sequence[Layer]) -> bool:
     """True if accelerations or a motion differ, and nothing is known that explains it."""
-    last = (layer for layer in layers if layer.name in {"acceleration", "motion"})
-    return any(layer.undecided if layer.residual is None else not (layer.holds or layer.causes) for layer in last)
+    return bool(_open_layers(layers) & {"acceleration", "motion"})
 
 
 def _open(judged: _Judged) -> tuple[int, int, int]:
     """Number of layers that are not explained or not decided, that do not hold, and that a fitted inertia explains."""
     _, layers = judged
-    undecided = [layer for layer in layers if layer.residual is None and layer.undecided]
     failed = [layer for layer in layers if not layer.holds]
-    unexplained = len(undecided) + sum(not layer.causes for layer in failed)
-    return unexplained, len(failed), sum(cause.id == FITTED for layer in failed for cause in layer.causes)
+    fitted = sum(cause.id == FITTED for layer in failed for cause in layer.causes)
+    return len(_open_layers(layers)), len(failed), fitted
 
 
 def _step_bound(mechanism: Mechanism, step: float) -> str:

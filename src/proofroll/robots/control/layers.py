@@ -262,7 +262,10 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
             ((1 + numbers) * cause.after, cause)
             for numbers, cause in _fitted_causes(layer.name, compared, evidence, most)
         ]
-    causes = [cause for _, cause in sorted(ranked, key=lambda item: item[0])]
+    by_words: dict[str, LayerCause] = {}
+    for _, cause in sorted(ranked, key=lambda item: item[0]):
+        by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
+    causes = [*by_words.values()]
     if layer.name == "instants" and not causes:
         causes = [*_missed(evidence)]
     return {"causes": tuple(causes), "tried": tried, "known": len(candidates)}
