@@ -40,7 +40,8 @@ def judge(
     ] = None,
     control: Annotated[Path | None, typer.Option(help="With --robot: the controller's file (.toml), if any.")] = None,
     layout: Annotated[
-        str, typer.Option("--as", help="With --robot: whose arrays: playground, isaaclab, isaacgym, legged_gym.")
+        str,
+        typer.Option("--as", help="With --robot: whose arrays: playground, isaaclab, isaacgym, legged_gym, pybullet."),
     ] = "",
     because: Annotated[str, typer.Option(help="Why that is close enough.")] = "",
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the truth is given up.")] = RUN_TIME_LIMIT,

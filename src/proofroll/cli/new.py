@@ -109,12 +109,15 @@ def probe(
     texts = {
         "robot": _quoted(str(robot.resolve())),
         "base": str(numbers),
-        "urdf": str(start.kind == "urdf"),
         "joints": f"{{\n{''.join(rows)}}}",
     }
-    file = _fresh(name, f"{name}.py")
-    template = _TEMPLATES / "probe" / f"{program}.py.txt"
-    _write(file, _filled(template, texts | {"name": name, "judge": judge}))
+    file = Path(f"{name}.py")
+    if file.exists():
+        advice = "this file is there already; remove or move it, or run the command in another folder"
+        raise InputError("probe", file, advice)
+    text = _filled(_TEMPLATES / "probe" / f"{program}.py.txt", texts | {"name": name, "judge": judge})
+    of_urdf = "" if start.kind == "urdf" else ".*\n"  # lines of a template that only a URDF needs
+    _write(file, re.sub(f"@urdf@{of_urdf}", "", text))
     _say(file, f"python {file}", judge)
 
 

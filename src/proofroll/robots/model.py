@@ -82,6 +82,7 @@ class RobotJoint:
         speed: largest velocity of its drive [rad/s or m/s]; None: none is given.
         actuated: True if an actuator acts on the joint.
         turning: True if the armature of a free joint acts along the body's axes, False: along the world's.
+        ref: number that the file gives the joint in its pose, where its coordinate here is 0 [rad or m].
     """
 
     name: str
@@ -103,6 +104,7 @@ class RobotJoint:
     speed: float | None = None
     actuated: bool = False
     turning: bool = False
+    ref: float = 0.0
 
     @property
     def dofs(self) -> int:

@@ -143,6 +143,22 @@ def test_a_mistake_of_columns_accuses_nothing_else(name: str, judged: Judged) ->
     assert wrong[0].causes[0].sentence.startswith(words)
 
 
+@pytest.mark.parametrize("kind", ["v_WB", "v", "w_WB"])
+def test_a_row_of_lag_shows_in_three_decimals(kind: str, judged: Judged) -> None:
+    """Rates that are a row late are named in a file with three decimals, and accuse no observation or frame."""
+    record = dict(Loop().record(PROGRAMS["mujoco"]))
+    record[kind] = np.concatenate([record[kind][:1], record[kind][:-1]])
+    judgement = judged(columns_of(record), "3")
+    causes = [(layer.name, cause.id) for layer in judgement.layers for cause in layer.causes]
+    assert causes == [("state", "late")], "\n".join(judgement.lines())
+
+
+def test_a_lag_that_no_digit_shows_is_left_open(judged: Judged) -> None:
+    """Where the digits of a file are too few for a lag of a row, the answer says so."""
+    judgement = judged(columns_of(Loop(steps=60).record(PROGRAMS["mujoco"])), "2")
+    assert "the digits of the record do not tell whether" in judgement.remarks[0]
+
+
 @pytest.mark.parametrize(
     ("columns_of_actions", "words"),
     [("scaled", "have the scale of the controller already"), ("late", "are one instant")],

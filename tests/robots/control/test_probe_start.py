@@ -16,6 +16,7 @@ import pytest
 import robot_templates
 
 Proofroll = Callable[..., tuple[int, str, str]]
+_RUFF = Path(sys.executable).with_name("ruff")
 ARM = robot_templates.urdf(first='<dynamics damping="0.3"/>')
 MJCF = """<mujoco><option integrator="RK4"/><worldbody><body name="ball"><freejoint/>
 <inertial pos="0.01 0 0" mass="2" diaginertia="0.02 0.03 0.04"/>
@@ -85,6 +86,34 @@ def test_a_probe_decides(
     assert code == 1, out + err
     link = {"arm.urdf": "tip", "legs.urdf": "FR_KFE_link"}[name]
     assert re.search(rf"{link}\S* carries \S+ kg more|inertia of {link}\S* are others", " ".join(out.split())), out
+
+
+@pytest.mark.parametrize("program", ["mujoco", "isaaclab"])
+@pytest.mark.parametrize("base", ["fixed", "free"])
+def test_a_probe_is_clean_code(program: str, base: str, proofroll: Proofroll, folder: Path) -> None:
+    """What ``new`` writes passes ruff with its own rules, and has no condition that is a constant."""
+    _, out, _ = proofroll("new", "probe", "arm.urdf", "--for", program, "--base", base)
+    script = folder / out.split()[0]
+    checked = subprocess.run([_RUFF, "check", "--isolated", str(script)], check=False, capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stdout
+    assert not re.search(r"if (True|False)", script.read_text())
+
+
+def test_a_probe_that_is_there_says_what_to_do(proofroll: Proofroll) -> None:
+    """No option names the script: a second one says what to move, not that another name be chosen."""
+    asked = ("new", "probe", "arm.urdf", "--for", "mujoco")
+    proofroll(*asked)
+    code, _, err = proofroll(*asked)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "'probe_arm_mujoco.py': this file is there already; remove or move it, or run the command in" in err
+
+
+def test_a_controller_and_a_ref_do_not_meet(proofroll: Proofroll, record: Callable[..., list[str]]) -> None:
+    """Arrays count from `ref` and a controller from the file's pose: both together are refused in one line."""
+    Path("stand.toml").write_text('rate = 50\n[[gains]]\njoints = "*"\nkp = 5\n')
+    code, _, err = proofroll(*record("leg.xml", "mujoco"), "--control", "stand.toml")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "hip has ref = 0.17453 in the robot's file: qpos counts from there" in err
 
 
 def test_a_probe_of_an_mjcf(proofroll: Proofroll, record: Callable[..., list[str]]) -> None:

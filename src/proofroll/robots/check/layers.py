@@ -135,7 +135,7 @@ class RobotTruth:
 
 
 # Attributes of joints that enter the passive forces only, not M, h or poses.
-_PASSIVE = {"damping", "friction", "stiffness", "rest"}
+_PASSIVE = {"damping", "friction", "stiffness", "rest", "ref"}
 _MOTION = [field.name for field in dataclasses.fields(RobotJoint) if field.name not in _PASSIVE]
 # Attributes of joints on which poses and Jacobians depend.
 _PLACES = ("name", "kind", "parent", "child", "position", "rotation", "axis", "child_position")

@@ -1,6 +1,7 @@
 """Robot in the air whose accelerations are recorded: gravity, efforts, inertias and losses, by least squares.
 
-M dv/dt + armature dv/dt + damping v + friction sign v + payload = scale · effort + gravity - h. What the right numbers
+M dv/dt + armature dv/dt + damping v + friction sign v + drag + payload = scale · effort + gravity - h, the drag of each
+link being m v (1 + |v|) at its centre of mass, and I w (1 + |w|). What the right numbers
 leave is held against the rounding of the record; a number that is not right counts if with it no more than rounding is
 left.
 """
@@ -11,23 +12,25 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.number_format import error as short
 from proofroll.core.number_format import with_bar
-from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import skew
-from proofroll.robots.control.bookkeeping.air import AirRobot
+from proofroll.robots.control.bookkeeping.air import AirLink, AirRobot, HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import BASE, ControlRecord, LayerCause
 from proofroll.robots.model import Array
 
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEWEST_ROWS = 4
+FITTED = "payload"  # id of the cause that has a mass and an inertia of a body as fitted numbers
 _SAFETY = 10.0  # on what rounding of the record leaves, whose size is estimated and whose errors are not independent
 _EQUAL = 1e-3  # part of an interval by which intervals may differ
 _ROUND_OFF = 1e-9  # part of the forces: round-off of a sum of some terms
@@ -40,7 +43,12 @@ _NUMBERS: Mapping[str, tuple[str, str]] = {
     "armature": ("the armature is", "of the right one"),
     "damping": ("joints have damping of", "N m s/rad or N s/m"),
     "friction": ("joints have dry friction of", "N m or N"),
+    "drag": (
+        "every link has drag m v (1 + |v|) and I w (1 + |w|), as linearDamping and angularDamping of PyBullet, of",
+        "1/s",
+    ),
 }
+_SIGNED = ("gravity", "effort")  # numbers that may have the other sign
 
 
 @dataclass(frozen=True)
@@ -117,34 +125,40 @@ class _Rows:
 
 
 def acceleration_fit(
-    record: ControlRecord, law: ControlLaw, mechanism: Mechanism, efforts: Array, held_mask: Array
+    record: ControlRecord,
+    law: ControlLaw,
+    held: HeldRobot,
+    efforts: Array,
+    steady: Array,
+    usable: NDArray[np.bool_] | None = None,
 ) -> AirFit | str:
     """Fit of a record with a row for each step or a few steps, or the reason why there is none.
 
     Args:
         record: with the state.
         law: the law as it should be.
-        mechanism: the robot.
+        held: the robot.
         efforts: of the joints from each row on, (times, n).
-        held_mask: True at rows at which no target changes, (times,).
+        steady: True at rows at which no target changes, (times,).
+        usable: True at rows at which nothing else acts, (times,); None: all are.
     """
-    robot = AirRobot.bare(mechanism, law)
+    robot = AirRobot.bare(held.mechanism, law)
     motion = _motion(record, robot)
     if isinstance(motion, str):
         return motion
-    states, velocities, base_axes = motion
-    # A method adds steps to the velocity of a floating base along the world's axes, or along the base's.
-    moving = [(velocities, base_axes)] + ([] if robot.base is None else [(np.array([v for _, v in states]), None)])
-    table = _Table(record, law, robot, states, efforts)
+    states, moving = motion
+    table = _Table(record, law, robot, states, efforts, held.links)
     trials: list[tuple[bool, _Rows]] = []
     try:
-        for central, (rated, axes) in itertools.product((False, True), moving):
-            rows = np.flatnonzero(held_mask[1:-1]) + 1 if central else np.arange(len(record.time) - 1)
+        for central, rated in itertools.product((False, True), moving):
+            rows = np.flatnonzero(steady[1:-1]) + 1 if central else np.arange(len(record.time) - 1)
+            if usable is not None:
+                rows = rows[usable[rows] & usable[rows - central]]
             if len(rows) < _FEWEST_ROWS:
                 continue
             rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(_MOST_ROWS, len(rows))).astype(int))]
             for implicit in (False, True):
-                trials.append((implicit, table.rows(rows, rated, axes, central=central, implicit=implicit)))
+                trials.append((implicit, table.rows(rows, rated, central=central, implicit=implicit)))
                 if trials[-1][1].exact and not implicit:
                     return AirFit(
                         trials[-1][1].off / trials[-1][1].size, _SAFETY * trials[-1][1].rounding / trials[-1][1].size
@@ -210,7 +224,10 @@ def _numbers(rows: _Rows, law: ControlLaw) -> Iterator[LayerCause]:
         remainder, value = rows.left - change * column, right.get(name, 0.0) + change
         distance, matched = _rms(remainder), rows.shown(column, remainder)
         bar = _SAFETY * (rows.rounding if matched else max(rows.rounding, distance)) / np.sqrt(square) + _ROUND_OFF
-        if not (matched or rows.explained(distance)) or abs(change) <= bar or (name != "effort" and value < -bar):
+        if not (matched or rows.explained(distance)) or abs(change) <= bar or (name not in _SIGNED and value < -bar):
+            continue
+        if name in _SIGNED and abs(value + 1) <= bar:
+            yield _cause(name, f"{words.removesuffix(' is')} has the other sign", -1.0, rows, distance)
             continue
         text, interval = with_bar(value, bar, 1)
         in_unit = "kg m² or kg" if name == "armature" and not law.armature.any() else unit
@@ -246,11 +263,13 @@ def _heavier(rows: _Rows, robot: AirRobot) -> Iterator[LayerCause]:
             heavier_bodies.append((distance, body, float(numbers[0]), words))
         elif mass + values[0] > 0:
             distance = _rms(rows.left - columns @ values)
-            change = f"mass, centre and inertia of {body} are others, {values[0]:+.3g} kg"
-            words = change if seen[0] else f"centre and inertia of {body} are others"
+            moments = columns[:, 4:] @ np.linalg.lstsq(columns[:, 4:], rows.left, rcond=_SMALL)[0]
+            words = f"mass, centre and inertia of {body} are others, {values[0]:+.3g} kg"
+            words = words if seen[0] else f"centre and inertia of {body} are others"
+            words = f"the inertia of {body} is another" if rows.explained(_rms(rows.left - moments)) else words
             heavier_bodies.append((_SAFETY * distance, body, float(values[0]), words))
     for distance, _, mass, words in sorted(heavier_bodies)[:1]:
-        yield _cause("payload", words, mass, rows, distance)
+        yield _cause(FITTED, words, mass, rows, distance)
 
 
 def _point(numbers: Array) -> Array:
@@ -277,21 +296,29 @@ def states_of(record: ControlRecord, robot: AirRobot) -> list[tuple[Array, Array
     return [robot.coordinates(*row) for row in zip(q, v, np.concatenate(base, axis=1), strict=True)]
 
 
-def _motion(record: ControlRecord, robot: AirRobot) -> tuple[list[tuple[Array, Array]], Array, Array] | str:
-    """States at all rows; velocities whose differences are accelerations; rotation of the base at all rows.
+class _Moving(NamedTuple):
+    """Velocities whose differences are accelerations, (times, nv), and the rotation of the base at all rows.
 
-    The velocity of the base is along the world's axes, and its angular velocity along its own.
+    Its linear velocity is then along the world's axes; without rotations it is along its own.
     """
+
+    rates: Array
+    axes: Array | None = None
+
+
+def _motion(record: ControlRecord, robot: AirRobot) -> tuple[list[tuple[Array, Array]], list[_Moving]] | str:
+    """States at all rows, and their velocities along the axes in which a method may add steps to them."""
     states = states_of(record, robot)
     if isinstance(states, str):
         return states
-    velocities, rotations = np.array([v for _, v in states]), np.tile(np.eye(3), (len(states), 1, 1))
-    if robot.base is not None:
-        attitude = np.array([q[robot.base[0]][3:] for q, _ in states])
-        rotations = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
-        linear = velocities[:, robot.base[1]][:, :3]
-        velocities[:, robot.base[1].start : robot.base[1].start + 3] = np.einsum("tij,tj->ti", rotations, linear)
-    return states, velocities, rotations
+    own = np.array([v for _, v in states])
+    if robot.base is None:
+        return states, [_Moving(own)]
+    attitude = np.array([q[robot.base[0]][3:] for q, _ in states])
+    R = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
+    of_world, start = own.copy(), robot.base[1].start
+    of_world[:, start : start + 3] = np.einsum("tij,tj->ti", R, own[:, start : start + 3])
+    return states, [_Moving(of_world, R), _Moving(own)]
 
 
 class _Table:
@@ -304,7 +331,9 @@ class _Table:
         robot: AirRobot,
         states: list[tuple[Array, Array]],
         efforts: Array,
+        links: Sequence[AirLink],
     ) -> None:
+        self.links = links
         self.law, self.robot, self.at, self.efforts = law, robot, states, efforts
         self.step = float(np.diff(record.time).mean())
         self.rated = _largest(record, ("v.", "v_WB.", "w_WB."))
@@ -312,25 +341,24 @@ class _Table:
         self._known: dict[int, tuple[Array, ...]] = {}
 
     def _forces(self, row: int) -> tuple[Array, ...]:
-        """Mass matrix with armatures, inertial forces, weight, and the whitening of free directions, at a row."""
+        """Mass matrix with armatures, inertial forces, weight, whitening of free directions, and drag, at a row."""
         if row not in self._known:
             M, inner, weight, free = self.robot.forces(*self.at[row])
             armed = M + np.diag(self.robot.load(self.law.armature))
             into = np.linalg.inv(np.linalg.cholesky(free.T @ armed @ free)) @ free.T
-            self._known[row] = armed, inner, weight, into
+            self._known[row] = armed, inner, weight, into, self._drag(*self.at[row])
         return self._known[row]
 
-    def rows(self, rows: Array, rated: Array, axes: Array | None, *, central: bool, implicit: bool) -> _Rows:
+    def rows(self, rows: Array, moving: _Moving, *, central: bool, implicit: bool) -> _Rows:
         """Forces at some rows.
 
         Args:
             rows: their indices.
-            rated: velocities whose differences are accelerations, (times, nv).
-            axes: rotation of the base, whose rates are then along the world's axes; None: along its own.
+            moving: velocities whose differences are accelerations.
             central: True if accelerations are differences over two intervals.
             implicit: True if kd acts at the velocity after a step.
         """
-        law, robot, h = self.law, self.robot, self.step
+        law, robot, h, rated = self.law, self.robot, self.step, moving.rates
         previous, width = (rows - 1, 2 * h) if central else (rows, h)
         rates = (rated[rows + 1] - rated[previous]) / width
         late = np.minimum(rows + 1, len(rated) - 2)
@@ -342,11 +370,11 @@ class _Table:
         bodies: dict[str, list[Array]] = {body.name: [] for body in robot.mechanism.bodies}
         for row, rate, following in zip(rows.tolist(), rates.copy(), ahead.copy(), strict=True):
             q, v = self.at[row]
-            M, inner, weight, into = self._forces(row)
+            M, inner, weight, into, drag = self._forces(row)
             for item in (rate, following):
-                if robot.base is not None and axes is not None:
-                    base, moving, spin = item[robot.base[1]], v[robot.base[1]][:3], v[robot.base[1]][3:]
-                    base[:3] = axes[row].T @ base[:3] - np.cross(spin, moving)
+                if robot.base is not None and moving.axes is not None:
+                    base, velocity, spin = item[robot.base[1]], v[robot.base[1]][:3], v[robot.base[1]][3:]
+                    base[:3] = moving.axes[row].T @ base[:3] - np.cross(spin, velocity)
             effort = self.efforts[row]
             acting = M @ rate - inner - law.gravity * weight - robot.load(effort)
             if implicit:
@@ -365,6 +393,7 @@ class _Table:
             columns["armature"].append(-into @ (robot.load(added) * rate))
             columns["damping"].append(-into @ robot.load(v[driven]))
             columns["friction"].append(-into @ robot.load(np.sign(v[driven])))
+            columns["drag"].append(-into @ drag)
             columns["implicit"].append(-into @ (robot.load(h * law.kd) * rate))
             for body, forces_of in zip(bodies, self._of_bodies(q, v, rate), strict=True):
                 bodies[body].append(-into @ forces_of)
@@ -376,6 +405,18 @@ class _Table:
             late=np.concatenate(lates),
             size=_rms(np.concatenate(sizes)) or 1.0,
         )
+
+    def _drag(self, q: Array, v: Array) -> Array:
+        """Forces along the velocities that drag of 1 1/s on each link needs, (nv,)."""
+        motion, total = self.robot.equations.tree.at(q, v), np.zeros(len(v))
+        for link in self.links:
+            R, w, J = motion.R_WB[link.body], motion.w_WB[link.body], motion.J[link.body]
+            arm = R @ link.com
+            velocity = J[:3] @ v + np.cross(w, arm)
+            force = link.mass * velocity * (1 + np.linalg.norm(velocity))
+            torque = R @ link.inertia @ R.T @ w * (1 + np.linalg.norm(w))
+            total += J[:3].T @ force + J[3:].T @ (torque + np.cross(arm, force))
+        return total
 
     def _of_bodies(self, q: Array, v: Array, rate: Array) -> Iterator[Array]:
         """Forces along the velocities that a mass, a first moment and an inertia of each body need, (nv, 10)."""

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.number_format import error
+from proofroll.core.number_format import error, with_bar
+from proofroll.robots.control.base_frames import BaseFrame
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import BASE, ControlRecord, Layer, LayerCause, in_world
 from proofroll.robots.model import Array
@@ -21,6 +22,11 @@ _DEGREE = np.pi / 180
 _MILLI = 1e-3
 _READINGS = 4  # of a record that are judged at most
 _SCHEMES = (-1.0, 0.0, 1.0)  # places move by the velocity before a step, by the mean, by that after it
+
+_OF_SCHEMES = 0.6  # intervals by which a method may move places before or after their rates
+_FEWEST = 5  # rows of which a lag is told
+_SURE = 5.0  # errors of a lag that it differs by
+_NAMES = {"v": "v.JOINT"}
 
 Changed = Callable[[ControlRecord], ControlRecord]
 
@@ -48,6 +54,7 @@ class _Off(NamedTuple):
 
 
 _NONE = _Off(0.0, 0.0, 0.0)
+_Measured = Callable[[ControlRecord], "_Contradiction | None"]
 
 
 class StateReading(NamedTuple):
@@ -56,10 +63,14 @@ class StateReading(NamedTuple):
     Attributes:
         record: with velocities that are the rates of its places.
         layer: the mistakes of the columns; None: there are none.
+        frame: that the program has for its base; None: the base's own.
+        reported: the record with that frame.
     """
 
     record: ControlRecord
     layer: Layer | None
+    frame: BaseFrame | None = None
+    reported: ControlRecord | None = None
 
 
 @dataclass(frozen=True)
@@ -86,7 +97,18 @@ def state_readings(record: ControlRecord, law: ControlLaw) -> list[StateReading]
         ("v_WB", _of_velocity, [*_of_velocities(law)]),
     ):
         readings = [item for reading in readings for item in _explained(reading, name, measured, known)][:_READINGS]
+        readings = [_in_time(reading, name, measured) for reading in readings]
     return [StateReading(reading.record, _layer(reading)) for reading in readings]
+
+
+def framed_readings(record: ControlRecord, law: ControlLaw, frames: Sequence[BaseFrame]) -> list[StateReading]:
+    """Readings of a record whose program reports one of some frames for its base, or its own: that is no mistake."""
+    readings = state_readings(record, law)
+    for frame in frames:
+        for reading in state_readings(frame.corrected(record), law):
+            reported = record if reading.layer is None else frame.reported(reading.record)
+            readings.append(reading._replace(frame=frame, reported=reported))
+    return readings
 
 
 def reading_in_degrees(record: ControlRecord) -> StateReading | None:
@@ -95,24 +117,71 @@ def reading_in_degrees(record: ControlRecord) -> StateReading | None:
     column = max(places, key=lambda name: float(places[name].max()), default="")
     if not column or places[column].max() <= 2 * np.pi:
         return None
-    largest = float(places[column].max())
     words = "q.JOINT and v.JOINT are in degrees: name them q.JOINT[deg] and v.JOINT[deg/s]"
-    cause = LayerCause("degrees", f"{words} (all other layers hold with that)", _DEGREE, 0.0)
-    layer = Layer("state", (1 - _DEGREE) * largest, float(record.rounding[column].max()), column, causes=(cause,))
-    return StateReading(_after(_scaled("q.", _DEGREE), _scaled("v.", _DEGREE))(record), layer)
+    off = (1 - _DEGREE) * float(places[column].max())
+    changed = _after(_scaled("q.", _DEGREE), _scaled("v.", _DEGREE))(record)
+    return _silent(changed, "degrees", words, off, column)
 
 
-def _explained(
-    reading: _Reading, name: str, measured: Callable[[ControlRecord], _Off | None], known: Sequence[ColumnMistake]
-) -> list[_Reading]:
+def readings_by_frames(record: ControlRecord, frames: Sequence[BaseFrame]) -> Iterator[StateReading]:
+    """Readings of a record that has one of some frames in place of the base's own; no integral shows that."""
+    for frame in frames if "q_WB.w" in record.columns else ():
+        off = float(np.linalg.norm(frame.place))
+        reading = _silent(frame.corrected(record), "base_frame", frame.words, off, "p_WB")
+        yield reading._replace(frame=frame, reported=record)
+
+
+def readings_of_early_rates(record: ControlRecord) -> Iterator[StateReading]:
+    """Readings of a record with velocities of after a step beside places of before it, which a scheme may imitate."""
+    names = ("v.", "v_WB.", "w_WB.") if "v_WB.x" in record.columns else ("v.",)
+    for kinds in (names, *((name,) for name in names if len(names) > 1)):
+        told = ", ".join(_NAMES.get(kind[:-1], kind[:-1]) for kind in kinds)
+        size = max(float(np.abs(item).max()) for name, item in record.columns.items() if name.startswith(kinds))
+        words = f"{told}: one row early, as velocities after a step beside places before it"
+        yield _silent(_moved(kinds, -1)(record), "early", words, size, kinds[0][:-1])
+
+
+def untold_lags(record: ControlRecord) -> Iterator[str]:
+    """Names of the rates of which the digits of a record do not tell whether they are a row late."""
+    for name, measured in (("v", _of_joints), ("w_WB", _of_spin), ("v_WB", _of_velocity)):
+        if (compared := measured(record)) is not None:
+            lag = compared.lag_fit()
+            if lag.square and _SURE * lag.bar(compared.rounding / np.sqrt(3)) > 1 - _OF_SCHEMES:
+                yield _NAMES.get(name, name)
+
+
+def readings_of_late_efforts(readings: Sequence[StateReading]) -> Iterator[StateReading]:
+    """The readings with efforts that are a row late, as where a program returns those of its last step."""
+    for reading in readings:
+        efforts = {name: np.abs(item) for name, item in reading.record.columns.items() if name.startswith("effort.")}
+        if not efforts:
+            continue
+        words = "the columns effort.JOINT are one row late: each row has those of the step before it"
+        column, sooner = max(efforts, key=lambda name: float(efforts[name].max())), _moved("effort.", 1)
+        late = _silent(sooner(reading.record), "late_effort", words, float(efforts[column].max()), column)
+        if reading.layer is not None and late.layer is not None:
+            late = late._replace(layer=replace(reading.layer, causes=(*reading.layer.causes, *late.layer.causes)))
+        reported = None if reading.reported is None else sooner(reading.reported)
+        yield late._replace(frame=reading.frame, reported=reported)
+
+
+def _silent(record: ControlRecord, name: str, words: str, off: float, column: str) -> StateReading:
+    """Reading by a mistake that is told by the layers behind it."""
+    cause = LayerCause(name, f"{words} (the layers behind it tell so)", None, 0.0)
+    return StateReading(record, Layer("state", off, 0.0, column, causes=(cause,)))
+
+
+def _explained(reading: _Reading, name: str, measured: _Measured, known: Sequence[ColumnMistake]) -> list[_Reading]:
     """The reading with each of the known mistakes that explain best what its velocities contradict."""
-    apart = measured(reading.record)
+    compared = measured(reading.record)
+    apart = None if compared is None else compared.off()
     if apart is None or apart.off <= max(_TELLS * apart.way, _SAFETY * apart.rounding):
         return [reading]
     trials = []
     for mistake in known:
         trial = mistake.changed(reading.record)
-        left = measured(trial)
+        compared = measured(trial)
+        left = None if compared is None else compared.off()
         if left is not None and left.off <= _HELPS * min(apart.off, left.way):
             trials.append((left.off, mistake, trial))
     tried = reading.tried + len(known)
@@ -130,6 +199,36 @@ def _explained(
     return readings
 
 
+def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
+    """The reading with rates that are a row late or early moved to their rows.
+
+    Places move by the velocity before a step, after it, or the mean: that is up to half an interval of lag.
+    """
+    compared = measured(reading.record)
+    if compared is None:
+        return reading
+    lag, rounding = compared.lag_fit(), compared.rounding / np.sqrt(3)
+    rows = 1 if lag.intervals > 0 else -1
+    record = _moved(f"{name}.", rows)(reading.record)
+    right = measured(record) if len(record.time) > _FEWEST else None
+    if right is None:
+        return reading
+    rest = right.lag_fit()
+    noise = max(rest.rest, rounding)
+    bar = _SURE * lag.bar(noise)
+    explained = rest.rest <= max(2 * rounding, _HELPS * lag.size)
+    if not explained or abs(lag.intervals) <= _OF_SCHEMES + bar or abs(rest.intervals) > _OF_SCHEMES + bar:
+        return reading
+    before, after = compared.off(), right.off()
+    words = f"{_NAMES.get(name, name)} is one row {'late' if rows > 0 else 'early'}"
+    text, interval = with_bar(abs(lag.intervals), bar, 1)
+    proof = f"places off by {error(before.off)}, by {error(after.off, 1)} with that; {text} ± {interval} rows"
+    cause = LayerCause("late" if rows > 0 else "early", f"{words} ({proof})", None, after.off)
+    worst, column = max((reading.worst, reading.column), (before, name))
+    tried = reading.tried + 1
+    return _Reading(record=record, causes=(*reading.causes, cause), worst=worst, column=column, tried=tried)
+
+
 def _layer(reading: _Reading) -> Layer | None:
     """Layer of a reading; None: nothing was wrong."""
     if not reading.causes:
@@ -139,43 +238,84 @@ def _layer(reading: _Reading) -> Layer | None:
     return Layer("state", worst.off, bar, reading.column, causes=reading.causes, tried=tried, known=tried)
 
 
-def _of_joints(record: ControlRecord) -> _Off | None:
+class _Contradiction(NamedTuple):
+    """Places minus the integrals of their rates, (rows, numbers): of trapezoids, and what one interval of lag adds."""
+
+    left: Array
+    lag: Array
+    way: float
+    rounding: float
+
+    def off(self) -> _Off:
+        """Largest difference by the scheme that suits best."""
+        off = min(float(np.abs(self.left - part / 2 * self.lag).max()) for part in _SCHEMES)
+        return _Off(off, self.way, self.rounding)
+
+    def lag_fit(self) -> _Lag:
+        """Intervals by which rates are late."""
+        left, lag = self.left - self.left.mean(axis=0), self.lag - self.lag.mean(axis=0)
+        square = float((lag * lag).sum())
+        intervals = float((left * lag).sum()) / square if square else 0.0
+        rest, size = (float(np.sqrt(np.mean(item**2))) for item in (left - intervals * lag, left))
+        return _Lag(intervals=intervals, rest=rest, size=size, square=square)
+
+
+class _Lag(NamedTuple):
+    """Lag of rates behind their places.
+
+    Attributes:
+        intervals: rows by which they are late.
+        rest: root mean square of what that leaves.
+        size: the same without any lag.
+        square: sum of squares of what one interval adds.
+    """
+
+    intervals: float
+    rest: float
+    size: float
+    square: float
+
+    def bar(self, noise: float) -> float:
+        """Error of the intervals for a noise of the places."""
+        return noise / np.sqrt(self.square) if self.square else np.inf
+
+
+def _of_joints(record: ControlRecord) -> _Contradiction | None:
     names = [name[2:] for name in record.columns if name.startswith("q.") and f"v.{name[2:]}" in record.columns]
     q, v = record.stacked("q", names), record.stacked("v", names)
-    return None if q is None or v is None else _apart(record, q, v, record.rounding_of("q", names))
+    return None if q is None or v is None else _of_places(record, q, v, record.rounding_of("q", names))
 
 
-def _of_velocity(record: ControlRecord) -> _Off | None:
+def _of_velocity(record: ControlRecord) -> _Contradiction | None:
     place, velocity = record.stacked("p_WB", "xyz"), record.stacked("v_WB", "xyz")
     if place is None or velocity is None:
         return None
-    return _apart(record, place, velocity, record.rounding_of("p_WB", "xyz"))
+    return _of_places(record, place, velocity, record.rounding_of("p_WB", "xyz"))
 
 
-def _apart(record: ControlRecord, places: Array, rates: Array, rounding: Array) -> _Off:
-    """Distance of places from the integrals of their rates, by the scheme that suits best."""
+def _of_places(record: ControlRecord, places: Array, rates: Array, rounding: Array) -> _Contradiction:
     steps, way = np.diff(record.time)[:, None], places[1:] - places[0]
     mean = np.cumsum(steps * (rates[1:] + rates[:-1]) / 2, axis=0)
-    half = np.cumsum(steps * np.diff(rates, axis=0) / 2, axis=0)
-    off = min(float(np.abs(way - mean - part * half).max()) for part in _SCHEMES)
-    return _Off(off, float(np.abs(way).max()), float(rounding.max()))
+    lag = np.cumsum(steps * np.diff(rates, axis=0), axis=0)
+    return _Contradiction(way - mean, lag, float(np.abs(way).max()), float(rounding.max()))
 
 
-def _of_spin(record: ControlRecord) -> _Off | None:
+def _of_spin(record: ControlRecord) -> _Contradiction | None:
     attitude, spin = record.stacked("q_WB", "wxyz"), record.stacked("w_WB", "xyz")
     if attitude is None or spin is None:
         return None
     turned = Rotation.from_quat(attitude, scalar_first=True)
-    steps, offs = np.diff(record.time)[:, None], []
+    steps, lefts = np.diff(record.time)[:, None], []
     for part in _SCHEMES:
         turns = Rotation.from_rotvec(steps * ((1 - part) * spin[:-1] + (1 + part) * spin[1:]) / 2)
-        reached, off = turned[0], 0.0
+        reached, left = turned[0], []
         for k in range(len(steps)):
             reached = turns[k] * reached
-            off = max(off, (turned[k + 1] * reached.inv()).magnitude())
-        offs.append(off)
+            left.append((turned[k + 1] * reached.inv()).as_rotvec())
+        lefts.append(np.array(left))
+    sooner, mean, later = lefts
     way = float((turned[1:] * turned[0].inv()).magnitude().max())
-    return _Off(min(offs), way, float(record.rounding_of("q_WB", "wxyz").max()))
+    return _Contradiction(mean, sooner - later, way, float(record.rounding_of("q_WB", "wxyz").max()))
 
 
 def _of_joint_columns() -> Iterator[ColumnMistake]:
@@ -202,7 +342,6 @@ def _of_spins() -> Iterator[ColumnMistake]:
 
 
 def _of_velocities(law: ControlLaw) -> Iterator[ColumnMistake]:
-    yield ColumnMistake("late", "v_WB is one row late", _sooner("v_WB."))
     yield ColumnMistake("base_axes", "v_WB is along the axes of the base: name it v_WB_B", _along_base("v_WB"))
     if law.centre.any():
         at_centre = "v_WB is the velocity of the base's centre of mass, not of its origin"
@@ -316,14 +455,14 @@ def _scaled(start: str, factor: float) -> Changed:
     return changed
 
 
-def _sooner(start: str) -> Changed:
-    """Change of columns that are one row late; the last row, for which there is none, goes."""
+def _moved(start: str | tuple[str, ...], rows: int) -> Changed:
+    """Change of columns that are a row late, 1, or early, -1; the row for which there is none goes."""
 
     def changed(record: ControlRecord) -> ControlRecord:
-        rows: Any = np.arange(len(record.time) - 1)
-        part = record.part(rows)
-        later = {name: item[1:] for name, item in record.columns.items() if name.startswith(start)}
-        return ControlRecord(record.path, {**part.columns, **later}, part.rounding, part.time)
+        kept: Any = np.arange(max(0, -rows), len(record.time) - max(0, rows))
+        part = record.part(kept)
+        moved = {name: item[kept + rows] for name, item in record.columns.items() if name.startswith(start)}
+        return ControlRecord(record.path, {**part.columns, **moved}, part.rounding, part.time)
 
     return changed
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -18,7 +19,10 @@ from proofroll.elements.mechanism.run.reader import made_mechanism
 from proofroll.elements.mechanism.scene.control import TARGET, Control
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.policy import PolicySource
+from proofroll.robots.control.base_frames import BaseFrame, base_frames
+from proofroll.robots.control.bookkeeping.air import HeldRobot, links_of
 from proofroll.robots.control.controller import Controller, Gains, read_controller
+from proofroll.robots.control.imported import imported_robots
 from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.scene_tables import ENDINGS, ParameterRow, described, laws, read_robot, tables_of
@@ -43,12 +47,22 @@ class RecordedRobot:
         grounded: True if the controller has it stand on the ground.
         reductions: joint -> turns of its motor per turn of the joint, of the transmissions in its file.
         speeds: joint -> largest velocity of its drive, of its file [rad/s or m/s].
+        ranges: joint -> its limits, of its file [rad or m].
+        refs: joint -> number that an MJCF gives it in its pose, where it is not 0 [rad or m].
+        base_frames: frames that programs report in place of the frame of a base that floats.
+        held: frame of these, or None -> the robot in the air, with that frame as that of its base.
+        imported: the same -> robots that importers make of the file.
     """
 
     mechanism: Mechanism
     grounded: bool
     reductions: Mapping[str, float]
     speeds: Mapping[str, float]
+    ranges: Mapping[str, tuple[float, float]]
+    refs: Mapping[str, float]
+    base_frames: tuple[BaseFrame, ...]
+    held: Callable[[BaseFrame | None], HeldRobot]
+    imported: Callable[[BaseFrame | None], Iterator[HeldRobot]]
 
 
 class ControlledScenes:
@@ -103,18 +117,35 @@ class ControlledScenes:
             start = dataclasses.replace(controller.start, base=None, base_velocity=(0.0,) * 6)
             controller = dataclasses.replace(controller, start=start)
         file, robot = self._robot(path, controller, "free" if free else "fixed")
-        values = {name: row["value"] for name, row in described(file, laws(robot))["parameters"].items()}
-        values["gravity"] = float(np.linalg.norm(robot.gravity))
-        tables = dict(self._tables(file, robot, controller, values, always=True))
-        if left_out := tables.pop("unmodelled"):
-            raise InputError("robot", path, f"it has {left_out[0]}, which no equations here have")
-        x, y, z = robot.gravity.tolist()
-        del tables["gravity"]
+
+        def mechanism_of(robot: Robot) -> Mechanism:
+            values = {name: row["value"] for name, row in described(file, laws(robot))["parameters"].items()}
+            values["gravity"] = float(np.linalg.norm(robot.gravity))
+            tables = dict(self._tables(file, robot, controller, values, always=True))
+            if left_out := tables.pop("unmodelled"):
+                raise InputError("robot", path, f"it has {left_out[0]}, which no equations here have")
+            x, y, z = robot.gravity.tolist()
+            del tables["gravity"]
+            return made_mechanism(tables, (x, y, z), Parameters({}, {}))
+
+        def held(robot: Robot, frame: BaseFrame | None) -> HeldRobot:
+            based = robot if frame is None else frame.based(robot)
+            return HeldRobot(mechanism_of(based), links_of(based))
+
         return RecordedRobot(
-            mechanism=made_mechanism(tables, (x, y, z), Parameters({}, {})),
+            mechanism=mechanism_of(robot),
             grounded=controller.ground is not None,
             reductions=file.driven,
             speeds={joint.name: joint.speed for joint in robot.moving if joint.speed},
+            ranges={
+                joint.name: (joint.lower, joint.upper)
+                for joint in robot.moving
+                if joint.lower is not None and joint.upper is not None and joint.lower < joint.upper
+            },
+            refs={joint.name: joint.ref for joint in robot.moving if joint.ref},
+            base_frames=base_frames(robot),
+            held=partial(held, robot),
+            imported=lambda frame: imported_robots(file, robot, partial(held, frame=frame)),
         )
 
     def _tables(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +16,27 @@ from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.step_limits import servo_steps
+from proofroll.robots.control.air_fit import FITTED
+from proofroll.robots.control.base_frames import BaseFrame
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
-from proofroll.robots.control.columns import StateReading, reading_in_degrees, state_readings
+from proofroll.robots.control.columns import (
+    StateReading,
+    framed_readings,
+    reading_in_degrees,
+    readings_by_frames,
+    readings_of_early_rates,
+    readings_of_late_efforts,
+    state_readings,
+    untold_lags,
+)
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
-from proofroll.robots.control.layers import BETWEEN, record_layers
+from proofroll.robots.control.layers import BETWEEN, InAir, record_layers
 from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
+_Judged = tuple[StateReading, list[Layer]]
 _SAME_STEP = 1e-3  # part of the interval between rows by which the step of the program may differ from it
 
 
@@ -101,7 +114,7 @@ def _found(layer: Layer) -> str:
     place = "" if layer.holds else f", most in {layer.column}"
     place += f" at {layer.time:.4g} s" if place and np.isfinite(layer.time) else ""
     remark = f"; {layer.reason}" if layer.reason else ""
-    rounding = "" if layer.reason == BETWEEN else f", rounding {error(layer.bar)}"
+    rounding = "" if layer.reason.startswith(BETWEEN) else f", rounding {error(layer.bar)}"
     return f"off by {error(layer.residual)}{rounding}{place}{remark}"
 
 
@@ -131,12 +144,14 @@ def judge_record(
         free = floats(arrays, layout, sum(joint.nq == 1 for joint in fixed_robot.joints))
         model = scenes.of_record(robot, free=free)
         driven = law_of(model.mechanism).joints
-        time, columns = columns_of(record, arrays, layout, model.mechanism, driven)
+        if control and LAYOUTS[layout].from_refs and model.refs:
+            _refuse_refs(control, model.refs)
+        time, columns = columns_of(record, arrays, layout, model.mechanism, driven, model.refs)
         eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
         digits = max(eps, default=0.0) / 2
         read = record_of(time, columns, record, digits=digits)
-        if "sim_dt" in arrays:
-            stepwise = bool(np.isclose(_step_of(record, arrays["sim_dt"]), _step(read), rtol=_SAME_STEP))
+        sim_dt = _step_of(record, arrays["sim_dt"]) if "sim_dt" in arrays else LAYOUTS[layout].step
+        stepwise = sim_dt is not None and bool(np.isclose(sim_dt, _step(read), rtol=_SAME_STEP))
     else:
         if record.suffix in ARRAYS:
             raise InputError("--as", "", f"say whose arrays these are: {', '.join(LAYOUTS)}")
@@ -147,22 +162,32 @@ def judge_record(
     law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
     names_of_layers = DIFFERENCES if control else ()
 
-    def layers_of(reading: StateReading) -> list[Layer]:
+    def layers_of(reading: StateReading, *, imported: bool = False) -> list[Layer]:
         state_layers = [] if reading.layer is None else [reading.layer]
-        mechanism, grounded = model.mechanism, model.grounded
+        held = InAir(
+            held=model.held(reading.frame),
+            imported=partial(model.imported, reading.frame) if imported else tuple,
+            reported=reading.reported,
+            ranges=model.ranges,
+        )
         return [
             *state_layers,
-            *record_layers(reading.record, law, mechanism, grounded=grounded, names=names_of_layers, stepwise=stepwise),
+            *record_layers(
+                reading.record,
+                law,
+                model.mechanism,
+                grounded=model.grounded,
+                names=names_of_layers,
+                stepwise=stepwise,
+                in_air=held,
+            ),
         ]
 
-    judged = [(reading.record, layers_of(reading)) for reading in state_readings(read, law)]
-    # Of readings that explain the state alike, layers behind it tell the right one.
-    read, layers = min(judged, key=lambda item: sum(not layer.holds for layer in item[1]))
-    if not all(layer.holds for layer in layers) and (degrees := reading_in_degrees(read)) is not None:
-        _, *later_layers = layers_in_degrees = layers_of(degrees)
-        computed = any(layer.residual is not None for layer in later_layers)
-        if computed and all(layer.holds for layer in later_layers):
-            read, layers = degrees.record, layers_in_degrees
+    inertial = bool(layout) and LAYOUTS[layout].inertial and free
+    frames = model.base_frames
+    readings = framed_readings(read, law, frames) if inertial else state_readings(read, law)
+    reading, layers = _best_reading(readings, layers_of, () if inertial else frames, controlled=control is not None)
+    read = reading.record
     return RecordJudgement(
         record=str(record),
         robot=str(robot),
@@ -171,9 +196,85 @@ def judge_record(
         rows=len(read.time),
         step=_step(read),
         layers=layers,
-        remarks=[*_too_fast(read, model.speeds)],
+        remarks=[*_too_fast(read, model.speeds), *_untold(read)],
         step_bound=_step_bound(model.mechanism, _step(read)),
     )
+
+
+def _best_reading(
+    readings: Iterable[StateReading],
+    layers_of: Callable[..., list[Layer]],
+    frames: Sequence[BaseFrame],
+    *,
+    controlled: bool,
+) -> _Judged:
+    """Reading of a record of which layers are open least, and its layers.
+
+    Of readings that explain the state alike, layers behind it tell the right one. Mistakes that the state does not show
+    are tried where these are open.
+
+    Args:
+        readings: by the state.
+        layers_of: layers of a reading.
+        frames: that the record may have for its base.
+        controlled: True if a controller's law tells the efforts.
+    """
+    judged = [(reading, layers_of(reading)) for reading in readings]
+    plain = min(judged, key=_open)
+    record = plain[0].record
+
+    def try_rivals(rivals: Iterable[StateReading], *, imported: bool = False) -> None:
+        """Adds readings that look at every layer that is open without them."""
+        trials = [(rival, layers_of(rival, imported=imported)) for rival in rivals]
+        judged.extend(item for item in trials if _open_layers(plain[1]) <= _looked_at(item[1]))
+
+    if any(_open(plain)) and (degrees := reading_in_degrees(record)) is not None:
+        try_rivals([degrees])
+    if _unexplained_forces(min(judged, key=_open)[1]):
+        try_rivals(readings_by_frames(record, frames))
+    if _unexplained_forces(min(judged, key=_open)[1]) and not controlled:
+        try_rivals(readings_of_late_efforts([rival for rival, _ in judged]))
+    if min(map(_open, judged))[0]:
+        try_rivals(readings_of_early_rates(record))
+    if any(min(map(_open, judged))[::2]):
+        try_rivals([rival for rival, _ in judged], imported=True)
+    return min(judged, key=_open)
+
+
+def _open_layers(layers: Sequence[Layer]) -> set[str]:
+    """Names of layers that differ without a cause."""
+    return {
+        layer.name
+        for layer in layers
+        if (layer.undecided if layer.residual is None else not (layer.holds or layer.causes))
+    }
+
+
+def _looked_at(layers: Sequence[Layer]) -> set[str]:
+    return {layer.name for layer in layers if layer.residual is not None or layer.undecided}
+
+
+def _refuse_refs(control: Path, refs: Mapping[str, float]) -> None:
+    """Raises InputError: poses and observations of a controller count from elsewhere than the arrays."""
+    joint, ref = next(iter(refs.items()))
+    advice = (
+        f"{joint} has ref = {ref:.5g} in the robot's file: qpos counts from there, and a controller's poses, targets "
+        "and observations from the file's pose; give a .csv with q.JOINT and target.JOINT less ref, or omit --control"
+    )
+    raise InputError("--control", control, advice)
+
+
+def _unexplained_forces(layers: Sequence[Layer]) -> bool:
+    """True if accelerations or a motion differ, and nothing is known that explains it."""
+    return bool(_open_layers(layers) & {"acceleration", "motion"})
+
+
+def _open(judged: _Judged) -> tuple[int, int, int]:
+    """Number of layers that are not explained or not decided, that do not hold, and that a fitted inertia explains."""
+    _, layers = judged
+    failed = [layer for layer in layers if not layer.holds]
+    fitted = sum(cause.id == FITTED for layer in failed for cause in layer.causes)
+    return len(_open_layers(layers)), len(failed), fitted
 
 
 def _step_bound(mechanism: Mechanism, step: float) -> str:
@@ -195,6 +296,12 @@ def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[st
                 f"v.{joint} passes the velocity limit {limit:.4g} of the robot's file at {instant:.4g} s; a program "
                 "that clamps velocities moves it otherwise"
             )
+
+
+def _untold(record: ControlRecord) -> Iterator[str]:
+    """A sentence on rates that may be a row late, if there are any."""
+    if names := [*untold_lags(record)]:
+        yield f"the digits of the record do not tell whether {' and '.join(names)} may be a row late"
 
 
 def _step_of(path: Path, values: NDArray[Any]) -> float:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
-from proofroll.robots.control.air_fit import AirFit, acceleration_fit
+from proofroll.robots.control.air_fit import FITTED, AirFit, acceleration_fit
+from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import (
     IMPLICIT,
@@ -41,6 +43,7 @@ from proofroll.robots.control.differences import (
 from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
 from proofroll.robots.control.record import OBSERVED, ControlRecord, Layer, LayerCause
+from proofroll.robots.control.standing_joints import held_joints, rows_off_stops
 from proofroll.robots.model import Array
 
 # Part of the largest forces up to which what is left without a cause is taken for the program's steps between the rows:
@@ -62,6 +65,7 @@ def record_layers(
     grounded: bool,
     names: Collection[str] = DIFFERENCES,
     stepwise: bool = False,
+    in_air: InAir | None = None,
 ) -> list[Layer]:
     """All layers of a record, with causes at those that do not hold.
 
@@ -72,8 +76,9 @@ def record_layers(
         grounded: True if something else than servos and gravity acts on the robot.
         names: of the layers before that of accelerations.
         stepwise: True if the program has no steps between the rows.
+        in_air: what the accelerations are held against; by default the mechanism.
     """
-    evidence = _Evidence(record, law, mechanism)
+    evidence = _Evidence(record, law, mechanism, in_air or InAir(HeldRobot.of(mechanism)))
     layers: list[Layer] = []
     time = SearchTime(SEARCH_TIME)
     for name in names:
@@ -96,10 +101,28 @@ def record_layers(
 
 
 @dataclass(frozen=True)
+class InAir:
+    """Robots that the accelerations of a record are held against.
+
+    Attributes:
+        held: the robot.
+        imported: robots that are tried where it differs.
+        reported: the record with the frame of its base, if that is not the one of the other layers.
+        ranges: joint -> its limits [rad or m].
+    """
+
+    held: HeldRobot
+    imported: Callable[[], Iterable[HeldRobot]] = tuple
+    reported: ControlRecord | None = None
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class _Evidence:
     record: ControlRecord
     law: ControlLaw
     mechanism: Mechanism
+    in_air: InAir
 
     def difference(
         self, name: str, law: ControlLaw | None = None, record: ControlRecord | None = None
@@ -133,19 +156,26 @@ def _layer(name: str, evidence: _Evidence) -> Layer:
 
 def _in_air(evidence: _Evidence, layers: Sequence[Layer], *, stepwise: bool) -> Layer:
     """Layer of accelerations, from recorded efforts."""
-    record, law = evidence.record, evidence.law
+    record, law = evidence.in_air.reported or evidence.record, evidence.law
     efforts = record.stacked("effort", law.joints)
     if efforts is None:
         return Layer("acceleration", reason="the record has no columns effort.JOINT")
-    fit = acceleration_fit(record, law, evidence.mechanism, efforts, held_rows(record, law))
+    off_stops, remark = rows_off_stops(record, evidence.in_air.ranges)
+    fit = acceleration_fit(record, law, evidence.in_air.held, efforts, held_rows(record, law), off_stops)
+    differs = isinstance(fit, AirFit) and (fit.off > fit.bar or fit.bar >= 1)
+    if differs and (held := held_joints(record, law, evidence.in_air.held, efforts)) is not None:
+        fit = AirFit(off=1.0, bar=held.after, causes=(held,))
     if isinstance(fit, str):
-        return Layer("acceleration", reason=fit)
+        return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
+    if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
+        fit = _of_another_robot(record, evidence, efforts, fit, off_stops)
     fit = dataclasses.replace(fit, between=fit.between and not stepwise)
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
     if fit.between and fit.off > _STEPS:
         off = f"the forces are off by {error(fit.off)} of the largest, and no cause is known"
-        return Layer("acceleration", reason=f"{off}; steps between the rows may explain it: log every step to decide")
+        advice = "steps between the rows may explain it: log every step to decide"
+        return Layer("acceleration", reason=f"{off}; {advice}", undecided=True)
     implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
     holds = (fit.off <= fit.bar and not fit.causes) or fit.between
     earlier = next((layer.name for layer in layers if not layer.holds), "")
@@ -154,10 +184,30 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], *, stepwise: bool) -> 
         residual=fit.off,
         bar=max(fit.off, fit.bar) if holds else min(fit.bar, 0.99 * fit.off),
         column="the forces",
-        reason=implicit if fit.imitated else BETWEEN if fit.between else "",
+        reason="; ".join(
+            part for part in (implicit if fit.imitated else BETWEEN if fit.between else "", remark) if part
+        ),
         causes=fit.causes,
         tried=0 if earlier else fit.tried,
     )
+
+
+def _of_another_robot(
+    record: ControlRecord, evidence: _Evidence, efforts: Array, fit: AirFit, usable: NDArray[np.bool_]
+) -> AirFit:
+    """Fit with the first robot that an importer makes of the file and that the record is of; else the fit itself."""
+    law = evidence.law
+    for robot in evidence.in_air.imported():
+        trial = acceleration_fit(record, law, robot, efforts, held_rows(record, law), usable)
+        if isinstance(trial, str) or trial.between or any(cause.id == FITTED for cause in trial.causes):
+            continue
+        if trial.off > trial.bar and not trial.causes:
+            continue
+        left = min((cause.after for cause in trial.causes), default=trial.off)
+        proof = f"forces off by {error(fit.off)} of their size, by {error(left, 1)} with that"
+        cause = LayerCause(robot.causes[0], f"{robot.words} ({proof})", None, left)
+        return dataclasses.replace(fit, causes=(cause, *trial.causes), between=False)
+    return fit
 
 
 def _fit_by_law(record: ControlRecord, evidence: _Evidence) -> AirFit | str:
@@ -165,7 +215,7 @@ def _fit_by_law(record: ControlRecord, evidence: _Evidence) -> AirFit | str:
     efforts = efforts_of(record, evidence.law)
     if isinstance(efforts, str) or not np.isfinite(efforts).all():
         return efforts if isinstance(efforts, str) else "the record begins between two instants"
-    return acceleration_fit(record, evidence.law, evidence.mechanism, efforts, held_rows(record, evidence.law))
+    return acceleration_fit(record, evidence.law, evidence.in_air.held, efforts, held_rows(record, evidence.law))
 
 
 def _bars(name: str, evidence: _Evidence, compared: LayerDifferences) -> Array:
@@ -212,7 +262,10 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
             ((1 + numbers) * cause.after, cause)
             for numbers, cause in _fitted_causes(layer.name, compared, evidence, most)
         ]
-    causes = [cause for _, cause in sorted(ranked, key=lambda item: item[0])]
+    by_words: dict[str, LayerCause] = {}
+    for _, cause in sorted(ranked, key=lambda item: item[0]):
+        by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
+    causes = [*by_words.values()]
     if layer.name == "instants" and not causes:
         causes = [*_missed(evidence)]
     return {"causes": tuple(causes), "tried": tried, "known": len(candidates)}

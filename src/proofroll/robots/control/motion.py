@@ -126,4 +126,5 @@ def motion_layer(
     )
     undecided = time.over and not search.right and not causes
     ended = f"the search ended after {SEARCH_TIME:.0f} s of processor time without a mistake that explains it"
-    return Layer("motion", reason=f"not decided: off by {error(least)}, and {ended}") if undecided else layer
+    reason = f"not decided: off by {error(least)}, and {ended}"
+    return Layer("motion", reason=reason, undecided=True) if undecided else layer

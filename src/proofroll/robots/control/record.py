@@ -207,6 +207,7 @@ class Layer:
         reason: reason why it was not looked at, or a remark.
         causes: mistakes that explain it, the best first.
         tried: number of mistakes that were tried, of those that are ``known``.
+        undecided: True if it differs and the record does not tell whether that counts.
     """
 
     name: str
@@ -218,6 +219,7 @@ class Layer:
     causes: tuple[LayerCause, ...] = ()
     tried: int = 0
     known: int = 0
+    undecided: bool = False
 
     @property
     def holds(self) -> bool:

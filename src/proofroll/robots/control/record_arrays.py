@@ -31,6 +31,9 @@ class Layout:
         at_centre: True if the velocity of the base is that of its centre of mass, False if of its origin.
         spin_in_base: True if its angular velocity is along its own axes.
         by_level: True if joints are in the order of their distance from the root, False if in that of the robot file.
+        inertial: True if place, attitude and velocity of the base are those of the inertial frame of its link.
+        from_refs: columns that count from the ``ref`` of an MJCF.
+        step: interval between rows that is the program's own step, where the file does not say [s]; None: unknown.
     """
 
     names: Mapping[str, tuple[str, ...]]
@@ -38,8 +41,12 @@ class Layout:
     at_centre: bool = False
     spin_in_base: bool = False
     by_level: bool = False
+    inertial: bool = False
+    from_refs: tuple[str, ...] = ()
+    step: float | None = None
 
 
+_BASE_PARTS = ("base_place", "base_attitude", "base_velocity", "base_spin")  # arrays that make a ``base``
 _TIME = ("time", "t")
 _COMMON = {"action": ("action", "actions"), "target": ("target", "targets", "joint_pos_target", "dof_pos_target")}
 _GYM = {
@@ -54,6 +61,7 @@ LAYOUTS: Mapping[str, Layout] = {
         | {"effort": ("torque", "torques", "actuator_force", "qfrc_actuator")},
         quaternion="wxyz",
         spin_in_base=True,
+        from_refs=("q", "target"),
     ),
     "isaaclab": Layout(  # 2.x; its views give velocities of centres of mass
         names={"base": ("root_state_w",), "q": ("joint_pos",), "v": ("joint_vel",)}
@@ -62,6 +70,16 @@ LAYOUTS: Mapping[str, Layout] = {
         quaternion="wxyz",
         at_centre=True,
         by_level=True,
+    ),
+    "pybullet": Layout(  # what getBasePositionAndOrientation, getBaseVelocity and getJointStates return
+        names={"base_place": ("base_position",), "base_attitude": ("base_orientation",)}
+        | {"base_velocity": ("base_linear_velocity",), "base_spin": ("base_angular_velocity",)}
+        | {"q": ("joint_positions", "joint_position"), "v": ("joint_velocities", "joint_velocity")}
+        | {"effort": ("applied_torques", "torques", "torque")}
+        | _COMMON,
+        quaternion="xyzw",
+        inertial=True,
+        step=1 / 240,
     ),
     "isaacgym": Layout(names=_GYM, quaternion="xyzw", at_centre=True),
     "legged_gym": Layout(names=_GYM, quaternion="xyzw", at_centre=True),
@@ -116,11 +134,16 @@ def floats(arrays: Mapping[str, Array], layout: str, joints: int) -> bool:
     named = _named(arrays, LAYOUTS[layout])
     if "qpos" in named:
         return bool(named["qpos"].shape[1] == joints + _POSE)
-    return "base" in named
+    return "base" in named or _BASE_PARTS[0] in named
 
 
 def columns_of(
-    path: Path, arrays: Mapping[str, Array], layout: str, mechanism: Mechanism, driven: Sequence[str]
+    path: Path,
+    arrays: Mapping[str, Array],
+    layout: str,
+    mechanism: Mechanism,
+    driven: Sequence[str],
+    refs: Mapping[str, float],
 ) -> tuple[Array, dict[str, Array]]:
     """Times [s] and columns of a record (:class:`.ControlRecord`) in arrays.
 
@@ -130,6 +153,7 @@ def columns_of(
         layout: of :data:`LAYOUTS`.
         mechanism: the robot.
         driven: its driven joints, in the order of its controller.
+        refs: joint -> what MuJoCo's qpos is in the pose of the file, where coordinates here are 0.
 
     Raises:
         InputError: an array is lacking, or has another number of columns than the robot has joints.
@@ -139,6 +163,7 @@ def columns_of(
     times = _times(path, arrays, len(next(iter(quantities.values()), ())))
     joints = _in_order(mechanism, arrays, by_level=kind.by_level)
     _require_shapes(path, kind, arrays, quantities, len(joints), len(times))
+    quantities = _with_base(path, kind, quantities)
     if "qpos" in quantities and "qvel" in quantities:
         positions, rates = quantities.pop("qpos"), quantities.pop("qvel")
         if positions.shape[1] == len(joints) + _POSE:
@@ -158,7 +183,8 @@ def columns_of(
         if width != len(labels):
             advice = f"it has {width} columns; the robot has {len(joints)} joints, of which {len(moved)} are driven"
             raise InputError(str(path), name, advice)
-        columns |= {f"{name}.{label}": quantities[name][:, k] for k, label in enumerate(labels)}
+        zeros = refs if name in kind.from_refs else {}
+        columns |= {f"{name}.{label}": quantities[name][:, k] - zeros.get(label, 0.0) for k, label in enumerate(labels)}
     if "base" in quantities:
         if not np.all(np.any(quantities["base"][:, 3:_POSE], axis=1)):
             raise InputError(str(path), "quaternion of the base", "it is zero in a row, which is no orientation")
@@ -170,7 +196,8 @@ def _require_shapes(
     path: Path, layout: Layout, arrays: Mapping[str, Array], quantities: Mapping[str, Array], joints: int, rows: int
 ) -> None:
     """Raises InputError for an array with another number of rows than times, or of columns than its state has."""
-    widths = {"base": (_POSE + _TWIST,), "qpos": (joints, joints + _POSE), "qvel": (joints, joints + _TWIST)}
+    parts = dict(zip(_BASE_PARTS, ((3,), (4,), (3,), (3,)), strict=True))
+    widths = parts | {"base": (_POSE + _TWIST,), "qpos": (joints, joints + _POSE), "qvel": (joints, joints + _TWIST)}
     if "qpos" in quantities and quantities["qpos"].shape[1] in widths["qpos"]:
         floating = quantities["qpos"].shape[1] == joints + _POSE
         widths["qvel"] = (joints + _TWIST * floating,)
@@ -195,6 +222,16 @@ def _named(arrays: Mapping[str, Array], layout: Layout) -> dict[str, Array]:
             values = values[:, 0] if values.ndim > 2 else values
             quantities[quantity] = values[:, None] if values.ndim == 1 else values
     return quantities
+
+
+def _with_base(path: Path, layout: Layout, quantities: Mapping[str, Array]) -> dict[str, Array]:
+    """Quantities whose arrays of parts of a base are one. Raises InputError if some of them lack."""
+    parts = [name for name in _BASE_PARTS if name in quantities]
+    lacking = [layout.names[name][0] for name in _BASE_PARTS if parts and name not in parts]
+    if lacking:
+        raise InputError(str(path), lacking[0], f"the record has parts of its base, and lacks {choices(lacking)}")
+    others = {name: item for name, item in quantities.items() if name not in parts}
+    return others | ({"base": np.concatenate([quantities[name] for name in parts], axis=1)} if parts else {})
 
 
 def _times(path: Path, arrays: Mapping[str, Array], count: int) -> Array:

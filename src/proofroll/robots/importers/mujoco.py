@@ -308,6 +308,7 @@ def _joint(
         lower=float(model.jnt_range[index, 0]) - shift if bounded and kind in ONE_COORDINATE else None,
         upper=float(model.jnt_range[index, 1]) - shift if bounded else None,
         actuated=driven,
+        ref=shift,
     )  # fmt: skip
 
 

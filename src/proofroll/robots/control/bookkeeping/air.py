@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.linalg import null_space
@@ -20,6 +20,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.policy import Observation
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.robots.control.bookkeeping.law import ControlLaw, RobotState
+from proofroll.robots.model import NO_BODY, Robot
 
 Scheme = Literal["explicit", "implicit", "explicit_base", "implicit_base", "rk4"]
 SCHEMES: Mapping[Scheme, str] = {
@@ -30,6 +31,59 @@ SCHEMES: Mapping[Scheme, str] = {
     "rk4": "RK4",
 }
 _STOP = 1e6  # rad/s or m/s: a run that is faster has blown up
+
+
+class AirLink(NamedTuple):
+    """Link of a body; links at fixed joints make one body.
+
+    Attributes:
+        body: index of the body.
+        mass: [kg].
+        com: centre of mass in the body's frame [m], shape (3,).
+        inertia: about it, in the body's axes [kg m²], shape (3, 3).
+    """
+
+    body: int
+    mass: float
+    com: Array
+    inertia: Array
+
+
+def links_of(robot: Robot) -> tuple[AirLink, ...]:
+    """All links that move and have mass."""
+    index = {joint.name: k for k, joint in enumerate(robot.moving)}
+    links = []
+    for name, (home, position, rotation) in robot.welded.items():
+        if home != NO_BODY and (link := robot.bodies[name]).mass:
+            com, inertia = position + rotation @ link.com, rotation @ link.inertia @ rotation.T
+            links.append(AirLink(body=index[home], mass=link.mass, com=com, inertia=inertia))
+    return tuple(links)
+
+
+@dataclass(frozen=True)
+class HeldRobot:
+    """Robot in the air as a program holds it.
+
+    Attributes:
+        mechanism: the robot.
+        links: of which its bodies consist.
+        causes: ids of what makes it another one than that of the file.
+        words: sentence on them, with what to do.
+    """
+
+    mechanism: Mechanism
+    links: tuple[AirLink, ...]
+    causes: tuple[str, ...] = ()
+    words: str = ""
+
+    @classmethod
+    def of(cls, mechanism: Mechanism) -> HeldRobot:
+        """Robot of a mechanism whose bodies are links."""
+        links = (
+            AirLink(body=k, mass=body.mass, com=np.array(body.com), inertia=np.array(body.inertia))
+            for k, body in enumerate(mechanism.bodies)
+        )
+        return cls(mechanism, tuple(links))
 
 
 class AirRobot:

@@ -71,6 +71,7 @@ class Mistake:
         later: True if a record may show it at the next layer, as where it lacks a part of an observation, or has an
             action before it is clipped.
         at_least: clause that names it where any larger size explains as much; empty: none does.
+        opposite: clause that names it where its size is -1; empty: its size is not negative.
     """
 
     id: str
@@ -84,11 +85,19 @@ class Mistake:
     absent: str = ""
     later: bool = False
     at_least: str = ""
+    opposite: str = ""
+
+    @property
+    def least(self) -> float:
+        """Smallest size."""
+        return -math.inf if self.opposite else 0.0
 
     def sentence(self, size: float, *, larger: bool = False) -> str:
         """The mistake with its size; ``larger``: any larger one explains as much."""
         if self.absent and abs(size) < _NOTHING:
             return self.absent
+        if self.opposite and abs(size + 1) < _NOTHING:
+            return self.opposite
         words = self.at_least if larger else self.words
         return words.format(size=f"{round(size, 12):.5g}")
 
@@ -131,14 +140,14 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
             starts=_ARMATURES,
             none=0.0,
         )
-    yield _sized("gravity", "gravity is {size} of the right one", "acceleration", "gravity")
+    yield _signed("gravity", "gravity", "acceleration", "gravity")
 
 
 def _of_servos(law: ControlLaw) -> Iterator[Mistake]:
     """Mistakes between targets and efforts."""
     for gain, words in (("kp", "kp"), ("kd", "kd")):
         if getattr(law, gain).any():
-            yield _sized(gain, f"{words} is {{size}} of the right one", "effort", gain)
+            yield _signed(gain, words, "effort", gain)
             yield _fixed(f"{gain}_sign", f"{words} has the other sign", "effort", **{gain: -getattr(law, gain)})
     if np.isfinite(law.limit).any():
         yield _fixed("clamp_missing", "efforts have no limit", "effort", limit=np.full(len(law.joints), np.inf))
@@ -217,7 +226,7 @@ def _of_actions(law: ControlLaw) -> Iterator[Mistake]:
     for words, order in orders(law.joints):
         yield _fixed("joint_order", f"actions are for joints in another order ({words})", "target", action_order=order)
     yield _fixed("pose_missing", "the default pose is missing", "target", pose=np.zeros(len(law.joints)))
-    yield _sized("scale", "the scale of actions is {size} of the right one", "target", "scale", (0.95, 1.9))
+    yield _signed("scale", "the scale of actions", "target", "scale", (0.95, 1.9, -0.5))
     yield Mistake(
         id="smoothing",
         words="actions pass a filter, of which {size} is new at each instant",
@@ -257,6 +266,12 @@ def _fixed(name: str, words: str, layer: str, *, later: bool = False, **changes:
 
 def _sized(name: str, words: str, layer: str, attribute: str, starts: tuple[float, ...] = (0.95,)) -> Mistake:
     return Mistake(id=name, words=words, layer=layer, changed=partial(_scaled, attribute), sized=True, starts=starts)
+
+
+def _signed(name: str, what: str, layer: str, attribute: str, starts: tuple[float, ...] = (0.95, -0.5)) -> Mistake:
+    """Mistake of a number that may have the other sign, too."""
+    mistake = _sized(name, f"{what} is {{size}} of the right one", layer, attribute, starts)
+    return dataclasses.replace(mistake, opposite=f"{what} has the other sign")
 
 
 def _scaled(attribute: str, law: ControlLaw, size: float) -> ControlLaw:

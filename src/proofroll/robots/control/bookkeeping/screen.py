@@ -218,12 +218,12 @@ class MistakeScreen:
         fixed, sized = ([item for item in items if item.mistake.sized is kind] for kind in (False, True))
         for _ in range(_ROUNDS if sized else 0):
             sizes = np.array([item.size for item in sized])
-            changes = _SLOPE * np.maximum(sizes, _SLOPE)
+            changes = _SLOPE * np.maximum(np.abs(sizes), _SLOPE)
             left, moved = (self.left(_laws(self.law, sized, tried), treatment) for tried in (sizes, sizes + changes))
             slopes = (moved - left) / changes[:, None]
             squares = np.square(slopes).sum(axis=1)
             steps = -np.divide((slopes * left).sum(axis=1), squares, out=np.zeros_like(squares), where=squares > 0)
-            better = np.maximum(0.0, sizes + steps)
+            better = np.maximum([item.mistake.least for item in sized], sizes + steps)
             unexplained = np.square(self.left(_laws(self.law, sized, better), treatment)).mean(axis=1).tolist()
             sized = [
                 replace(item, size=size, left=square) if square < item.left else item

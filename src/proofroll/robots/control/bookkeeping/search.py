@@ -236,12 +236,12 @@ class MotionSearch:
         mistake, size = item.mistake, item.size
 
         def sized(sizes: Array) -> ControlLaw:
-            return mistake.changed(self.law, max(0.0, float(sizes[0])))
+            return mistake.changed(self.law, max(mistake.least, float(sizes[0])))
 
         for scheme in motions.schemes_of(item.treatment):
             distance = motions.distance(mistake.changed(self.law, size), scheme, near * self.before)
             if math.isfinite(distance) and mistake.sized:
-                size = max(0.0, float(motions.fit(sized, np.array([size]), scheme, rounds=3)[0]))
+                size = max(mistake.least, float(motions.fit(sized, np.array([size]), scheme, rounds=3)[0]))
                 distance = motions.distance(mistake.changed(self.law, size), scheme)
             if distance <= _CLOSES * self.before:
                 bound = max(2 * distance, self.seen.bar)

@@ -1,0 +1,73 @@
+"""Robots that importers make of a file, by the causes of :mod:`proofroll.robots.check.hypotheses`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from proofroll.core.errors import InputError, Refused
+from proofroll.robots.check.hypotheses import RobotEvidence, RobotHypothesis, hypotheses
+from proofroll.robots.control.bookkeeping.air import HeldRobot
+from proofroll.robots.files.robot_file import RobotFile
+from proofroll.robots.model import Robot
+from proofroll.robots.protocol import Reading
+
+_NOTHING = Reading(
+    joints=(),
+    dofs=(),
+    mass={},
+    com={},
+    inertia={},
+    position={},
+    rotation={},
+    M=np.empty(0),
+    g=np.empty(0),
+    h=np.empty(0),
+)
+_MOST = 2  # causes that act together
+
+
+def imported_robots(file: RobotFile, robot: Robot, held: Callable[[Robot], HeldRobot]) -> Iterator[HeldRobot]:
+    """Robots by one cause, then by two.
+
+    Args:
+        file: of the robot.
+        robot: that the file describes.
+        held: robot as a program holds it.
+    """
+    begun: list[tuple[tuple[RobotHypothesis, ...], Robot]] = [((), robot)]
+    for _ in range(_MOST):
+        begun = [
+            ((*causes, cause), changed)
+            for causes, earlier in begun
+            for cause in hypotheses()
+            if cause.id not in {item.id for item in causes}
+            and (changed := _changed(file, earlier, cause)) is not None
+            and (not causes or cause.id > causes[-1].id)
+        ]
+        for causes, changed in begun:
+            with suppress(InputError, Refused):
+                ids, words = tuple(item.id for item in causes), "; ".join(_told(item) for item in causes)
+                yield replace(held(changed), causes=ids, words=words)
+
+
+def _told(cause: RobotHypothesis) -> str:
+    engines = ", ".join(" ".join(part for part in item if part) for item in cause.known.items())
+    return f"{cause.grounds}, as by {engines}: {cause.remedy}"
+
+
+def _changed(file: RobotFile, robot: Robot, cause: RobotHypothesis) -> Robot | None:
+    """Robot with a cause that needs the file alone; None: it needs more, changes nothing, or changes the joints."""
+    evidence = RobotEvidence(file=file, robot=robot, reading=_NOTHING)
+    changed = next(iter(cause.test(evidence)), None)
+    if not isinstance(changed, Robot) or changed is robot:
+        return None
+    return changed if _freedoms(changed) == _freedoms(robot) else None
+
+
+def _freedoms(robot: Robot) -> list[tuple[str, str]]:
+    """Joints that a record of a robot has columns of, with their kinds."""
+    return [(joint.name, joint.kind) for joint in robot.moving]
