@@ -13,7 +13,6 @@ from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.switched_truth import truth_of
-from proofroll_drill.published import true_values
 
 TIGHT = 1e-12  # of what two routes at 1e-14 leave, with room
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
@@ -34,34 +33,6 @@ def slider(actuator: Actuator | None = None, mass: float = 1.0, **more: object) 
     )
 
 
-def test_a_servo_moves_as_a_damped_oscillator() -> None:
-    """Its place, speed and effort at half a second are those of two complex roots."""
-    (true,) = true_values("servo")
-    found = motion("servo", [0.0, true["at"]])
-    x, v = true["values"].values()
-    assert found.record.q[1, 0] == pytest.approx(x, abs=TIGHT)
-    assert found.record.v[1, 0] == pytest.approx(v, abs=TIGHT)
-    assert found.record.named[:, 0] == pytest.approx([100.0, 100 * (1 - x) - 4 * v], abs=100 * TIGHT)
-    assert max(bars[-1] for bars in found.bars.values()) < 1e-9
-    assert found.events == ()
-
-
-@pytest.mark.drill
-def test_a_limit_clamps_the_whole_effort() -> None:
-    """The effort leaves and reaches its limit at the roots of the piecewise closed form."""
-    (true,) = true_values("saturated_servo")
-    found = motion("saturated_servo", [0.0, 0.1, 0.5, true["at"]])
-    assert [event.kind for event in found.events] == ["release", "saturate", "release", "saturate"]
-    for event, time in zip(found.events, true["events"], strict=True):
-        assert event.time == pytest.approx(time, abs=TIGHT)
-        assert event.name == "servo"
-    place, speed = true["values"].values()
-    assert found.record.q[-1, 0] == pytest.approx(place, abs=TIGHT)
-    assert found.record.v[-1, 0] == pytest.approx(speed, abs=TIGHT)
-    assert found.record.named[:, 0] == pytest.approx([20.0, 20.0, -20.0, 20.0], abs=1e-10)
-    assert found.bars["q"][-1] < TIGHT
-
-
 @pytest.mark.drill
 def test_a_limit_that_is_never_reached_changes_nothing() -> None:
     """A servo whose limit is larger than all its efforts has the truth of one without a limit."""
@@ -78,27 +49,6 @@ def test_one_effort_at_its_limit_all_the_time_is_clamped_beside_another_that_nev
     found = truth_of(Mechanism(bodies, joints, actuators=actuators, gravity=(0, 0, 0)), np.array([0.0, 1.0]))
     assert found.record.q[1] == pytest.approx([1.0, 0.5], abs=TIGHT)
     assert found.events == ()
-
-
-def test_a_gear_carries_the_force_of_the_second_wheel() -> None:
-    """Both wheels turn as their reflected inertia says, and the gear pushes the second one with -1 N m."""
-    found = motion("gear_pair", [0.0, 0.5, 1.0])
-    t = np.array([0.0, 0.5, 1.0])
-    assert found.record.q[:, 0] == pytest.approx(2.5 * t**2, abs=TIGHT)
-    assert found.record.q[:, 1] == pytest.approx(-1.25 * t**2, abs=TIGHT)
-    assert found.record.named[:, 0] == pytest.approx([-1.0] * 3, abs=TIGHT)
-    assert found.record.wrench[:, :, 5] == pytest.approx(np.array([[0.5, -1.0]] * 3), abs=TIGHT)
-
-
-@pytest.mark.drill
-def test_an_arm_under_servos_is_that_of_its_own_equations() -> None:
-    """Both angles are those of Lagrange's equations, integrated beforehand to thirteen digits."""
-    true = true_values("arm_pd")
-    found = motion("arm_pd", [0.0, *(each["at"] for each in true)], armature=0.0)
-    angles = np.array([list(each["values"].values()) for each in true])
-    assert found.record.q[1:] == pytest.approx(angles, abs=1e-13)
-    assert found.bars["q"][-1] < TIGHT
-    assert abs(motion("arm_pd", [0.0, 0.1]).record.q[1, 0] - angles[0, 0]) > 1e-2, "armature changes it"
 
 
 @pytest.mark.drill
