@@ -66,27 +66,6 @@ def test_the_first_switch_is_where_two_routes_have_it(name: str, kind: str, cont
     assert event.time == pytest.approx(time, abs=1e-7)
 
 
-@pytest.mark.parametrize(
-    "name", ["sled", "eccentric_sphere", "free_turntable", "rattleback", "tilted_disc", "ladder", "flick"]
-)
-def test_a_start_is_certified(name: str) -> None:
-    """Geometry, friction and first accelerations of every shape are the scene's to round-off, also on what moves."""
-    (element,) = load_scene(name).elements
-    assert isinstance(element, MechanismElement)
-    run = PROJECTION.build(load_scene(name), DEFAULT)
-    lines = element.certify(run.built(), run.sample())
-    assert [str(line) for line in lines if not line.holds] == []
-    told = {line.quantity for line in lines if line.difference is not None}
-    assert {
-        "gaps",
-        "responses of contacts",
-        "friction of contacts",
-        "acceleration",
-    } <= told
-    known = ~np.isnan(element.first_press)
-    np.testing.assert_allclose(run.sample().contact_force[known], element.first_press[known], atol=1e-8)
-
-
 @pytest.mark.parametrize("factor", [-1.0, 0.0, 1.01])
 def test_a_wrong_first_force_is_not_certified(factor: float) -> None:
     """A force of contact that is on the other body, left out, or a hundredth too large is told by the certificate."""
