@@ -226,21 +226,6 @@ def test_joints_have_no_contact():
         MUJOCO.build(on_floor(*SLED), MUJOCO.presets["joints"]["matched"])
 
 
-@pytest.mark.parametrize(
-    ("options", "field"),
-    [
-        ({"cone_correction": True, "integrator": "RK4"}, "integrator"),
-        ({"cone_correction": True, "cone": "pyramidal"}, "cone"),
-        ({"curvature": True, "integrator": "implicitfast"}, "integrator"),
-        ({"curvature": True, "cone": "pyramidal"}, "cone"),
-    ],
-)
-def test_settings_without_effect_are_told(options, field):
-    """Options that geoms does not have, or that the correction cannot use, are one line."""
-    with pytest.raises(InputError, match=f"mujoco: {field}"):
-        MUJOCO.build(on_floor(*SLED), preset(**options))
-
-
 def test_a_model_file_holds_geoms_but_no_correction():
     """MJCF has geoms and pairs; the correction of the cone, made in every step, is refused."""
     xml = MUJOCO.model_file(on_floor(*SLED), preset())

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.sampling import mechanism_of
@@ -77,15 +77,6 @@ def test_loops_beside_contacts_are_refused() -> None:
     joints = (Joint("j", "revolute", "world", "a"), Joint("k", "free", "world", "b", q0=(0, 0, 0.1, 1, 0, 0, 0)))
     mechanism = Mechanism(bodies, joints, geometries=(floor, ball), pairs=(Pair("p", ("ball", "floor"), 0.3),))
     PINOCCHIO.build(mechanism, PRESETS["matched"])  # a tree with contacts is one
-
-
-@pytest.mark.parametrize(
-    "options", [{"solver": None}, {"integrator": "rk4"}, {"projection": True}, {"formulation": "null_space"}]
-)
-def test_settings_that_do_nothing_here_are_refused(options: dict[str, Any]) -> None:
-    """Options of other formulations are one line."""
-    with pytest.raises(InputError, match="pinocchio"):
-        replace(PRESETS["matched"], **options)
 
 
 def _on_a_guide(**law: Any) -> Mechanism:
