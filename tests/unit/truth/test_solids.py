@@ -11,11 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-import proofroll
-from proofroll.core.errors import Refused
-from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.rotations import to_rpy
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.error_bars import TwoRouteMotion
@@ -388,32 +384,3 @@ def test_solids_that_tumble_collide_without_overlap(other: str, seed: int, swapp
     speeds = found.record.v_WB[:, 0] + np.cross(found.record.w_WB[:, 0], arm)
     momentum = speeds + 2.0 * found.record.v_WB[:, 1]
     assert np.abs(momentum - momentum[0]).max() < 1e-12
-
-
-RIMS = {"box": on_box((-0.02, 0, HALF), (FAST, 0, 0)), "rod": rod_on_box((-0.02, 0, HALF), (FAST, 0, 0))}
-
-
-@pytest.mark.drill
-@pytest.mark.parametrize("body", RIMS)
-@pytest.mark.parametrize(
-    "engine", ["mujoco[formulation=geoms,preset=tuned,dt=2e-4]", "pinocchio[formulation=impulses,dt=2e-4]"]
-)
-def test_engines_agree_on_a_slide_over_a_rim(engine: str, body: str) -> None:
-    """MuJoCo's own search for contacts, and Pinocchio's impulses at ours, tip each body as the truth does."""
-    scene = Scene(body, "", (MechanismElement(RIMS[body]),))
-    found = proofroll.judge(proofroll.simulate(scene, engine, until=0.08, every=0.04), scene)
-    assert found.agrees, str(found)
-
-
-@pytest.mark.parametrize(
-    ("engine", "why"),
-    [
-        ("projection[formulation=dependent]", "begin and end at borders of faces"),
-        ("exudyn[formulation=spheres]", "neither sphere nor wall"),
-    ],
-)
-def test_who_has_no_boxes_says_so(engine: str, why: str) -> None:
-    """Refused, with the reason."""
-    scene = Scene("rest", "", (MechanismElement(on_box((-0.5, 0, HALF))),))
-    with pytest.raises(Refused, match=why):
-        proofroll.simulate(scene, engine, until=0.01)
