@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
-from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.files.scene_file import read_scene_file
 from proofroll.truth.switched_truth import truth_of
 
 # m, s, N and the like: what two routes may leave of a scene; 1e-11 is seen.
@@ -37,7 +38,7 @@ def held_out(name: str, seed: int) -> dict[str, float]:
 @pytest.mark.timeout(900)  # 30 s of processor time, on a machine that may have much else to do
 def test_a_rattleback_reverses_its_spin() -> None:
     """Two routes of a stone that rolls agree until its spin has turned round, and it keeps its energy."""
-    mechanism = load_scene("rattleback").elements[0].mechanism  # type: ignore[attr-defined]
+    mechanism = mechanism_named("rattleback")
     found = truth_of(mechanism, np.array([0.0, 0.69, 0.71]))
     assert np.isinf(found.horizon)
     assert max(float(bar[-1]) for bar in found.bars.values()) < KNOWN
@@ -52,7 +53,7 @@ def test_a_rattleback_reverses_its_spin() -> None:
 @pytest.mark.parametrize(("name", "seed"), [(name, place % 3) for place, name in enumerate(ENDS)])
 def test_two_routes_agree_over_held_out_parameters(name: str, seed: int) -> None:
     """Another mass, friction, speed and size each: both routes see the same events, and differ by round-off alone."""
-    mechanism = load_scene(name, **held_out(name, seed)).elements[0].mechanism  # type: ignore[attr-defined]
+    mechanism = mechanism_named(name, **held_out(name, seed))
     end, events = ENDS[name]
     found = truth_of(mechanism, np.array([0.0, end / 2, end]))
     assert np.isinf(found.horizon)
@@ -84,7 +85,7 @@ def bounced(height: float, radius: float, mu: float, e: float, g: float, until: 
 def test_a_thrown_ball_lies_where_formulas_say(seed: int) -> None:
     """Over held-out parameters a ball that bounces is, within its own bars, where flights and impacts put it."""
     numbers = held_out("spinning_bounce", seed) | {"restitution": 0.55 + 0.1 * seed}
-    mechanism = load_scene("spinning_bounce", **numbers).elements[0].mechanism  # type: ignore[attr-defined]
+    mechanism = mechanism_named("spinning_bounce", **numbers)
     found = truth_of(mechanism, np.array([0.0, 0.8]))
     keys = ("height", "radius", "friction", "restitution", "gravity")
     for field, exact in zip(("p_WB", "v_WB", "w_WB"), bounced(*(numbers[key] for key in keys), 0.8), strict=True):

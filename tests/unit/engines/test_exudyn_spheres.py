@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
@@ -76,7 +77,7 @@ def test_shapes_and_impacts_that_exudyn_lacks_are_refused(geometry, pair, said):
 
 def test_what_sinks_in_beyond_its_wall_is_refused():
     """A ball that its load at the start presses through the opposite side of its wall is refused, with the depth."""
-    heavy = load_scene("sphere_in_cylinder", mass=6e3, mu_static=0.35).elements[0].mechanism
+    heavy = mechanism_named("sphere_in_cylinder", mass=6e3, mu_static=0.35)
     with pytest.raises(Refused, match=r"ball_on_wall starts 0\.48 m deep in a contact of 1e\+06 N/m, beyond its wall"):
         EXUDYN.build(heavy, MATCHED)
 

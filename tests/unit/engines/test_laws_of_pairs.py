@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 import proofroll
 from proofroll.core.errors import InputError
@@ -95,7 +96,7 @@ def test_laws_of_a_pair_are_read(law: str, said: str, tmp_path: Path) -> None:
     """A table of two coefficients is read; each impossible law names its field, its value and what to do."""
     (tmp_path / "scene.toml").write_text(FILE + law)
     if not said:
-        (pair,) = load_scene(str(tmp_path)).elements[0].mechanism.pairs  # type: ignore[attr-defined]
+        (pair,) = mechanism_named(str(tmp_path)).pairs
         assert (pair.static, pair.friction) == (0.5, 0.3)
         return
     with pytest.raises(InputError) as error:

@@ -156,7 +156,7 @@ def test_an_effort_meets_its_limit_when_it_should(options, tolerance):
     assert [event.kind for event in run.events()] == ["release", "saturate"] * 2
     # Of rk4 it is the error of its step, 1.9e-8 s with every kind of arithmetic that was tried.
     np.testing.assert_allclose([event.time for event in run.events()], true["events"], atol=tolerance)
-    place, speed = true["values"].values()
+    place, speed, _ = true["values"].values()
     assert run.sample().p_WB[0, 0] == pytest.approx(place, abs=tolerance)
     assert run.sample().v_WB[0, 0] == pytest.approx(speed, abs=20 * tolerance)
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 from scipy.integrate import quad
 
 from proofroll.core.errors import NotUnique, Refused
@@ -45,14 +46,9 @@ TIGHT = 1e-10  # s: of events, where 1e-12 is seen
 BARS = 1e-9  # of what two routes leave in SI units: 6e-11 is seen, of a rod of 10 µm that falls by 1000 rad/s
 
 
-def mechanism_of(scene: str, **parameters: float) -> Mechanism:
-    """The mechanism of a scene."""
-    return load_scene(scene, **parameters).elements[0].mechanism  # type: ignore[attr-defined, no-any-return]
-
-
 def motion(scene: str, times: list[float], **parameters: float) -> TwoRouteMotion:
     """The truth of a scene of one mechanism at these times, with narrow bars."""
-    found = truth_of(mechanism_of(scene, **parameters), np.array(times))
+    found = truth_of(mechanism_named(scene, **parameters), np.array(times))
     assert np.isinf(found.horizon)
     assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
     return found
@@ -181,7 +177,7 @@ def test_the_error_of_rebounds_cut_short_is_within_the_bars(friction: float, mon
 
 def test_friction_that_tears_is_refused() -> None:
     """A rod that slides with friction beyond 4/3 and leans the wrong way has no unique motion (Painlevé)."""
-    rod = mechanism_of("falling_rod", friction=2.0)
+    rod = mechanism_named("falling_rod", friction=2.0)
     leans = -0.55
     joint = replace(rod.joints[0], q0=(0.5 * np.sin(leans), -(0.02 + 0.5 * np.cos(leans)), leans), v0=(1.0, 0.0, 0.0))
     with pytest.raises(Refused, match="Painlevé"):
@@ -192,7 +188,7 @@ def test_friction_that_tears_is_refused() -> None:
 @pytest.mark.parametrize("tilt", [0.0, 1e-11])
 def test_a_plank_that_falls_flat_is_refused(tilt: float) -> None:
     """Two corners that an impact presses at once, as far as is known, share it by their order, which nobody knows."""
-    block = mechanism_of("rocking_block", friction=0.2)
+    block = mechanism_named("rocking_block", friction=0.2)
     flat = replace(block.joints[0], q0=(0.0, -0.3, tilt), v0=(0.0, 0.0, 0.0))
     found = truth_of(replace(block, joints=(flat,)), np.array([0.0, 0.1, 0.3]))
     assert "presses left and right at once" in found.ended
@@ -202,7 +198,7 @@ def test_a_plank_that_falls_flat_is_refused(tilt: float) -> None:
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_corners_hit_at_once_are_refused_where_only_one_of_them_is_pressed(friction: float) -> None:
     """A turning block lands flat: one impact of both presses the faster corner alone, but either may come first."""
-    block = mechanism_of("rocking_block", friction=friction)
+    block = mechanism_named("rocking_block", friction=friction)
     falls, spin = float(np.sqrt(2 * 0.05 / 9.81)), 4.95
     lands = replace(block.joints[0], q0=(0.0, -0.3, -spin * falls), v0=(0.0, 0.0, spin))
     found = truth_of(replace(block, joints=(lands,)), np.array([0.0, 0.1, 0.15]))
@@ -213,7 +209,7 @@ def test_corners_hit_at_once_are_refused_where_only_one_of_them_is_pressed(frict
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_disc_that_lands_flat_is_refused(restitution: float) -> None:
     """Its whole edge lands at once: one contact at its centre would stop the routes, or leave it a spin for ever."""
-    disc = mechanism_of("tilted_disc")
+    disc = mechanism_named("tilted_disc")
     flat = replace(disc.joints[0], q0=(0, 0, 0.05, 1, 0, 0, 0), v0=(1, 0, 0, 0, 0, 5))
     pairs = tuple(replace(pair, restitution=restitution) for pair in disc.pairs)
     found = truth_of(replace(disc, joints=(flat,), pairs=pairs), np.array([0.0, 0.1, 0.2]))
@@ -224,7 +220,7 @@ def test_a_disc_that_lands_flat_is_refused(restitution: float) -> None:
 @pytest.mark.parametrize("friction", [0.0, 2.0])
 def test_a_disc_that_tips_until_it_lies_flat_is_refused_with_the_time(friction: float) -> None:
     """A disc let go on its edge falls on its face, on a smooth floor and on one that holds it; it is told when."""
-    disc, tilt, radius = mechanism_of("tilted_disc", friction=friction), 0.1, 0.25
+    disc, tilt, radius = mechanism_named("tilted_disc", friction=friction), 0.1, 0.25
     start = (0.0, 0.0, radius * np.sin(tilt), np.cos(tilt / 2), np.sin(tilt / 2), 0.0, 0.0)
     tips = replace(disc.joints[0], q0=tuple(map(float, start)), v0=(0.0,) * 6)
 
@@ -242,7 +238,7 @@ def test_a_disc_that_tips_until_it_lies_flat_is_refused_with_the_time(friction: 
 
 def test_a_smooth_plank_that_falls_flat_rests() -> None:
     """Either end hit first presses the other more and more: without friction and rebound it lies still."""
-    plank = mechanism_of("rocking_block", friction=0.0, moment=0.005)
+    plank = mechanism_named("rocking_block", friction=0.0, moment=0.005)
     flat = replace(plank.joints[0], q0=(0.0, -0.3, 0.0), v0=(0.0, 0.0, 0.0))
     found = truth_of(replace(plank, joints=(flat,)), np.array([0.0, 0.2]))
     assert np.isinf(found.horizon)
@@ -395,7 +391,7 @@ def test_engines_with_laws_of_joints_beside_contacts_are_certified(laws: dict[st
 @pytest.mark.drill
 def test_a_finger_that_meets_its_stop_lets_the_ball_go() -> None:
     """A finger with a stop flicks a ball, both routes alike: friction slows it, the stop throws it back."""
-    flick = mechanism_of("flick")
+    flick = mechanism_named("flick")
     for joint, event in (
         (replace(flick.joints[0], limits=(-1.0, 0.15), restitution=0.3), ("impact", "knuckle")),
         (replace(flick.joints[0], friction=0.05), ("slip", "push")),
@@ -416,7 +412,7 @@ def test_a_table_and_the_ball_on_it_keep_their_moment_of_momentum() -> None:
     moment = 0.02 * spin + 0.3 * (p[:, 0] * v[:, 1] - p[:, 1] * v[:, 0])
     assert moment == pytest.approx(0.125, abs=DIGITS)
     assert abs(spin[1] - spin[0]) > 0.01
-    energy = found.record.placed(mechanism_of("free_turntable")).energy()
+    energy = found.record.placed(mechanism_named("free_turntable")).energy()
     assert energy == pytest.approx(energy[0], abs=DIGITS)
 
 
@@ -424,7 +420,7 @@ def test_a_disc_rolls_on_its_edge_without_loss() -> None:
     """Rolling keeps the energy of a tilted disc, whose edge touches at every time."""
     found = motion("tilted_disc", [0.0, 0.2])
     assert happened(found) == []
-    energy = found.record.placed(mechanism_of("tilted_disc")).energy()
+    energy = found.record.placed(mechanism_named("tilted_disc")).energy()
     assert energy == pytest.approx(energy[0], abs=DIGITS)
     assert found.pressed is not None
     assert (found.pressed[:, 0, 2] > 0).all()
@@ -536,7 +532,7 @@ def test_a_row_of_balls_is_ill_posed_and_keeps_momentum_and_energy() -> None:
 def test_a_rod_that_leans_against_its_slip_has_no_truth() -> None:
     """Where a normal force would tear, the scene is refused with the reason, and below that friction it is not."""
     with pytest.raises(NotUnique, match=r"^contact would not press but tear from t = 0 s on: .* \(Painlevé\)$"):
-        truth_of(mechanism_of("painleve_rod"), np.array([0.0, 0.01]))
+        truth_of(mechanism_named("painleve_rod"), np.array([0.0, 0.01]))
     motion("painleve_rod", [0.0, 0.01], friction=0.5)
 
 
@@ -622,7 +618,7 @@ def test_residuals_of_the_truth_are_within_their_bars() -> None:
 def test_a_ball_that_just_rolls_is_ill_posed(part: int) -> None:
     """Friction of 2/7 of the slope, to round-off: whether the contact sticks hangs on nothing, on both sides alike."""
     friction = 2 / 7 * np.tan(0.3) * (1 + part * np.finfo(float).eps)
-    ball = mechanism_of("inclined_plane", tilt=0.3, speed=0.0, mu_static=float(friction))
+    ball = mechanism_named("inclined_plane", tilt=0.3, speed=0.0, mu_static=float(friction))
     found = truth_of(ball, np.array([0.0, 0.1]))
     assert (found.horizon, tuple(found.events)) == (0.0, ())
 
@@ -738,7 +734,7 @@ def test_a_finger_pushes_a_ball_and_lets_go() -> None:
 )
 def test_a_flicked_ball_has_narrow_bars_at_other_numbers(finger: float, swing: float, mass: float) -> None:
     """Both routes agree to 1e-9 over the whole motion, with an effort that leaves its limits and comes back."""
-    flicked = mechanism_of("flick", finger_friction=finger, swing=swing, mass=mass)
+    flicked = mechanism_named("flick", finger_friction=finger, swing=swing, mass=mass)
     found = truth_of(flicked, np.linspace(0.0, 0.4, 5))
     assert np.isinf(found.horizon)
     assert {("lift_off", "push"), ("stick", "ground")} <= set(happened(found))
@@ -785,7 +781,7 @@ def test_a_box_that_lands_flat_has_a_truth_to_its_rest(slip: float) -> None:
 @pytest.mark.parametrize("impacts", ["any order", "together"])
 def test_two_feet_that_land_at_once_have_an_outcome_where_no_order_decides(impacts: str) -> None:
     """A plank whose ends are two contacts falls flat: where its order decides the truth ends, unless it has none."""
-    block = mechanism_of("rocking_block", friction=0.2)
+    block = mechanism_named("rocking_block", friction=0.2)
     flat = replace(block.joints[0], q0=(0.0, -0.3, 0.0), v0=(0.0, 0.0, 0.0))
     found = truth_of(replace(block, joints=(flat,), impacts=impacts), np.array([0.0, 0.1, 0.3]))
     assert ("its outcome depends on their order" in found.ended) == (impacts == "any order")

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from mechanism_scenes import true_motion
 from scipy.integrate import solve_ivp
 
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
@@ -16,11 +17,6 @@ from proofroll.truth.switched_truth import truth_of
 
 TIGHT = 1e-12  # of what two routes at 1e-14 leave, with room
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
-
-
-def motion(scene: str, times: list[float], **parameters: float):
-    """The truth of a scene of one mechanism at these times."""
-    return truth_of(load_scene(scene, **parameters).elements[0].mechanism, np.array(times))  # type: ignore[attr-defined]
 
 
 def slider(actuator: Actuator | None = None, mass: float = 1.0, **more: object) -> Mechanism:
@@ -36,7 +32,7 @@ def slider(actuator: Actuator | None = None, mass: float = 1.0, **more: object) 
 @pytest.mark.drill
 def test_a_limit_that_is_never_reached_changes_nothing() -> None:
     """A servo whose limit is larger than all its efforts has the truth of one without a limit."""
-    one, two = motion("servo", [0.0, 0.5, 1.0]), motion("saturated_servo", [0.0, 0.5, 1.0], limit=150.0)
+    one, two = true_motion("servo", [0.0, 0.5, 1.0]), true_motion("saturated_servo", [0.0, 0.5, 1.0], limit=150.0)
     assert two.events == ()
     assert np.abs(one.record.q - two.record.q).max() <= one.bars["q"][-1] + two.bars["q"][-1]
 
@@ -69,24 +65,24 @@ def test_a_true_rotor_turns_with_the_rod_that_carries_it() -> None:
     assert acceleration == pytest.approx([*expected, n * expected[1]], rel=1e-12)
     armature = np.linalg.solve(M + np.diag([0, inertia * n**2]), weight + effort)
     assert np.abs(armature / expected - 1).max() > 1e-3
-    truth = motion("arm_rotor", [0.0, 0.3, 1.0], elbow=b)
+    truth = true_motion("arm_rotor", [0.0, 0.3, 1.0], elbow=b)
     assert truth.bars["q"][-1] < 1e-10
 
 
 def test_a_stiff_damper_lets_the_mass_go_its_time_constant() -> None:
     """A mass in a damper goes (F/c) t + (v0 - F/c) (m/c) (1 - exp(-c t/m)), and then as fast as its force."""
     t = np.array([0.0, 0.001, 0.2])
-    found = motion("stiff_damper", t.tolist())
+    found = true_motion("stiff_damper", t.tolist())
     assert found.record.q[:, 0] == pytest.approx(0.01 * t + 0.99e-3 * (1 - np.exp(-1000 * t)), abs=1e-15)
     assert found.bars["q"][-1] < TIGHT
 
 
 def test_friction_that_holds_a_weight_is_the_weight() -> None:
     """A mass that its friction can hold does not move, and friction tells the weight; a weaker one lets it fall."""
-    found = motion("friction_hold", [0.0, 0.5, 1.0])
+    found = true_motion("friction_hold", [0.0, 0.5, 1.0])
     assert np.abs(found.record.q).max() == np.abs(found.record.v).max() == 0.0
     assert found.record.named[:, 0] == pytest.approx([9.81] * 3, rel=1e-12)
-    falls = motion("friction_hold", [0.0, 1.0], friction=4.81)
+    falls = true_motion("friction_hold", [0.0, 1.0], friction=4.81)
     assert falls.record.q[1, 0] == pytest.approx(-2.5, abs=TIGHT)
     assert falls.record.named[:, 0] == pytest.approx([4.81] * 2)
 
