@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from feet_on_rails import foot_on_rail
 from mechanism_scenes import mechanism_named
 from scipy.integrate import quad
 
@@ -27,7 +28,6 @@ from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.run.dataset import UNDETERMINED
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.scene.composed import Cable
-from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
@@ -272,12 +272,12 @@ def test_early_events_lie_within_their_brackets() -> None:
 def test_stops_with_friction_beside_contact_are_followed_to_the_stop() -> None:
     """A joint with both stays on its stop, where the shares of what holds it are not determinate."""
     times = np.array([0.0, 0.05, 0.1, 0.2])
-    free, far = (truth_of(dragged(friction=1.0, limits=(-1.0, at)), times) for at in (9.0, 0.1))
+    free, far = (truth_of(foot_on_rail(friction=1.0, limits=(-1.0, at)), times) for at in (9.0, 0.1))
     assert np.isinf(free.horizon)
     assert np.isinf(free.end)
-    plain = truth_of(dragged(friction=1.0), times)
+    plain = truth_of(foot_on_rail(friction=1.0), times)
     assert free.record.q == pytest.approx(plain.record.q, abs=1e-12)
-    assert [item.name for item in named_forces(dragged(friction=1.0, limits=(-1.0, 9.0)))] == [
+    assert [item.name for item in named_forces(foot_on_rail(friction=1.0, limits=(-1.0, 9.0)))] == [
         "friction.rail", "stop.rail"
     ]  # fmt: skip
     assert free.record.named[:, 0] == pytest.approx(plain.record.named[:, 0], abs=1e-12)
@@ -291,7 +291,7 @@ def test_stops_with_friction_beside_contact_are_followed_to_the_stop() -> None:
 def test_a_joint_that_rubs_bounces_off_its_stop_beside_contacts() -> None:
     """An impact with restitution leaves the stop, so that nothing is shared there."""
     times = np.array([0.0, 0.05, 0.1, 0.2])
-    bounces = truth_of(dragged(friction=1.0, limits=(-1.0, 0.1), restitution=0.5), times)
+    bounces = truth_of(foot_on_rail(friction=1.0, limits=(-1.0, 0.1), restitution=0.5), times)
     assert ("impact", "rail") in happened(bounces)
     assert np.isinf(bounces.end)
 
@@ -322,53 +322,14 @@ def test_a_joint_that_rubs_rests_on_its_stop_and_leaves_it_beside_contacts_as_wi
         assert b.time_low <= a.time_high
 
 
-def test_friction_of_a_joint_and_of_a_contact_stop_a_foot() -> None:
-    """A rail and a floor that rub together stop what moves after v/a, and then hold it."""
-    found = truth_of(dragged(friction=2.0), np.array([0.0, 0.1, 0.5]))
-    slowed = (2.0 + 0.2 * 1.5 * 9.81) / 2.0
-    assert happened(found) == [("rest", "sole"), ("stick", "rail")]
-    times_of(found, 1 / slowed, 1 / slowed)
-    assert found.record.q[1:, 0] == pytest.approx([0.1 - slowed * 0.1**2 / 2, 1 / slowed / 2], abs=1e-13)
-    assert found.record.named[:2, 0] == pytest.approx([-2.0, -2.0], abs=1e-13)
-    assert np.isnan(found.record.named[2, 0])  # what rail and floor hold together is anybody's
-    assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
-    assert np.isinf(found.horizon)
-
-
-@pytest.mark.drill
-def test_a_foot_that_slides_rebounds_from_a_stop() -> None:
-    """A stop returns half of the speed, and friction at the foot turns with it."""
-    found = truth_of(dragged(limits=(-1.0, 0.1), restitution=0.5), np.array([0.0, 0.05, 0.3]))
-    slowed = 0.2 * 1.5 * 9.81 / 2.0
-    hit = (1 - np.sqrt(1 - 2 * slowed * 0.1)) / slowed
-    back = 0.5 * (1 - slowed * hit)
-    assert happened(found) == [("impact", "rail"), ("turn", "sole")]
-    times_of(found, hit, hit)
-    left = 0.3 - hit
-    assert found.record.q[2, 0] == pytest.approx(0.1 - back * left + slowed * left**2 / 2, abs=1e-13)
-    assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
-    assert np.isinf(found.horizon)
-
-
 @pytest.mark.parametrize(
     ("laws", "kinds"), [({"sole": 0.0, "pull": 3.0}, ["impact"]), ({"restitution": 0.5}, ["impact", "turn"])]
 )
 def test_a_stop_that_is_approached_at_first_is_hit_at_once(laws: dict[str, float], kinds: list[str]) -> None:
     """A joint that starts at its stop and moves into it has an impact at time 0, as it has without contacts."""
-    found = truth_of(dragged(limits=(-1.0, 0.0), **laws), np.array([0.0, 0.3]))
+    found = truth_of(foot_on_rail(limits=(-1.0, 0.0), **laws), np.array([0.0, 0.3]))
     assert [kind for kind, _ in happened(found)] == kinds
     times_of(found, *[0.0] * len(kinds))
-    assert np.isinf(found.horizon)
-
-
-def test_a_smooth_foot_is_pressed_against_a_stop() -> None:
-    """A stop that returns nothing bears what pulls the foot on."""
-    found = truth_of(dragged(limits=(-1.0, 0.1), sole=0.0, pull=3.0), np.array([0.0, 0.3]))
-    hit = (np.sqrt(1 + 2 * 3.0 * 0.1) - 1) / 3.0
-    assert happened(found) == [("impact", "rail")]
-    times_of(found, hit)
-    assert found.record.q[1, 0] == pytest.approx(0.1, abs=1e-14)
-    assert found.record.named[1, 0] == pytest.approx(-2.0 * 3.0, abs=1e-12)
     assert np.isinf(found.horizon)
 
 
@@ -683,35 +644,6 @@ def test_an_impact_on_one_edge_of_a_face_opens_the_other() -> None:
     rough = modes_of(closed, closed, (0,) * 8)
     _, stays, _ = bodies._struck(state, rough, [0.0] * 8, [0.0] * 8)
     assert sum(stays) == 2
-
-
-def dragged(*, sole: float = 0.2, pull: float = 0.0, **rail: Any) -> Mechanism:
-    """A cart on a rail, at 1 m/s, with a foot on a floor; laws of the ``rail``, and a pull along it [m/s²]."""
-    inertia = (1.0, 1.0, 1.0)
-    joints = (
-        Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(1.0,), **rail),
-        Joint("shaft", "prismatic", "cart", "foot", axis=(0, 0, 1), q0=(0.1,)),
-    )
-    return Mechanism(
-        bodies=tuple(Body(name, mass, inertia=inertia) for name, mass in (("cart", 0.5), ("foot", 1.5))),
-        joints=joints,
-        geometries=(Geometry("ball", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane")),
-        pairs=(Pair("sole", ("ball", "floor"), friction=sole),),
-        gravity=(pull, 0.0, -9.81),
-    )
-
-
-@pytest.mark.drill
-def test_a_driven_foot_slides_as_newton_says() -> None:
-    """A force that grows in time up to its limit moves a foot against friction by a cubic, then a parabola of time."""
-    push = Actuator("push", "rail", "torque", target=Formula("20*t"), limit=4.0)
-    found = truth_of(replace(dragged(), actuators=(push,)), np.array([0.0, 0.1, 0.22]))
-    slowed = 0.2 * 1.5 * 9.81 / 2
-    moved = [0.1 - slowed * 0.1**2 / 2 + 20 / 2 * 0.1**3 / 6]
-    moved.append(0.22 - slowed * 0.22**2 / 2 + 20 / 2 * (0.2**3 / 6 + 0.2**2 / 2 * 0.02) + 4.0 / 2 * 0.02**2 / 2)
-    assert found.record.q[1:, 0] == pytest.approx(moved, abs=1e-13)
-    assert found.record.named[:, 0] == pytest.approx([0.0, 2.0, 4.0], abs=1e-14)
-    assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
 
 
 @pytest.mark.drill
