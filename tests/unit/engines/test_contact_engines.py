@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.plugins import load_engine
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.scene_file import load_scene
 
@@ -69,3 +70,38 @@ def test_rows_that_turn_leave_no_contact_open(setting: str) -> None:
     for step in range(101, 900):
         run.advance(step * 1e-3)
         assert run.sample().contact_force[0, 2] > 1.0, step
+
+
+def on_a_guide(setting: str, **law: Any) -> Any:
+    """A run of a mass of 1 kg on a vertical guide with a law of its joint."""
+    engine, formulation, preset = setting.split()
+    plugin, joint = load_engine(engine), Joint("guide", "prismatic", "world", "mass", **law)
+    mechanism = Mechanism((Body("mass", 1.0, inertia=(0.1, 0.1, 0.1)),), (joint,))
+    return plugin.build(mechanism, plugin.presets[formulation][preset])
+
+
+@pytest.mark.parametrize("setting", ["projection dependent matched", "pinocchio impulses matched"])
+def test_a_joint_holds_without_creep_and_tells_its_friction(setting: str) -> None:
+    """15 N hold a weight of 9.81 N, which the joint transmits; 5 N rub with all of it, against the motion."""
+    for size, force, fallen in ((15.0, 9.81, 0.0), (5.0, 5.0, 4.81)):
+        run = on_a_guide(setting, friction=size)
+        run.advance(0.2)
+        sample = run.sample()
+        assert sample.friction[0] == pytest.approx(force, abs=1e-6)
+        assert sample.v_WB[0, 2] == pytest.approx(-fallen * 0.2, abs=1e-9)
+        assert sample.joint_force is None or sample.joint_force[0, 2] == pytest.approx(force, abs=1e-6)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("setting", "place", "load"),
+    [("projection dependent matched", 1e-10, 1e-9), ("pinocchio impulses matched", 5e-3, 1e-2)],
+)
+def test_a_mass_falls_on_a_stop(setting: str, place: float, load: float, restitution: float) -> None:
+    """It rests there with its weight on it, or rebounds to the square of the restitution; without being thrown."""
+    run, fall = on_a_guide(setting, q0=(1.0,), limits=(0.0, 2.0), restitution=restitution), np.sqrt(2 / 9.81)
+    run.advance(fall * (1 + restitution) if place < 1e-6 else round(fall * (1 + restitution), 3))
+    assert run.sample().p_WB[0, 2] == pytest.approx(restitution**2, abs=place)
+    run.advance(2.0)  # rebounds end at 3 falls
+    assert run.sample().p_WB[0, 2] == pytest.approx(0.0, abs=place / 100 if place > 1e-6 else place)
+    assert run.sample().stop[0] == pytest.approx(9.81, abs=load)

@@ -102,16 +102,6 @@ def test_dry_friction_is_of_first_order(dt: float, error: float) -> None:
     assert alone.sample().p_WB[0, 0] == run.sample().p_WB[0, 0]
 
 
-def test_a_joint_holds_without_creep_and_tells_its_friction() -> None:
-    """15 N hold a weight of 9.81 N; 5 N rub with all of it, against the motion."""
-    held, falls = (PINOCCHIO.build(_on_a_guide(friction=size), PRESETS["matched"]) for size in (15.0, 5.0))
-    for run, force, speed in ((held, 9.81, 0.0), (falls, 5.0, -4.81 * 0.2)):
-        run.advance(0.2)
-        found = run.sample()
-        assert found.friction[0] == pytest.approx(force, abs=1e-6)
-        assert found.v_WB[0, 2] == pytest.approx(speed, abs=1e-9)
-
-
 def test_an_impulse_of_a_stop_is_no_friction() -> None:
     """A mass that rubs and falls on a stop has its friction up to the step in which it hits, and no more."""
     run = PINOCCHIO.build(_on_a_guide(q0=(0.1,), limits=(0.0, 2.0), friction=5.0), PRESETS["matched"])
@@ -122,18 +112,6 @@ def test_an_impulse_of_a_stop_is_no_friction() -> None:
         found.append(run.sample().friction[0])
     np.testing.assert_allclose(found, 5.0, atol=1e-6)
     assert run.sample().stop[0] == 0.0
-
-
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_a_mass_falls_on_a_stop_of_pinocchio(restitution: float) -> None:
-    """It rests there with its weight on it, or rebounds with the restitution; without being thrown."""
-    low = _on_a_guide(q0=(1.0,), limits=(0.0, 2.0), restitution=restitution)
-    run, fall = PINOCCHIO.build(low, PRESETS["matched"]), np.sqrt(2 / 9.81)
-    run.advance(round(fall * (1 + restitution), 3))
-    assert run.sample().p_WB[0, 2] == pytest.approx(restitution**2, abs=5e-3)
-    run.advance(2.0)
-    assert run.sample().p_WB[0, 2] == pytest.approx(0.0, abs=5e-5)
-    assert run.sample().stop[0] == pytest.approx(9.81, rel=1e-3)
 
 
 def test_a_fast_ball_on_a_curved_wall_keeps_its_rolling_resistance():
