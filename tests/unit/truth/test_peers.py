@@ -34,16 +34,11 @@ def test_a_truth_meets_what_peers_published(name: str) -> None:
 
 # The last entry of each scene, or of each of its parameters.
 MOTIONS = {entry["scene"] + str(entry.get("parameters", "")): entry for entry in true_motions()}
-LONG = {"sled", "sled_on_slope", "eccentric_sphere", "arm_pd{'armature': 0.0}"}
-NIGHTLY_MOTIONS = {"tilted_disc", "rattleback", "free_turntable"}
+LONG = {"sled", "sled_on_slope", "eccentric_sphere", "tilted_disc", "rattleback"}
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=MARKS[name in NIGHTLY_MOTIONS]) if name in LONG | NIGHTLY_MOTIONS else name
-        for name in MOTIONS
-    ],
+    "name", [pytest.param(name, marks=pytest.mark.drill) if name in LONG else name for name in MOTIONS]
 )
 def test_a_truth_meets_what_a_laboratory_found(name: str) -> None:
     """Values and events of other equations are the true ones to ten digits, within narrow brackets and bars."""
