@@ -131,10 +131,10 @@ def test_compare(command_line: Proofroll) -> None:
 @pytest.mark.drill
 def test_tradeoff_and_recommend(command_line: Proofroll, springs: Path) -> None:
     """Tradeoff goes by the deciding observable, and recommend answers from it."""
-    code, out, err = command_line("tradeoff", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
+    code, out, err = command_line("tradeoff", str(springs), "--engine", "sprung", "--until", "0.1", "--json")
     assert code == 0, err
     assert json.loads(out)["quantity"] == "x"
-    arguments = ("--until", "0.5", "--tolerance", "1e-3", "--engine", "sprung", "--json")
+    arguments = ("--until", "0.1", "--tolerance", "1e-3", "--engine", "sprung", "--json")
     code, out, err = command_line("recommend", str(springs), *arguments)
     assert code == 0, err
     assert json.loads(out)["choice"]["engine"].startswith("sprung")
@@ -147,7 +147,7 @@ def test_tradeoff_of_two_elements(command_line: Proofroll, springs: Path) -> Non
     two.mkdir()
     mass = '[[masses]]\nname = "n"\nmass = 1.0\nstiffness = 80.0\nx0 = 0.1\n'
     (two / "scene.toml").write_text(SCENE + mass)
-    given = ("--engine", "sprung", "--until", "0.5", "--quantity", "x.m", "--quantity", "x.n", "--all")
+    given = ("--engine", "sprung", "--until", "0.1", "--quantity", "x.m", "--quantity", "x.n", "--all")
     code, out, err = command_line("tradeoff", str(two), *given)
     assert code == 0, err
     assert "x.m [m]" in out

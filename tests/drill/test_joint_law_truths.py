@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 from scipy.integrate import solve_ivp
 
-from proofroll.files.scene_file import load_scene
 from proofroll.truth.switched_truth import truth_of
 from test_contact_truths import KNOWN, held_out
 
@@ -236,7 +236,7 @@ def test_truths_agree_with_an_independent_solver(name: str, seed: int) -> None:
     numbers = held_out(name, seed) | more(seed)
     expected, times = own(numbers), [0.0, 0.37 * until, 0.73 * until, until]
     q, v = (np.array(each) for each in zip(*(expected.shown(y) for y in expected.at(times)), strict=True))
-    found = truth_of(load_scene(name, **numbers).elements[0].mechanism, np.array(times))  # type: ignore[attr-defined]
+    found = truth_of(mechanism_named(name, **numbers), np.array(times))
     assert np.isinf(found.horizon)
     assert any("implicit collocation" in route for route in found.routes) == (name in STIFF)
     pull = max(1.0, float(np.abs(found.record.wrench).max()))  # springs of the governor pull with 20 kN

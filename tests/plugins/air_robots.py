@@ -13,8 +13,6 @@ from proofroll.elements.mechanism.run.reader import made_mechanism
 from proofroll.elements.mechanism.scene.policy import Observation, PolicySource
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 
-LEGS = ("FL_HAA", "FL_HFE", "FL_KFE", "FR_HAA", "FR_HFE", "FR_KFE")
-
 
 def make_policy(joints: Sequence[str]) -> Policy:
     """Makes a small network with fixed random weights."""

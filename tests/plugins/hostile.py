@@ -95,19 +95,6 @@ class Steady(Oracle):
         super().advance(t * (1 + off))
 
 
-class Garbage(Oracle):
-    """Prints text that looks like answers to standard output, invalid UTF-8, and warnings to standard error."""
-
-    name = "garbage"
-
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        sys.stdout.write('{"status": "done"}\n\x00 not UTF-8: ')
-        os.write(1, b"\xff\xfe\n" * 10000)
-        os.write(2, b"warning: nothing is well\n")
-        super().advance(t)
-
-
 class Exits(Oracle):
     """Ends its process, as some libraries do on a licence error."""
 
@@ -118,16 +105,6 @@ class Exits(Oracle):
         sys.stderr.write(f"fatal: no licence at {t}\n")
         sys.stderr.flush()
         os._exit(7)
-
-
-class Segfaults(Oracle):
-    """Dies by a signal."""
-
-    name = "segfaults"
-
-    def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
-        """See :class:`proofroll.core.engine.Engine`."""
-        os.kill(os.getpid(), signal.SIGSEGV)
 
 
 class Hangs(Oracle):
@@ -188,16 +165,6 @@ class Raises(Oracle):
         raise RuntimeError(f"matrix is singular\nat t = {t}")
 
 
-class SaysExit(Oracle):
-    """Calls ``sys.exit`` in the middle of a run."""
-
-    name = "says_exit"
-
-    def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
-        """See :class:`proofroll.core.engine.Engine`."""
-        sys.exit("goodbye")
-
-
 class NotANumber(Oracle):
     """Reports a velocity of NaN from 0.1 s on."""
 
@@ -231,47 +198,6 @@ class Refuses(Oracle):
     def build(cls, scene: Scene, settings: Any) -> RunOnBody:  # noqa: ARG003 -- the protocol's signature
         """See :class:`proofroll.core.engine.Engine`."""
         raise Refused("no wheel, no ball")
-
-
-class BlamesMemory(Oracle):
-    """Reports a MemoryError as its own divergence."""
-
-    name = "blames_memory"
-
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        try:
-            raise MemoryError
-        except MemoryError:
-            raise Diverged(f"the step failed at {t:g} s") from None
-
-
-class BlamesFile(Oracle):
-    """Reports an unreadable file as a refusal."""
-
-    name = "blames_file"
-
-    @classmethod
-    def build(cls, scene: Scene, settings: Any) -> RunOnBody:  # noqa: ARG003 -- the protocol's signature
-        """See :class:`proofroll.core.engine.Engine`."""
-        try:
-            raise OSError(24, "Too many open files")
-        except OSError as error:
-            raise Refused("no model") from error
-
-
-class Interrupted(Oracle):
-    """Reports an interrupt (Ctrl-C) as its own divergence."""
-
-    name = "interrupted"
-
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        try:
-            os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(600)
-        except KeyboardInterrupt:
-            raise Diverged(f"the solver stopped at {t:g} s") from None
 
 
 class Commands(Oracle):

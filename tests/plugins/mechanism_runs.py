@@ -5,13 +5,13 @@ import functools
 
 import numpy as np
 from lone_routes import by_joints
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Tree
 from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.rotations import from_quaternion
-from proofroll.files.scene_file import load_scene
 
 # Formulation for mechanisms -> its engine, and the preset for which tests have tight bounds.
 FORMULATIONS = {
@@ -27,7 +27,7 @@ FORMULATIONS = {
 @functools.cache
 def model(name, **parameters):
     """The mechanism of a scene."""
-    return load_scene(name, **parameters).elements[0].mechanism
+    return mechanism_named(name, **parameters)
 
 
 @functools.cache

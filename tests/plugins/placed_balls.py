@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
+
 import numpy as np
 import xarray as xr
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.dataset import columns, unturned
 from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.elements.mechanism.run.sampling import MechanismSample
+from proofroll.files.scene_file import load_scene
 from proofroll_drill.placed_balls import gravity_of, placed, scene_with
 
-__all__ = ["compared", "gravity_of", "of_ball", "placed", "run_of", "sample_of", "scene_with"]
+__all__ = ["compared", "gravity_of", "leaning_cylinder", "of_ball", "placed", "run_of", "sample_of", "scene_with"]
 
 
 def run_of(
@@ -60,6 +65,13 @@ def sample_of(
     p, v, w = (np.reshape(values, (1, 3)) for values in (p_WB, v_WB, w_WB))
     pressed = np.full((1, 3), np.nan) if force is None else np.reshape(force, (1, 3))
     return MechanismSample(p, v, w, None if q_WB is None else np.reshape(q_WB, (1, 4)), contact_force=pressed)
+
+
+def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
+    """The cylinder with its axis, and gravity along it, leaning by ``tilt`` [rad]."""
+    scene = load_scene("sphere_in_cylinder", **parameters)
+    gravity = Gravity(9.81, (-math.sin(tilt), 0.0, -math.cos(tilt)))
+    return scene_with(scene, surface=dataclasses.replace(placed(scene).surface, tilt=tilt), gravity=gravity)
 
 
 def of_ball(run: xr.Dataset) -> xr.Dataset:

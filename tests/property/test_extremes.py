@@ -123,6 +123,7 @@ def test_rolling_in_euler_angles(motion: dict[str, float], size: float) -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=8)
 @given(motion=CYLINDERS, size=SIZES, mu=st.one_of(st.just(0.0), decades(1e-3, 1e3)))
 def test_bounded_friction(motion: dict[str, float], size: float, mu: float) -> None:
@@ -176,6 +177,7 @@ def test_scale(mu: float, motion: dict[str, float], power: int, heavier: int) ->
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=5)
 @given(
     tilt=st.sampled_from([0.0, 0.35, -0.35]),

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 import proofroll
-from proofroll.core.errors import InputError, Refused
+from proofroll.core.errors import InputError
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
@@ -47,15 +48,6 @@ geometries = ["ball", "floor"]
 """
 
 
-def falling(pair: Pair) -> Scene:
-    """A ball that falls on a plane with spin and speed and hits at 0.0452 s."""
-    inertia = 0.4 * 0.5 * 0.1**2
-    shapes = (Geometry("s", "ball", "sphere", radius=0.1), Geometry("floor", "world", "plane"))
-    joint = Joint("j", "free", "world", "ball", q0=(0, 0, 0.11, 1, 0, 0, 0), v0=(0.3, 0.1, 0, 1.0, 5.0, -8.0))
-    body = Body("ball", 0.5, com=(0.01, 0.0, 0.02), inertia=(inertia, inertia, 1.3 * inertia))
-    return Scene("falling", "", (MechanismElement(Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,))),))
-
-
 def climbing(static: float | None) -> Scene:
     """A foot that presses on a slope and slides up it along a rail."""
     joints = (
@@ -67,14 +59,6 @@ def climbing(static: float | None) -> Scene:
     pair = Pair("foot", ("sole", "floor"), 0.4, static_friction=static)
     parts = Mechanism(bodies, joints, geometries=shapes, pairs=(pair,), gravity=(2.5, 0.0, -9.5))
     return Scene("climbing", "", (MechanismElement(parts),))
-
-
-@pytest.mark.parametrize("engine", ["projection[formulation=dependent]", "pinocchio[formulation=impulses,dt=1e-4]"])
-def test_a_slip_rebounds_as_the_truth_says(engine: str) -> None:
-    """A ball with its centre of mass aside leaves an impact with part of its slip reversed."""
-    scene = falling(Pair("contact", ("s", "floor"), 0.8, 0.6, tangential_restitution=0.5))
-    found = proofroll.judge(proofroll.simulate(scene, engine, until=0.06, every=0.01), scene)
-    assert found.agrees, str(found)
 
 
 def test_static_friction_holds_what_kinetic_would_not() -> None:
@@ -90,23 +74,6 @@ def test_static_friction_holds_what_kinetic_would_not() -> None:
         assert found.agrees, str(found)
     assert ends[None] > 0.1
     assert abs(ends[0.7]) < 1e-9
-
-
-@pytest.mark.parametrize(
-    ("engine", "law", "why"),
-    [
-        ("mujoco[formulation=geoms]", {"static_friction": 0.9}, "this formulation gives a contact one coefficient"),
-        ("pinocchio[formulation=impulses]", {"static_friction": 0.9}, "this formulation gives a contact one coeffi"),
-        ("exudyn[formulation=spheres]", {"static_friction": 0.9}, "this formulation gives a contact one coefficient"),
-        ("mujoco[formulation=geoms]", {"tangential_restitution": 0.5}, "sets restitution along the normal alone"),
-        ("exudyn[formulation=spheres]", {"tangential_restitution": 0.5}, "this formulation has no rebounds"),
-        ("mujoco[formulation=geoms]", {"spinning_friction": 1e-3}, "friction = inf is the same in both"),
-    ],
-)
-def test_who_lacks_a_law_says_so(engine: str, law: dict[str, float], why: str) -> None:
-    """Refused, with the reason."""
-    with pytest.raises(Refused, match=why):
-        proofroll.simulate(falling(replace(Pair("contact", ("s", "floor"), 0.8), **law)), engine, until=0.01)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +96,7 @@ def test_laws_of_a_pair_are_read(law: str, said: str, tmp_path: Path) -> None:
     """A table of two coefficients is read; each impossible law names its field, its value and what to do."""
     (tmp_path / "scene.toml").write_text(FILE + law)
     if not said:
-        (pair,) = load_scene(str(tmp_path)).elements[0].mechanism.pairs  # type: ignore[attr-defined]
+        (pair,) = mechanism_named(str(tmp_path)).pairs
         assert (pair.static, pair.friction) == (0.5, 0.3)
         return
     with pytest.raises(InputError) as error:

@@ -187,19 +187,6 @@ def test_a_spring_winds_up_more_than_a_turn(formulation):
     assert error < {"joints": 1e-8, "redundant": 1e-3}.get(formulation, 1e-11)  # RK4 and order 2 at 1e-3 s
 
 
-@pytest.mark.parametrize("formulation", ALL)
-def test_sampling_changes_nothing(formulation):
-    """A run that is sampled and read back on its way ends where one ends that is not."""
-    mechanism = example(formulation)
-    quiet, looked_at = (runs.build(formulation, mechanism) for _ in range(2))
-    for t in (0.01, 0.02):
-        quiet.advance(t)
-        looked_at.sample(), looked_at.built()
-        looked_at.advance(t)
-    np.testing.assert_array_equal(looked_at.sample().p_WB, quiet.sample().p_WB)
-    np.testing.assert_array_equal(looked_at.sample().w_WB, quiet.sample().w_WB)
-
-
 @pytest.mark.parametrize("formulation", ["joints", "redundant", "null_space", "dependent"])
 @pytest.mark.parametrize("name", ["slider_crank", "four_bar", "bricard"])
 def test_mobility_is_that_of_the_geometry(formulation, name):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from proofroll.core.certificate import certify, first_difference
-from proofroll.core.errors import Diverged, InputError, Refused
-from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.loop_points import held_points, is_planar
@@ -126,29 +126,6 @@ def test_a_step_that_is_far_too_long_is_told(engine, formulation):
     run = kind.build(runs.model("heavy_top"), replace(kind.presets[formulation]["default"], dt=0.5))
     with pytest.raises(Diverged):
         run.advance(500.0)
-
-
-@pytest.mark.parametrize(
-    ("engine", "options", "field"),
-    [
-        ("mujoco", {"formulation": "joints", "cone": "pyramidal"}, "cone"),
-        ("mujoco", {"formulation": "joints", "condim": 6}, "condim"),
-        ("exudyn", {"formulation": "tree", "integrator": "generalized_alpha"}, "integrator"),
-        ("exudyn", {"formulation": "redundant", "integrator": "rk44"}, "integrator"),
-        ("exudyn", {"formulation": "redundant", "stiffness": 1e6}, "stiffness"),
-        ("pinocchio", {"formulation": "null_space", "proximal": 1e-8}, "proximal"),
-        ("pinocchio", {"formulation": "null_space", "orientation": True}, "orientation"),
-        ("pinocchio", {"formulation": "null_space", "integrator": "semi_implicit_euler"}, "integrator"),
-        ("pinocchio", {"formulation": "constraint_dynamics", "solver": "pgs"}, "solver"),
-        ("projection", {"formulation": "dependent", "integrator": "taylor"}, "integrator"),
-        ("projection", {"formulation": "dependent", "singularity": "stop"}, "singularity"),
-    ],
-)
-def test_settings_that_would_do_nothing_are_told(engine, options, field):
-    """An option that a formulation does not have is one line, not ignored."""
-    kind = load_engine(engine)
-    with pytest.raises(InputError, match=f"{engine}: {field}"):
-        kind.build(runs.model("pendulum"), resolve_settings(kind, options))
 
 
 def test_what_only_some_models_need_is_refused_in_words():

@@ -15,7 +15,6 @@ from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll_drill.published import true_values
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -199,44 +198,6 @@ def test_a_slip_that_gains_speed_keeps_its_contacts() -> None:
         assert run.sample().contact_force[:, 2].sum() == pytest.approx(2 * G * np.cos(0.5), rel=1e-6)
 
 
-def test_a_contact_that_turns_or_stops_keeps_pressing() -> None:
-    """A rod's foot slips back, reverses and turns, and presses in every step: J̇v lifts no corrected contact."""
-    run = MUJOCO.build(load_scene("falling_rod"), preset("tuned"))
-    run.advance(0.1)
-    for step in range(101, 900):
-        run.advance(step * 1e-3)
-        assert run.sample().contact_force[0, 2] > 1.0, step
-
-
-# At rest after 0.7 s, by two routes of 1e-12 m: place of the centre of mass and angle.
-REST = true_values("sled")[0]["values"]["p_WB"][:2]
-
-
-@pytest.mark.parametrize(
-    ("name", "coarse", "fine"),
-    [
-        ("default", (5e-2, 8e-2), (5e-2, 8e-2)),
-        ("matched", (5e-3, 3e-2), (5e-3, 3e-2)),
-        ("tuned", (4e-4, 2e-3), (4e-5, 2e-4)),
-    ],
-)
-def test_a_convex_cone_and_a_pyramid_have_another_limit(name, coarse, fine):
-    """A sled's place of rest: the pyramid and the convex cone stay off at all steps, the corrected cone converges."""
-    mechanism = on_floor(*SLED, v0=(1.5, 0.3, 0, 0, 0, 6))
-    for dt, (low, high) in ((1e-3, coarse), (1e-4, fine)):
-        run = MUJOCO.build(mechanism, preset(name, dt=dt))
-        run.advance(0.7)
-        assert low < np.hypot(*(run.sample().p_WB[0, :2] - REST)) < high
-
-
-def test_restitution_returns_its_part_of_the_speed():
-    """A ball that falls on the floor leaves it with e times its speed, and its friction throws no slip back."""
-    run = MUJOCO.build(on_floor((0, 0, -0.08), mu=0.0, restitution=0.5, height=0.2), preset(dt=1e-4))
-    run.advance(0.15)  # it touches after 0.143 s
-    fall = np.sqrt(2 * G * 0.1)
-    assert run.sample().v_WB[0, 2] == pytest.approx(0.5 * fall - G * (0.15 - fall / G), abs=5e-3)
-
-
 @pytest.mark.parametrize(
     ("pair", "options", "said"),
     [
@@ -263,21 +224,6 @@ def test_joints_have_no_contact():
     """The formulation joints refuses bodies that touch."""
     with pytest.raises(Refused, match="contact between bodies"):
         MUJOCO.build(on_floor(*SLED), MUJOCO.presets["joints"]["matched"])
-
-
-@pytest.mark.parametrize(
-    ("options", "field"),
-    [
-        ({"cone_correction": True, "integrator": "RK4"}, "integrator"),
-        ({"cone_correction": True, "cone": "pyramidal"}, "cone"),
-        ({"curvature": True, "integrator": "implicitfast"}, "integrator"),
-        ({"curvature": True, "cone": "pyramidal"}, "cone"),
-    ],
-)
-def test_settings_without_effect_are_told(options, field):
-    """Options that geoms does not have, or that the correction cannot use, are one line."""
-    with pytest.raises(InputError, match=f"mujoco: {field}"):
-        MUJOCO.build(on_floor(*SLED), preset(**options))
 
 
 def test_a_model_file_holds_geoms_but_no_correction():

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from feet_on_rails import foot_on_rail
 from scipy.integrate import solve_ivp
 
 from proofroll.core.errors import Diverged, Refused
@@ -21,7 +22,6 @@ from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
-from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.engines.projection.contact.contact_modes import ContactMotion
 from proofroll.engines.projection.contact.slip_directions import SlipDirections
 from proofroll.files.scene_file import load_scene
@@ -66,27 +66,6 @@ def test_the_first_switch_is_where_two_routes_have_it(name: str, kind: str, cont
     assert event.time == pytest.approx(time, abs=1e-7)
 
 
-@pytest.mark.parametrize(
-    "name", ["sled", "eccentric_sphere", "free_turntable", "rattleback", "tilted_disc", "ladder", "flick"]
-)
-def test_a_start_is_certified(name: str) -> None:
-    """Geometry, friction and first accelerations of every shape are the scene's to round-off, also on what moves."""
-    (element,) = load_scene(name).elements
-    assert isinstance(element, MechanismElement)
-    run = PROJECTION.build(load_scene(name), DEFAULT)
-    lines = element.certify(run.built(), run.sample())
-    assert [str(line) for line in lines if not line.holds] == []
-    told = {line.quantity for line in lines if line.difference is not None}
-    assert {
-        "gaps",
-        "responses of contacts",
-        "friction of contacts",
-        "acceleration",
-    } <= told
-    known = ~np.isnan(element.first_press)
-    np.testing.assert_allclose(run.sample().contact_force[known], element.first_press[known], atol=1e-8)
-
-
 @pytest.mark.parametrize("factor", [-1.0, 0.0, 1.01])
 def test_a_wrong_first_force_is_not_certified(factor: float) -> None:
     """A force of contact that is on the other body, left out, or a hundredth too large is told by the certificate."""
@@ -101,60 +80,9 @@ def test_a_wrong_first_force_is_not_certified(factor: float) -> None:
 
 def test_contacts_beside_couplings_are_refused() -> None:
     """A coupling beside contacts is refused in a line that says what is followed."""
-    coupled = replace(on_rail(), couplings=(Coupling("belt", "rail", "shaft", 1.0, 0.1),))
+    coupled = replace(foot_on_rail(), couplings=(Coupling("belt", "rail", "shaft", 1.0, 0.1),))
     with pytest.raises(Refused, match="contacts are followed in trees"):
         PROJECTION.build(coupled, DEFAULT)
-
-
-def on_rail(*, sole: float = 0.2, pull: float = 0.0, **rail: Any) -> Mechanism:
-    """A cart of 0.5 kg on a rail, at 1 m/s, with a foot of 1.5 kg on a floor; ``pull`` along the rail [m/s²]."""
-    return Mechanism(
-        bodies=tuple(Body(name, mass, inertia=(1.0, 1.0, 1.0)) for name, mass in (("cart", 0.5), ("foot", 1.5))),
-        joints=(
-            Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(1.0,), **rail),
-            Joint("shaft", "prismatic", "cart", "foot", axis=(0, 0, 1), q0=(0.1,)),
-        ),
-        geometries=(Geometry("ball", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane")),
-        pairs=(Pair("sole", ("ball", "floor"), friction=sole),),
-        gravity=(pull, 0.0, -9.81),
-    )
-
-
-def test_friction_of_a_joint_and_of_a_contact_stop_a_foot() -> None:
-    """A rail and a floor that rub together slow a foot by the sum of their frictions, and hold it where it stops."""
-    run, slowed = PROJECTION.build(on_rail(friction=2.0), replace(DEFAULT, dt=1e-2)), (2.0 + 0.2 * 1.5 * 9.81) / 2.0
-    run.advance(0.1)
-    sample = run.sample()
-    assert sample.p_WB[0, 0] == pytest.approx(0.1 - slowed * 0.1**2 / 2, abs=1e-12)
-    assert (sample.friction[0], sample.stop[0]) == pytest.approx((-2.0, 0.0), abs=1e-10)
-    assert sample.contact_force[0] == pytest.approx([-0.2 * 1.5 * 9.81, 0.0, 1.5 * 9.81], abs=1e-9)
-    run.advance(0.5)
-    assert run.sample().p_WB[0, 0] == pytest.approx(1 / slowed / 2, abs=1e-12)
-    assert [(event.kind, event.name) for event in run.events()] == [("rest", "sole"), ("stick", "rail")]
-    assert [event.time for event in run.events()] == pytest.approx([1 / slowed] * 2, abs=1e-12)
-
-
-def test_a_foot_that_slides_rebounds_from_a_stop() -> None:
-    """A stop returns half of the speed, and friction at the foot turns with it."""
-    run = PROJECTION.build(on_rail(limits=(-1.0, 0.1), restitution=0.5), replace(DEFAULT, dt=1e-2))
-    slowed = 0.2 * 9.81 * 1.5 / 2.0
-    hit = (1 - np.sqrt(1 - 2 * slowed * 0.1)) / slowed
-    back, left = 0.5 * (1 - slowed * hit), 0.3 - hit
-    run.advance(0.3)
-    assert run.sample().p_WB[0, 0] == pytest.approx(0.1 - back * left + slowed * left**2 / 2, abs=1e-12)
-    assert [(event.kind, event.name) for event in run.events()] == [("impact", "rail"), ("turn", "sole")]
-    assert [event.time for event in run.events()] == pytest.approx([hit] * 2, abs=1e-12)
-
-
-@pytest.mark.parametrize(("sole", "press"), [(0.0, -6.0), (0.2, None)])
-def test_a_foot_is_pressed_against_a_stop(sole: float, press: float | None) -> None:
-    """A stop without rebound holds a foot that is pulled on, alone or with the floor, whose shares are not unique."""
-    run = PROJECTION.build(on_rail(limits=(-1.0, 0.1), sole=sole, pull=3.0), replace(DEFAULT, dt=1e-2))
-    run.advance(0.3)
-    sample = run.sample()
-    assert sample.p_WB[0, 0] == pytest.approx(0.1, abs=1e-12)
-    assert sample.stop[0] + sample.contact_force[0, 0] == pytest.approx(-6.0, abs=1e-9)
-    assert press is None or sample.stop[0] == pytest.approx(press, abs=1e-9)
 
 
 LENGTH, HEIGHT, MASS, INERTIA, RUBS, RETURNS, RADIUS = 0.5, 0.2, 0.7, 0.02, 0.3, 0.6, 0.03
@@ -234,27 +162,6 @@ def test_a_clamped_servo_pushes_through_a_contact(engine: str, formulation: str,
     sample = run.sample()
     assert sample.p_WB[1, 0] == pytest.approx(0.07318356288203501, abs=bound)
     assert sample.effort == pytest.approx([0.6], abs=1e-6)
-
-
-def test_a_limit_of_an_effort_is_not_stepped_across() -> None:
-    """Steps of 0.03 s, one of which an effort's limit splits, follow a cubic and then a parabola of time exactly."""
-    joints = (
-        Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(1.0,)),
-        Joint("shaft", "prismatic", "cart", "foot", axis=(0, 0, 1), q0=(0.1,)),
-    )
-    dragged = Mechanism(
-        bodies=tuple(Body(name, mass, inertia=(1.0, 1.0, 1.0)) for name, mass in (("cart", 0.5), ("foot", 1.5))),
-        joints=joints,
-        actuators=(Actuator("push", "rail", "torque", target=Formula("20*t"), limit=4.0),),
-        geometries=(Geometry("ball", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane")),
-        pairs=(Pair("sole", ("ball", "floor"), friction=0.2),),
-        gravity=(0.0, 0.0, -9.81),
-    )
-    run = PROJECTION.build(dragged, replace(DEFAULT, dt=0.03))
-    run.advance(0.24)
-    slowed, left = 0.2 * 1.5 * 9.81 / 2, 0.04
-    moved = 0.24 - slowed * 0.24**2 / 2 + 10 * (0.2**3 / 6 + 0.2**2 / 2 * left) + 2.0 * left**2 / 2
-    assert run.sample().p_WB[0, 0] == pytest.approx(moved, abs=1e-13)
 
 
 def test_first_steps_into_an_impact_are_no_evidence() -> None:

@@ -61,30 +61,6 @@ def test_a_pendulum_rubs_to_rest():
     assert 2 * np.arctan2(axis[1:].sum(), axis[0]) == pytest.approx(true["values"]["q.pivot"], abs=1e-9)
 
 
-def test_friction_holds_what_is_lighter_and_carries_its_weight():
-    """A mass that friction can hold does not creep, and the joint transmits its weight."""
-    run = runs.build("dependent", slider(friction=15.0))
-    run.advance(1.0)
-    assert place(run) == 0.0
-    np.testing.assert_allclose(run.sample().joint_force[0], [0, 0, G], atol=1e-12)
-    heavy = runs.build("dependent", slider(friction=5.0))
-    heavy.advance(0.5)
-    assert place(heavy) == pytest.approx(-0.5 * (G - 5) * 0.25, abs=1e-12)
-
-
-@pytest.mark.parametrize("restitution", [0.0, pytest.param(0.5, marks=pytest.mark.drill)])
-def test_a_mass_falls_on_a_stop(restitution):
-    """It rests there at once, or rebounds by parabolas, the next of which is the square of the restitution as high."""
-    run = runs.build("dependent", slider(q0=(1.0,), limits=(0.0, 2.0), restitution=restitution))
-    fall = np.sqrt(2 / G)
-    run.advance(float(fall * (1 + restitution)))
-    assert place(run) == pytest.approx(restitution**2, abs=1e-10)
-    run.advance(2.0)  # rebounds end at 3 falls
-    assert place(run) == pytest.approx(0.0, abs=1e-10)
-    np.testing.assert_allclose(run.sample().joint_force[0], [0, 0, G], atol=1e-9)
-    assert run.events()[0].time == pytest.approx(fall, abs=1e-11)
-
-
 def test_a_mass_that_hardly_falls_comes_to_rest():
     """Rebounds from the height of a file's last digits are summed, as are the last ones of any fall."""
     run = runs.build("dependent", slider(q0=(1e-12,), limits=(0.0, 2.0), restitution=0.5))
@@ -156,7 +132,7 @@ def test_an_effort_meets_its_limit_when_it_should(options, tolerance):
     assert [event.kind for event in run.events()] == ["release", "saturate"] * 2
     # Of rk4 it is the error of its step, 1.9e-8 s with every kind of arithmetic that was tried.
     np.testing.assert_allclose([event.time for event in run.events()], true["events"], atol=tolerance)
-    place, speed = true["values"].values()
+    place, speed, _ = true["values"].values()
     assert run.sample().p_WB[0, 0] == pytest.approx(place, abs=tolerance)
     assert run.sample().v_WB[0, 0] == pytest.approx(speed, abs=20 * tolerance)
 

@@ -7,14 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from balls_on_walls import MASS, MOMENT, RADIUS, SHARE, WALLS, on_wall
 
+import proofroll
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.files.scene_file import load_scene
 
-RADIUS, MASS, SHARE = 0.025, 0.5, 0.4  # m, kg, J / (m a²)
-MOMENT = SHARE * MASS * RADIUS**2
 GRAVITY = 9.81
 
 
@@ -27,27 +28,6 @@ def ball_in_bore(*, friction: float = math.inf, speed: float = 4.0) -> Mechanism
     )
     pairs = (Pair("contact", ("sphere", "wall"), friction),)
     return Mechanism((Body("ball", MASS, inertia=(MOMENT,) * 3),), (joint,), geometries=shapes, pairs=pairs)
-
-
-VELOCITY = dict.fromkeys(("shaft", "bowl", "cone", "torus"), (0.0, 0.3, 0.0, 5.0, 0.0, 3.0))
-VELOCITY["bore"] = (1.6, 0.0, -1.2, 0.0, 0.0, -80.0)
-WALLS = {
-    "bore": (Geometry("wall", "world", "bore", radius=0.225, axis=(0.6, 0.0, 0.8)), (0.0, 0.2, 0.0)),
-    "shaft": (Geometry("wall", "world", "shaft", radius=0.2, axis=(1.0, 0.0, 0.0)), (0.0, 0.0, 0.225)),
-    "bowl": (Geometry("wall", "world", "bowl", (0.0, 0.0, 0.1), radius=0.225), (0.12, 0.0, -0.06)),
-    "cone": (Geometry("wall", "world", "cone", (0.0, 0.0, -0.05), slope=0.6435011087932844), (0.04, 0.0, 0.01125)),
-    "torus": (Geometry("wall", "world", "torus", radius=0.05, ring_radius=0.2), (0.2, 0.0, 0.075)),
-}
-
-
-def on_wall(kind: str, *, friction: float = 0.3, swapped: bool = False) -> Mechanism:
-    """A sphere that slides and spins on a wall, of a body whose centre of mass is aside."""
-    wall, place = WALLS[kind]
-    joint = Joint("free", "free", "world", "ball", q0=(*place, 1, 0, 0, 0), v0=VELOCITY[kind])
-    shapes = (Geometry("sphere", "ball", "sphere", radius=RADIUS), wall)
-    names = ("wall", "sphere") if swapped else ("sphere", "wall")
-    body = Body("ball", MASS, com=(0.002, 0.0, 0.001), inertia=(MOMENT, MOMENT, 1.2 * MOMENT))
-    return Mechanism((body,), (joint,), geometries=shapes, pairs=(Pair("contact", names, friction),))
 
 
 def place_in_bore(t: float, speed: float = 4.0) -> np.ndarray:
@@ -159,3 +139,22 @@ def test_a_ball_at_the_centre_of_a_bowl_falls(setting: str) -> None:
     run = load_engine(engine).build(mechanism, load_engine(engine).presets[formulation][preset])
     run.advance(0.1)
     assert run.sample().p_WB[0] == pytest.approx([0, 0, -GRAVITY * 0.1**2 / 2], abs=GRAVITY * 0.1 * 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "resistance", "error"),
+    [
+        ("sphere_in_cylinder", 0.0, 2.5e-3),
+        ("bowl", 0.0, 2e-5),
+        ("cone", 0.0, 4e-6),
+        ("bowl", 1e-3, 4e-6),  # 2e-6 m is seen; of first order it would be 7e-5
+    ],
+)
+def test_pinocchios_midpoint_is_of_second_order_on_curved_walls(name: str, resistance: float, error: float) -> None:
+    """Half the step gives a quarter of the error: the wall turns within a step (J̇v), and so does what rolls."""
+    scene, grid = load_scene(name, rolling_resistance=resistance), {"until": 0.4, "every": 0.04}
+    right = proofroll.simulate(scene, "truth", **grid)["p_WB"].values
+    settings = [f"pinocchio[formulation=impulses,preset=tuned,dt={dt}]" for dt in (4e-3, 2e-3)]
+    far, near = (abs(proofroll.simulate(scene, setting, **grid)["p_WB"].values - right).max() for setting in settings)
+    assert near < error
+    assert 3.5 < far / near < 4.5

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from true_runs import true_run
 
-from proofroll.core.errors import InputError, Refused
+from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
@@ -131,22 +131,6 @@ def test_mujoco_contact_of_more_dimensions(condim: int, coefficients: list[float
     run, truth = simulate(scene(), options, until=1.0, every=0.1), true_run(scene(), 1.0, 0.1)
     assert run.status == "done"
     assert float(np.max(np.abs(run.z - truth.z))) > 0.02  # of a range of 0.12 m
-
-
-@pytest.mark.parametrize(
-    ("options", "advice"),
-    [
-        ("formulation=geoms,condim=6", "geoms does not use it; leave it out"),
-        ("condim=5", "it must be 3, 4 or 6"),
-    ],
-)
-def test_mujoco_dimensions_that_make_no_sense(options: str, advice: str) -> None:
-    """A contact of more dimensions where it has no meaning is refused in one line."""
-    with pytest.raises(InputError) as caught:
-        build(scene(), f"mujoco[{options}]")
-    assert advice in str(caught.value)
-    assert "condim" in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", OURS)

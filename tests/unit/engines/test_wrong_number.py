@@ -21,7 +21,9 @@ RESISTED = {"rolling_resistance": 5e-4}
 CYLINDER = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0} | RESISTED
 SCENES: Mapping[str, Scene] = {
     "cylinder": load_scene("sphere_in_cylinder", **CYLINDER),
-    "cylinder, backwards": load_scene("sphere_in_cylinder", **RESISTED, speed=-2.0, axial_speed=-0.5),
+    "cylinder, backwards": load_scene(
+        "sphere_in_cylinder", **RESISTED, speed=-2.0, axial_speed=-0.5, radius=0.05, mass=2.0, gravity=1.6
+    ),
 }
 # What is changed: parameters as multiples, and the line that names it.
 CHANGES: Mapping[str, tuple[Mapping[str, float], str]] = {

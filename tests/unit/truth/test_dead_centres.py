@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
@@ -15,7 +16,6 @@ from proofroll.elements.mechanism.scene.drives import Coupling
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
-from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 from proofroll.truth.switched_truth import truth_of
 
@@ -24,7 +24,7 @@ G = 9.81
 
 def piston(motion: str = "") -> Mechanism:
     """The slider-crank with dry friction of 2 N at its slider, whose crank may be driven."""
-    mechanism: Mechanism = load_scene("slider_crank", angle=np.pi / 4, speed=10.0).elements[0].mechanism  # type: ignore[attr-defined]
+    mechanism: Mechanism = mechanism_named("slider_crank", angle=np.pi / 4, speed=10.0)
     shaft, pin, guide = mechanism.joints
     if motion:
         shaft = replace(shaft, motion=Formula(motion), q0=(), v0=())

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from mechanism_scenes import true_motion
 from scipy.integrate import solve_ivp
 
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
@@ -13,15 +14,9 @@ from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.switched_truth import truth_of
-from proofroll_drill.published import true_values
 
 TIGHT = 1e-12  # of what two routes at 1e-14 leave, with room
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
-
-
-def motion(scene: str, times: list[float], **parameters: float):
-    """The truth of a scene of one mechanism at these times."""
-    return truth_of(load_scene(scene, **parameters).elements[0].mechanism, np.array(times))  # type: ignore[attr-defined]
 
 
 def slider(actuator: Actuator | None = None, mass: float = 1.0, **more: object) -> Mechanism:
@@ -34,38 +29,10 @@ def slider(actuator: Actuator | None = None, mass: float = 1.0, **more: object) 
     )
 
 
-def test_a_servo_moves_as_a_damped_oscillator() -> None:
-    """Its place, speed and effort at half a second are those of two complex roots."""
-    (true,) = true_values("servo")
-    found = motion("servo", [0.0, true["at"]])
-    x, v = true["values"].values()
-    assert found.record.q[1, 0] == pytest.approx(x, abs=TIGHT)
-    assert found.record.v[1, 0] == pytest.approx(v, abs=TIGHT)
-    assert found.record.named[:, 0] == pytest.approx([100.0, 100 * (1 - x) - 4 * v], abs=100 * TIGHT)
-    assert max(bars[-1] for bars in found.bars.values()) < 1e-9
-    assert found.events == ()
-
-
-@pytest.mark.drill
-def test_a_limit_clamps_the_whole_effort() -> None:
-    """The effort leaves and reaches its limit at the roots of the piecewise closed form."""
-    (true,) = true_values("saturated_servo")
-    found = motion("saturated_servo", [0.0, 0.1, 0.5, true["at"]])
-    assert [event.kind for event in found.events] == ["release", "saturate", "release", "saturate"]
-    for event, time in zip(found.events, true["events"], strict=True):
-        assert event.time == pytest.approx(time, abs=TIGHT)
-        assert event.name == "servo"
-    place, speed = true["values"].values()
-    assert found.record.q[-1, 0] == pytest.approx(place, abs=TIGHT)
-    assert found.record.v[-1, 0] == pytest.approx(speed, abs=TIGHT)
-    assert found.record.named[:, 0] == pytest.approx([20.0, 20.0, -20.0, 20.0], abs=1e-10)
-    assert found.bars["q"][-1] < TIGHT
-
-
 @pytest.mark.drill
 def test_a_limit_that_is_never_reached_changes_nothing() -> None:
     """A servo whose limit is larger than all its efforts has the truth of one without a limit."""
-    one, two = motion("servo", [0.0, 0.5, 1.0]), motion("saturated_servo", [0.0, 0.5, 1.0], limit=150.0)
+    one, two = true_motion("servo", [0.0, 0.5, 1.0]), true_motion("saturated_servo", [0.0, 0.5, 1.0], limit=150.0)
     assert two.events == ()
     assert np.abs(one.record.q - two.record.q).max() <= one.bars["q"][-1] + two.bars["q"][-1]
 
@@ -78,27 +45,6 @@ def test_one_effort_at_its_limit_all_the_time_is_clamped_beside_another_that_nev
     found = truth_of(Mechanism(bodies, joints, actuators=actuators, gravity=(0, 0, 0)), np.array([0.0, 1.0]))
     assert found.record.q[1] == pytest.approx([1.0, 0.5], abs=TIGHT)
     assert found.events == ()
-
-
-def test_a_gear_carries_the_force_of_the_second_wheel() -> None:
-    """Both wheels turn as their reflected inertia says, and the gear pushes the second one with -1 N m."""
-    found = motion("gear_pair", [0.0, 0.5, 1.0])
-    t = np.array([0.0, 0.5, 1.0])
-    assert found.record.q[:, 0] == pytest.approx(2.5 * t**2, abs=TIGHT)
-    assert found.record.q[:, 1] == pytest.approx(-1.25 * t**2, abs=TIGHT)
-    assert found.record.named[:, 0] == pytest.approx([-1.0] * 3, abs=TIGHT)
-    assert found.record.wrench[:, :, 5] == pytest.approx(np.array([[0.5, -1.0]] * 3), abs=TIGHT)
-
-
-@pytest.mark.drill
-def test_an_arm_under_servos_is_that_of_its_own_equations() -> None:
-    """Both angles are those of Lagrange's equations, integrated beforehand to thirteen digits."""
-    true = true_values("arm_pd")
-    found = motion("arm_pd", [0.0, *(each["at"] for each in true)], armature=0.0)
-    angles = np.array([list(each["values"].values()) for each in true])
-    assert found.record.q[1:] == pytest.approx(angles, abs=1e-13)
-    assert found.bars["q"][-1] < TIGHT
-    assert abs(motion("arm_pd", [0.0, 0.1]).record.q[1, 0] - angles[0, 0]) > 1e-2, "armature changes it"
 
 
 @pytest.mark.drill
@@ -119,24 +65,24 @@ def test_a_true_rotor_turns_with_the_rod_that_carries_it() -> None:
     assert acceleration == pytest.approx([*expected, n * expected[1]], rel=1e-12)
     armature = np.linalg.solve(M + np.diag([0, inertia * n**2]), weight + effort)
     assert np.abs(armature / expected - 1).max() > 1e-3
-    truth = motion("arm_rotor", [0.0, 0.3, 1.0], elbow=b)
+    truth = true_motion("arm_rotor", [0.0, 0.3, 1.0], elbow=b)
     assert truth.bars["q"][-1] < 1e-10
 
 
 def test_a_stiff_damper_lets_the_mass_go_its_time_constant() -> None:
     """A mass in a damper goes (F/c) t + (v0 - F/c) (m/c) (1 - exp(-c t/m)), and then as fast as its force."""
     t = np.array([0.0, 0.001, 0.2])
-    found = motion("stiff_damper", t.tolist())
+    found = true_motion("stiff_damper", t.tolist())
     assert found.record.q[:, 0] == pytest.approx(0.01 * t + 0.99e-3 * (1 - np.exp(-1000 * t)), abs=1e-15)
     assert found.bars["q"][-1] < TIGHT
 
 
 def test_friction_that_holds_a_weight_is_the_weight() -> None:
     """A mass that its friction can hold does not move, and friction tells the weight; a weaker one lets it fall."""
-    found = motion("friction_hold", [0.0, 0.5, 1.0])
+    found = true_motion("friction_hold", [0.0, 0.5, 1.0])
     assert np.abs(found.record.q).max() == np.abs(found.record.v).max() == 0.0
     assert found.record.named[:, 0] == pytest.approx([9.81] * 3, rel=1e-12)
-    falls = motion("friction_hold", [0.0, 1.0], friction=4.81)
+    falls = true_motion("friction_hold", [0.0, 1.0], friction=4.81)
     assert falls.record.q[1, 0] == pytest.approx(-2.5, abs=TIGHT)
     assert falls.record.named[:, 0] == pytest.approx([4.81] * 2)
 

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.quantity import powers_of
@@ -23,7 +24,6 @@ from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.elements.mechanism.scene.spring_law import SpringLaw
-from proofroll.files.scene_file import load_scene
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.natural_units import Units, natural_units
@@ -36,11 +36,6 @@ FAST, SLOW = (1.0, 1.0, 1e-6), (1.0, 1.0, 1e6)
 SMALL_AND_HEAVY, LARGE_AND_LIGHT = (1e-5, 1e9, 1e6), (1e4, 1e-9, 1e-6)
 
 
-def mechanism_of(scene: str) -> Mechanism:
-    """The mechanism of a scene."""
-    return load_scene(scene).elements[0].mechanism  # type: ignore[attr-defined, no-any-return]
-
-
 def larger(mechanism: Mechanism, scale: tuple[float, float, float]) -> Mechanism:
     """A mechanism with lengths, masses and times multiplied."""
     return Units(*(1 / factor for factor in scale)).mechanism(mechanism)
@@ -49,7 +44,7 @@ def larger(mechanism: Mechanism, scale: tuple[float, float, float]) -> Mechanism
 @cache
 def as_given(scene: str, until: float) -> TwoRouteMotion:
     """The truth of a scene in its own units."""
-    return truth_of(mechanism_of(scene), np.array([0.0, until]))
+    return truth_of(mechanism_named(scene), np.array([0.0, until]))
 
 
 DEAR = (("flick", 0.15), ("spinning_bounce", 0.4), ("sled", 0.65), ("spring_friction", 2.0))
@@ -77,7 +72,7 @@ def test_a_scene_of_another_size_has_the_same_events(
     scene: str, until: float, scale: tuple[float, float, float]
 ) -> None:
     """Lengths, masses and times that are multiplied change nothing but the units of the answer."""
-    mechanism, (length, _, time) = mechanism_of(scene), scale
+    mechanism, (length, _, time) = mechanism_named(scene), scale
     one = as_given(scene, until)
     two = truth_of(larger(mechanism, scale), np.array([0.0, until * time]))
     assert [(event.kind, event.name) for event in two.events] == [(event.kind, event.name) for event in one.events]
@@ -211,7 +206,7 @@ def test_loops_and_shapes_have_lengths_too() -> None:
     loop = Loop("pin", "revolute", "arm", "loose", (0.2, 0.0, 0.0), (0.0, 0.4, 0.0))
     own = Units(0.5, 1.0, 1.0).mechanism(replace(everything(), loops=(loop,)))
     assert (own.loops[0].position_a, own.loops[0].position_b) == ((0.4, 0.0, 0.0), (0.0, 0.8, 0.0))
-    sled = Units(0.5, 1.0, 1.0).mechanism(mechanism_of("sled"))
+    sled = Units(0.5, 1.0, 1.0).mechanism(mechanism_named("sled"))
     assert sled.geometries[1].radius == 2 * 0.02
     assert own.joints[1].limits is None
 
@@ -219,7 +214,7 @@ def test_loops_and_shapes_have_lengths_too() -> None:
 @pytest.mark.parametrize("turn", np.linspace(0.0, 0.4, 9))
 def test_a_small_mechanism_far_from_the_origin_closes(turn: float) -> None:
     """Loops of 0.1 mm that close 10 m from the world's origin are accepted: round-off of such places is larger."""
-    base, far = larger(mechanism_of("four_bar"), (1e-4, 1.0, 1e-2)), np.array([10.1, 3.3, 0.0])
+    base, far = larger(mechanism_named("four_bar"), (1e-4, 1.0, 1e-2)), np.array([10.1, 3.3, 0.0])
     joints = [
         replace(
             joint, position=tuple(far + joint.position) if joint.parent == "world" else joint.position, dependent=k > 0
@@ -232,11 +227,11 @@ def test_a_small_mechanism_far_from_the_origin_closes(turn: float) -> None:
 
 def test_natural_units_follow_the_scene() -> None:
     """They are powers of two near the extent, the mass, and the time of a fall by the extent or of the first motion."""
-    rod = mechanism_of("falling_rod")
+    rod = mechanism_named("falling_rod")
     units = natural_units(rod)
     assert units.length in {0.5, 1.0}
     assert units.time == pytest.approx(np.sqrt(units.length / 9.81), rel=0.5)
-    spring = mechanism_of("spring_friction")
+    spring = mechanism_named("spring_friction")
     slow = natural_units(larger(spring, (1.0, 1.0, 1024.0)))
     assert slow == natural_units(spring)._replace(time=1024.0 * natural_units(spring).time)
     for number in (*units, *slow):
@@ -246,7 +241,7 @@ def test_natural_units_follow_the_scene() -> None:
 @pytest.mark.parametrize(("scene", "point"), [("servo", False), ("stop", False), ("stiff_damper", True)])
 def test_a_mechanism_at_one_place_has_a_length_that_follows_it(scene: str, point: bool) -> None:
     """A body at the origin, above its stop, or a point with a speed has 100 times the length where it is as large."""
-    mechanism = mechanism_of(scene)
+    mechanism = mechanism_named(scene)
     if point:
         mechanism = replace(mechanism, bodies=tuple(replace(body, inertia=(0, 0, 0)) for body in mechanism.bodies))
     one, other = (MechanismElement(item) for item in (mechanism, larger(mechanism, (100.0, 1.0, 10.0))))
@@ -280,7 +275,7 @@ def test_messages_of_routes_have_seconds() -> None:
 
 def test_an_effort_that_starts_at_its_limit_passes_it() -> None:
     """A stretch that begins with an effort exactly at its limit ends where the effort passes it."""
-    flick = mechanism_of("flick")
+    flick = mechanism_named("flick")
     servo = replace(flick.actuators[0], kind="torque", target=Formula("0.5 + t^3"), kp=0.0, kd=0.0, limit=0.5)
     mechanism = replace(flick, actuators=(servo,))
     tree = ContactTree(ContactDynamics(mechanism), 1e-14, 1.0)
@@ -292,7 +287,7 @@ def test_an_effort_that_starts_at_its_limit_passes_it() -> None:
 
 def test_a_closed_form_without_finite_numbers_is_no_truth() -> None:
     """A mass whose products are not finite is refused in words, not by an eigenvalue that does not converge."""
-    mechanism = mechanism_of("pendulum")
+    mechanism = mechanism_named("pendulum")
     heavy = replace(mechanism, bodies=tuple(replace(body, mass=1e308) for body in mechanism.bodies))
     with np.errstate(all="ignore"), pytest.raises(Refused, match="too large or too small"):
         truth_of(heavy, np.array([0.0, 0.01]))
@@ -301,7 +296,7 @@ def test_a_closed_form_without_finite_numbers_is_no_truth() -> None:
 @pytest.mark.parametrize("size", [1e-7, 1.0, 1e7])
 def test_a_loop_closes_by_the_size_of_its_mechanism(size: float) -> None:
     """Round-off of a large loop does not open it, and a gap of a billionth of a tiny one does."""
-    mechanism = larger(mechanism_of("four_bar"), (size, 1.0, 1.0))
+    mechanism = larger(mechanism_named("four_bar"), (size, 1.0, 1.0))
     check_start(mechanism)
     loop, *others = mechanism.loops
     apart = replace(loop, position_a=tuple(x + 1e-9 * size for x in loop.position_a))
@@ -312,7 +307,7 @@ def test_a_loop_closes_by_the_size_of_its_mechanism(size: float) -> None:
 @pytest.mark.parametrize("units", [Units(1.0, 1.0, 1.0), Units(0.25, 1.0, 1.0), Units(2.0, 2.0, 1.0)])
 def test_reactions_beside_a_light_rotor_keep_their_digits_in_any_unit(units: Units) -> None:
     """At the start of a geared arm, bodies in any units have the reactions of the tree up to round-off."""
-    mechanism = mechanism_of("arm_rotor")
+    mechanism = mechanism_named("arm_rotor")
     tree, start = JointCoordinates(mechanism), np.concatenate(mechanism.start())
     by_tree = tree.recorded(np.zeros(1), start[None]).wrench
     by_bodies = units.record(mechanism, MaximalCoordinates(units.mechanism(mechanism)).at_start()).wrench

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 from scipy.integrate import solve_ivp
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
@@ -16,13 +17,6 @@ from proofroll.elements.mechanism.scene.signal import Formula, Signal, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 from proofroll.truth.switched_truth import truth_of
-
-
-def mechanism_named(name: str) -> Mechanism:
-    """Mechanism of a scene."""
-    scene: Any = load_scene(name)
-    found: Mechanism = scene.elements[0].mechanism
-    return found
 
 
 def shaken(motion: Signal) -> Mechanism:

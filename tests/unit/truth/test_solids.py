@@ -1,11 +1,14 @@
-"""Truths of solids that meet: closed forms in turned axes, and the bars of both routes."""
+"""Balls, boxes and capsules on solids: rest, borders that are passed, impacts anywhere, and what is not followed."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
@@ -14,14 +17,18 @@ from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.switched_truth import truth_of
 
-RADIUS, MASS, GRAVITY, SPEED = 0.1, 1.5, 9.81, 0.3
+MASS, GRAVITY = 2.0, 9.81
+RADIUS, SPEED = 0.1, 0.3  # of the ball
+HALF, ACROSS, FAST = 0.05, 0.012, 0.9  # half the height of box and rod, the rod's moment, and how fast they slide
 TURN = Rotation.from_rotvec([0.3, -0.7, 0.5])
 AXES = TURN.as_matrix()
-BARS = 1e-11  # 2e-13 is seen
+BARS = 1e-11  # 5e-13 is seen
+SMALL, LARGE = (0.2, 0.1, 2 * HALF), (1.0, 0.3, 0.2)
 TOP = {
     "box": {"size": (1.0, 1.0, 1.0), "orientation": to_rpy(AXES)},
     "cylinder": {"radius": 0.5, "length": 1.0, "axis": tuple(AXES[:, 2])},
 }
+ROD = Geometry("upper", "body", "capsule", radius=HALF, length=0.3, axis=(1, 0, 0))
 
 
 def turned(vector: Any) -> tuple[float, float, float]:
@@ -30,19 +37,48 @@ def turned(vector: Any) -> tuple[float, float, float]:
     return x, y, z
 
 
-def ball_on(solid: Geometry, place: Any, v: Any, w: Any = (0, 0, 0), **law: float) -> Mechanism:
-    """A free ball beside a fixed solid; place and motion in turned axes, where gravity is along -z."""
-    inertia = 0.4 * MASS * RADIUS**2
-    q = TURN.as_quat(scalar_first=True).tolist()
-    joint = Joint("j", "free", "world", "ball", q0=(*turned(place), *q), v0=(*v, *w))
-    shapes = (Geometry("ball", "ball", "sphere", radius=RADIUS), solid)
+def inertia(size: Any) -> Any:
+    """Principal moments of a solid box."""
+    a, b, c = size
+    return tuple(MASS * (p**2 + q**2) / 12 for p, q in ((b, c), (a, c), (a, b)))
+
+
+def free(
+    shape: Geometry, solid: Geometry, moments: Any, place: Any, v: Any = (0, 0, 0), w: Any = (0, 0, 0),
+    turn: Any = (0, 0, 0), **law: float,
+) -> Mechanism:  # fmt: skip
+    """A free body beside a fixed solid; place and motion in turned axes, where gravity is along -z; ``turn``: of it."""
+    attitude = TURN * Rotation.from_rotvec(turn)
+    velocity = attitude.inv().apply(turned(v)).tolist()
+    q = attitude.as_quat(scalar_first=True).tolist()
     return Mechanism(
-        (Body("ball", MASS, inertia=(inertia, inertia, inertia)),),
-        (joint,),
+        (Body("body", MASS, inertia=moments),),
+        (Joint("j", "free", "world", "body", q0=(*turned(place), *q), v0=(*velocity, *w)),),
         gravity=turned((0, 0, -GRAVITY)),
-        geometries=shapes,
-        pairs=(Pair("touch", ("ball", solid.name), **({"friction": 0.0} | law)),),
+        geometries=(shape, solid),
+        pairs=(Pair("touch", (shape.name, solid.name), **({"friction": 0.0} | law)),),
     )
+
+
+def ball_on(solid: Geometry, place: Any, v: Any, w: Any = (0, 0, 0), **law: float) -> Mechanism:
+    """A ball beside a fixed solid."""
+    ball = Geometry("ball", "body", "sphere", radius=RADIUS)
+    return free(ball, solid, (0.4 * MASS * RADIUS**2,) * 3, place, v, w, **law)
+
+
+def base(size: Any = LARGE) -> Geometry:
+    """A fixed box whose upper face ends at x = 0."""
+    return Geometry("lower", "world", "box", turned((-size[0] / 2, 0, -size[2] / 2)), to_rpy(AXES), size=size)
+
+
+def on_box(place: Any, v: Any = (0, 0, 0), size: Any = SMALL, below: Any = LARGE, **law: Any) -> Mechanism:
+    """A box above a fixed one of size ``below``."""
+    return free(Geometry("upper", "body", "box", size=size), base(below), inertia(size), place, v, **law)
+
+
+def rod_on_box(place: Any, v: Any = (0, 0, 0), rod: Geometry = ROD) -> Mechanism:
+    """A capsule above a fixed box."""
+    return free(rod, base((1.0, 0.6, 0.2)), (ACROSS,) * 3, place, v)
 
 
 def followed(mechanism: Mechanism, times: Any) -> TwoRouteMotion:
@@ -167,3 +203,179 @@ def test_capsules_that_come_to_lie_along_each_other_end_the_truth_with_the_reaso
     )
     mechanism = Mechanism((body,), (joint,), geometries=shapes, pairs=(Pair("touch", ("one", "two"), 0.3),))
     assert "the capsules of touch touch along a line at t = 0.428" in truth_of(mechanism, np.array([0.0, 1.0])).ended
+
+
+@pytest.mark.parametrize(
+    ("size", "below", "closed"),
+    [
+        (SMALL, LARGE, (0, 1, 2, 3)),  # corners of the upper one
+        (LARGE, SMALL, (4, 5, 6, 7)),  # of the lower one
+        ((0.8, 0.1, 0.1), (0.2, 0.6, 0.2), (10, 11, 14, 15)),  # a plank across a beam: edges that cross
+    ],
+)
+def test_a_box_on_a_box_rests(size: Any, below: Any, closed: tuple[int, ...]) -> None:
+    """The sum of the forces is its weight, and what presses are the corners of where both faces overlap."""
+    mechanism = on_box((-below[0] / 2, 0, size[2] / 2), size=size, below=below, friction=0.4)
+    found = followed(mechanism, [0.0, 0.5])
+    assert found.events == ()
+    assert found.sums is not None
+    np.testing.assert_allclose(found.sums[-1, 0] @ AXES, [0, 0, MASS * GRAVITY], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(found.record.p_WB[1], found.record.p_WB[0], rtol=0, atol=1e-14)
+    assert found.pressed is not None
+    loose = np.isnan(found.pressed[-1]).any(axis=1)  # of a load that corners share none is determinate
+    assert set(np.flatnonzero(loose)) <= set(closed)
+
+
+def test_a_capsule_rests_on_a_face() -> None:
+    """Both ends bear half of its weight."""
+    across = replace(ROD, axis=(0, 1, 0))
+    found = followed(rod_on_box((-0.5, 0, HALF), rod=across), [0.0, 0.3])
+    assert found.events == ()
+    assert found.pressed is not None
+    loads = found.pressed[-1] @ AXES[:, 2]
+    assert loads[:2] == pytest.approx([MASS * GRAVITY / 2] * 2, abs=1e-11)
+    assert not np.nan_to_num(loads[2:]).any()
+
+
+def over_the_rim(times: Any, moment: float) -> Any:
+    """Place, in the plane of motion, and turn of a body whose centre passes a rim without friction at time 0.
+
+    Coordinates are its turn, and the place of its centre along its lower face from the rim; (times, 3).
+    """
+
+    def rates(_: float, y: Any) -> list[float]:
+        turn, along, w, u = y
+        matrix = [[1, HALF, 0], [0, -along, -1 / MASS], [0, moment, -along]]
+        right = [along * w**2 + GRAVITY * np.sin(turn), (u + HALF * w) * w + u * w - GRAVITY * np.cos(turn), 0]
+        slide, turning, _force = np.linalg.solve(matrix, right)
+        return [w, u, turning, slide]
+
+    solved = solve_ivp(rates, (0, times[-1]), [0, 0, 0, FAST], "DOP853", times, rtol=1e-13, atol=1e-15)
+    turn, along = solved.y[:2]
+    x, z = along * np.cos(turn) + HALF * np.sin(turn), HALF * np.cos(turn) - along * np.sin(turn)
+    return np.array([x, z, turn]).T
+
+
+@pytest.mark.drill
+def test_a_box_that_slides_over_a_rim_tips_when_its_centre_passes_it() -> None:
+    """Its leading corners end at the rim, where edges cross; it tips about these as an independent solver says."""
+    start, since = -0.12, np.array([0.0, 0.03, 0.06, 0.09])
+    passes = -start / FAST
+    found = followed(on_box((start, 0, HALF), (FAST, 0, 0)), [0.0, *(passes + since)])
+    events = [(event.kind, event.name, event.time) for event in found.events]
+    assert [event[:2] for event in events] == [("lift_off", f"touch.{k}") for k in (3, 4, 1, 2)]
+    assert [event[2] for event in events] == pytest.approx([0.02 / FAST] * 2 + [passes] * 2, abs=1e-12)
+    expected = over_the_rim(since, inertia(SMALL)[1])
+    place = found.record.p_WB[1:, 0] @ AXES
+    np.testing.assert_allclose(place[:, [0, 2]], expected[:, :2], rtol=0, atol=1e-11)
+    attitude = TURN * Rotation.from_rotvec(np.outer(expected[:, 2], [0, 1, 0]))
+    measured = Rotation.from_quat(found.record.q_WB[1:, 0], scalar_first=True)
+    assert (attitude.inv() * measured).magnitude().max() < 1e-11
+
+
+@pytest.mark.drill
+def test_a_rod_that_slides_over_a_rim_tips_on_it_and_leaves_by_its_end() -> None:
+    """Its side crosses the edge where its middle passes; an independent solver moves it so until its end passes."""
+    start, since = -0.02, np.array([0.0, 0.05, 0.1, 0.15])
+    passes = -start / FAST
+    found = followed(rod_on_box((start, 0, HALF), (FAST, 0, 0)), [0.0, *(passes + since), passes + 0.19])
+    assert [event.kind for event in found.events] == ["lift_off", "lift_off"]
+    assert found.events[0].time == pytest.approx(passes, abs=1e-12)
+    place = found.record.p_WB[1:-1, 0] @ AXES
+    np.testing.assert_allclose(place[:, [0, 2]], over_the_rim(since, ACROSS)[:, :2], rtol=0, atol=1e-11)
+
+
+def test_edges_that_cross_rebound_from_each_other() -> None:
+    """An edge below that falls across an edge above rebounds by its restitution, v' = -e v, without turning."""
+    across = Rotation.from_rotvec([np.pi / 4, 0, 0])
+    size, side = (0.5, 0.1, 0.1), 0.1 / np.sqrt(2)
+    roof = TURN * Rotation.from_rotvec([0, np.pi / 4, 0])
+    falling = on_box((0, 0, 2 * side + 0.005), size=size, turn=across.as_rotvec(), restitution=0.5, friction=0.2)
+    lower = Geometry("lower", "world", "box", orientation=to_rpy(roof.as_matrix()), size=(0.1, 0.5, 0.1))
+    mechanism = Mechanism(
+        falling.bodies, falling.joints, gravity=falling.gravity, geometries=(falling.geometries[0], lower),
+        pairs=falling.pairs,
+    )  # fmt: skip
+    hits = np.sqrt(2 * 0.005 / GRAVITY)
+    found = followed(mechanism, [0.0, hits + 0.01])
+    assert [event.kind for event in found.events] == ["impact"]
+    assert found.events[0].time == pytest.approx(hits, abs=1e-12)
+    speed = 0.5 * GRAVITY * hits - GRAVITY * 0.01
+    np.testing.assert_allclose(found.record.v_WB[-1, 0] @ AXES, [0, 0, speed], rtol=0, atol=1e-12)
+    assert np.abs(found.record.w_WB[-1]).max() < 1e-11
+
+
+def test_a_box_that_meets_a_side_rebounds_from_it() -> None:
+    """Faces that come to meet are those of the sides: a box that flies at the side of another one comes back."""
+    found = followed(on_box((0.15, 0, -0.1), (-1.0, 0, 0.3), restitution=0.6), [0.0, 0.06])
+    assert {event.kind for event in found.events} == {"impact"}
+    assert [event.time for event in found.events] == pytest.approx([0.05] * len(found.events), abs=1e-13)
+    v = found.record.v_WB[-1, 0] @ AXES
+    np.testing.assert_allclose(v, [0.6, 0, 0.3 - GRAVITY * 0.06], rtol=0, atol=1e-12)
+    assert np.abs(found.record.w_WB[-1]).max() < 1e-12
+
+
+@pytest.mark.drill
+def test_a_box_that_tips_by_more_than_half_a_right_angle_ends_the_truth_with_the_reason() -> None:
+    """A box that does not slip on the rim turns on until other faces meet, and the line says so."""
+    found = truth_of(on_box((0.02, 0, HALF), friction=np.inf), np.array([0.0, 0.5]))
+    assert [event.kind for event in found.events] == []
+    assert "have turned so far at t = 0." in found.ended
+
+
+HULL = Geometry("hull_a", "a", "box", size=(0.4, 0.3, 0.2))
+# What tumbles towards a hull, the centre of mass of the hull's body, seeds, and the kinds of events.
+TUMBLERS = {
+    "box": (Geometry("hull_b", "b", "box", size=(0.3, 0.3, 0.5)), (0.01, 0, 0.02), (1, 4, 8), {"impact"}),
+    "capsule": (
+        Geometry("hull_b", "b", "capsule", radius=0.06, length=0.5), (0, 0, 0), (0, 4, 11), {"impact", "lift_off"}
+    ),
+}  # fmt: skip
+
+
+def mujoco_distances(shapes: tuple[Geometry, ...], found: TwoRouteMotion) -> list[float]:
+    """Distance of two bodies at each time [m], by MuJoCo."""
+    spec = mujoco.MjSpec()
+    for shape in shapes:
+        body = spec.worldbody.add_body()
+        body.add_freejoint()
+        size = np.array(shape.size if shape.kind == "box" else (2 * shape.radius, shape.length, 0)) / 2
+        body.add_geom(type=getattr(mujoco.mjtGeom, f"mjGEOM_{shape.kind.upper()}"), size=size)
+    model = spec.compile()
+    data, apart = mujoco.MjData(model), []
+    for places, attitudes in zip(found.record.p_WB, found.record.q_WB, strict=True):
+        data.qpos[:] = np.concatenate([places, attitudes], axis=1).ravel()
+        mujoco.mj_forward(model, data)
+        apart.append(mujoco.mj_geomDistance(model, data, 0, 1, 10.0, None))
+    return apart
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize(
+    ("other", "seed", "swapped"),
+    [(name, seed, not seed % 2) for name, (_, _, seeds, _) in TUMBLERS.items() for seed in seeds],
+)
+def test_solids_that_tumble_collide_without_overlap(other: str, seed: int, swapped: bool) -> None:
+    """Wherever they meet, corner or edge first, they stay apart by MuJoCo's own distance and keep their momentum."""
+    tumbler, com, _, kinds = TUMBLERS[other]
+    rng = np.random.default_rng(seed)
+    turns = [Rotation.random(random_state=seed + k) for k in (0, 99)]
+    way = rng.normal(size=3)
+    way /= np.linalg.norm(way)
+    v = turns[1].inv().apply(-3 * way + 0.2 * rng.normal(size=3))
+    spins = rng.normal(size=3), 2 * rng.normal(size=3)
+    starts = ((0, 0, 0), (0, 0, 0), spins[0]), (0.6 * way, v, spins[1])
+    joints = tuple(
+        Joint(f"j{name}", "free", "world", name, q0=(*p, *turn.as_quat(scalar_first=True)), v0=(*u, *w))
+        for name, turn, (p, u, w) in zip("ab", turns, starts, strict=True)
+    )
+    bodies = (Body("a", 1.0, com=com, inertia=(0.012, 0.013, 0.011)), Body("b", 2.0, inertia=(0.05, 0.03, 0.04)))
+    pair = Pair("touch", ("hull_b", "hull_a") if swapped else ("hull_a", "hull_b"), 0.3, 0.5)
+    mechanism = Mechanism(bodies, joints, gravity=(0, 0, 0), geometries=(HULL, tumbler), pairs=(pair,))
+    found = followed(mechanism, np.linspace(0.0, 0.13, 27))
+    assert {"impact"} <= {event.kind for event in found.events} <= kinds
+    assert min(mujoco_distances((HULL, tumbler), found)) > -1e-9
+    arm = Rotation.from_quat(found.record.q_WB[:, 0], scalar_first=True).apply(com)
+    speeds = found.record.v_WB[:, 0] + np.cross(found.record.w_WB[:, 0], arm)
+    momentum = speeds + 2.0 * found.record.v_WB[:, 1]
+    assert np.abs(momentum - momentum[0]).max() < 1e-12

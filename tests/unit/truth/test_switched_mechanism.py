@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named, true_motion
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
@@ -27,15 +28,10 @@ from proofroll_drill.published import true_values
 TIGHT = 1e-11  # of what two routes at 1e-14 leave after some ten switches, with room
 
 
-def motion(scene: str, times: list[float], **parameters: float):
-    """The truth of a scene of one mechanism at these times."""
-    return truth_of(load_scene(scene, **parameters).elements[0].mechanism, np.array(times))  # type: ignore[attr-defined]
-
-
 @pytest.mark.drill
 def test_a_spring_that_rubs_loses_four_parts_of_friction_a_swing() -> None:
     """Half swings last pi sqrt(m/k), end at (-1)^n (1 - 0.06 n), and the mass rests where the spring is too weak."""
-    found = motion("spring_friction", [0.0, 1.0, 2.0], start=0.3)
+    found = true_motion("spring_friction", [0.0, 1.0, 2.0], start=0.3)
     half = np.pi / 10
     assert [event.kind for event in found.events] == ["turn"] * 4 + ["stick"]
     for number, event in enumerate(found.events, 1):
@@ -51,24 +47,13 @@ def test_a_spring_that_rubs_loses_four_parts_of_friction_a_swing() -> None:
 
 
 @pytest.mark.drill
-def test_a_hinge_that_rubs_turns_where_the_work_of_friction_says() -> None:
-    """The first turns of the rod obey the balance of energy, computed to fourteen digits beforehand."""
-    (true,) = true_values("pendulum_friction")
-    found = motion("pendulum_friction", [0.0, true["events"][0], 2.5])
-    assert found.events[0].time == pytest.approx(true["events"][0], abs=TIGHT)
-    assert found.record.q[1, 0] == pytest.approx(true["turns"][0], abs=TIGHT)
-    assert [event.kind for event in found.events] == ["turn", "turn"]
-    assert found.bars["q"][-1] < TIGHT
-
-
-@pytest.mark.drill
 def test_a_hinge_that_rubs_turns_seven_times_and_rests() -> None:
     """All turns and the place of rest are those of the balance of energy."""
     (true,) = true_values("pendulum_friction")
-    events = motion("pendulum_friction", [0.0, true["at"]]).events
+    events = true_motion("pendulum_friction", [0.0, true["at"]]).events
     assert [event.kind for event in events] == ["turn"] * 7 + ["stick"]
     times = [event.time for event in events]
-    found = motion("pendulum_friction", [0.0, *times])
+    found = true_motion("pendulum_friction", [0.0, *times])
     assert times[-1] == pytest.approx(true["rests"], abs=TIGHT)
     assert found.record.q[1:, 0] == pytest.approx([*true["turns"], true["values"]["q.pivot"]], abs=1e-12)
 
@@ -103,25 +88,16 @@ def test_impacts_of_two_masses_that_accumulate_are_summed() -> None:
 
 def test_rebounds_are_summed_by_the_fastest_impact() -> None:
     """An impact settles against the fastest one at its stop, which need not be the first."""
-    mechanism = load_scene("stop").elements[0].mechanism  # type: ignore[attr-defined]
+    mechanism = mechanism_named("stop")
     tree = ContactTree(ContactDynamics(mechanism), 1e-14, 1.0)
     assert [tree._settles(0, speed, 0.5) for speed in (1.0, 100.0, 1e-4)] == [False, False, True]
-
-
-def test_a_stop_without_restitution_carries_the_weight() -> None:
-    """The mass falls, rests on its stop at once, and the stop pushes with its weight."""
-    found = motion("stop", [0.0, 0.3, 1.0])
-    assert [(event.kind, event.name) for event in found.events] == [("impact", "guide")]
-    assert found.events[0].time == pytest.approx(np.sqrt(2 / 9.81), abs=TIGHT)
-    assert found.record.q[:, 0] == pytest.approx([1.0, 1 - 9.81 * 0.3**2 / 2, 0.0], abs=TIGHT)
-    assert found.record.wrench[2, 0, 2] == pytest.approx(9.81, abs=1e-9)
 
 
 @pytest.mark.drill
 def test_rebounds_come_to_rest_after_infinitely_many() -> None:
     """With e = 0.5 the impacts end after three times the time of the fall, which the last event tells."""
     fall = np.sqrt(2 / 9.81)
-    found = motion("stop", [0.0, 1.2, 2.0], restitution=0.5)
+    found = true_motion("stop", [0.0, 1.2, 2.0], restitution=0.5)
     assert found.events[0].time == pytest.approx(fall, abs=TIGHT)
     assert found.events[1].time == pytest.approx(2 * fall, abs=TIGHT)
     assert found.events[-1].kind == "settle"
@@ -135,7 +111,7 @@ def test_rebounds_come_to_rest_after_infinitely_many() -> None:
 def test_rebounds_on_a_guide_that_rubs_come_to_rest_too() -> None:
     """Friction makes each fall slower than its rise; both routes follow turns that lie 1e-12 m above the stop."""
     e, friction = 0.4, 1.0
-    stop = load_scene("stop", restitution=e).elements[0].mechanism  # type: ignore[attr-defined]
+    stop = mechanism_named("stop", restitution=e)
     found = truth_of(replace(stop, joints=(replace(stop.joints[0], friction=friction),)), np.array([0.0, 0.5, 1.5]))
     rise, fall = 9.81 + friction, 9.81 - friction
     slower, speed = np.sqrt(fall / rise), np.sqrt(2 * fall)
@@ -163,7 +139,7 @@ def test_which_rebound_is_the_last_hangs_on_no_digit(restitution: float, impacts
 @pytest.mark.parametrize(("height", "restitution"), [(0.0, 1.0), (1e-9, 0.5)])
 def test_what_lies_on_a_stop_or_nearly_so_comes_to_rest(height: float, restitution: float) -> None:
     """Rebounds that are round-off do not go on for ever, and nothing is dropped on the stop that it lies on."""
-    stop = load_scene("stop", restitution=restitution).elements[0].mechanism  # type: ignore[attr-defined]
+    stop = mechanism_named("stop", restitution=restitution)
     joint = replace(stop.joints[0], q0=(height,))
     found = truth_of(replace(stop, joints=(joint,)), np.array([0.0, 0.01]))
     assert abs(found.record.q[-1, 0]) <= found.bars["q"][-1]
@@ -198,7 +174,7 @@ def test_a_throw_that_rubs_and_ends_at_its_stop_is_ill_posed(part: float, known:
 @pytest.mark.drill
 def test_a_joint_that_comes_back_to_the_stop_of_its_start_grazes_it() -> None:
     """A pendulum released at its stop returns to it at rest: places known to 1e-12 leave an impact of 1e-6 possible."""
-    free = load_scene("pendulum", angle=0.5).elements[0].mechanism  # type: ignore[attr-defined]
+    free = mechanism_named("pendulum", angle=0.5)
     stopped = replace(free, joints=(replace(free.joints[0], limits=(-0.6, 0.5)),))
     found, back = truth_of(stopped, np.array([0.0, 1.0, 2.5])), truth_of(free, np.array([0.0, 1.0]))
     assert found.events == ()
@@ -208,7 +184,7 @@ def test_a_joint_that_comes_back_to_the_stop_of_its_start_grazes_it() -> None:
 
 def test_a_joint_that_starts_beyond_its_stop_by_rounding_leaves_it_without_an_impact() -> None:
     """A pendulum released a billionth of its range beyond a stop falls as one without stops."""
-    free = load_scene("pendulum", angle=2.8).elements[0].mechanism  # type: ignore[attr-defined]
+    free = mechanism_named("pendulum", angle=2.8)
     beyond = replace(free, joints=(replace(free.joints[0], limits=(-1.2, 2.8 - 3.9e-9)),))
     found, fell = (truth_of(each, np.array([0.0, 0.5])) for each in (beyond, free))
     assert (found.events, found.horizon) == ((), np.inf)
@@ -245,7 +221,7 @@ def test_two_joints_that_feel_each_other_stick_and_slip_alike_in_both_routes() -
 
 def test_a_stop_that_is_never_reached_changes_nothing() -> None:
     """A pendulum between stops that it does not reach has the truth of one without."""
-    free = load_scene("pendulum", angle=0.5).elements[0].mechanism  # type: ignore[attr-defined]
+    free = mechanism_named("pendulum", angle=0.5)
     from dataclasses import replace
 
     held = replace(free, joints=(replace(free.joints[0], limits=(-0.6, 0.6)),))
@@ -362,7 +338,7 @@ def test_friction_that_just_holds_is_ill_posed(scene: str, parameters: dict[str,
     said = set()
     for part in (-1, 0, 1):
         friction = edge * (1 + part * np.finfo(float).eps)
-        mechanism = load_scene(scene, friction=friction, **parameters).elements[0].mechanism  # type: ignore[attr-defined]
+        mechanism = mechanism_named(scene, friction=friction, **parameters)
         found = truth_of(mechanism, np.array([0.0, 0.05]))
         said.add((found.horizon, tuple(found.events)))
     assert said == {(0.0, ())}
@@ -447,7 +423,7 @@ def test_stops_hit_one_after_the_other_are_well_posed() -> None:
 def test_routes_that_agree_by_chance_are_known_to_the_tolerance_of_a_step() -> None:
     """Parabolas that both routes follow to the last digit have a bar of what their steps may be off by."""
     scene = load_scene("stop", height=0.3)
-    units, bars = natural_units(scene.elements[0].mechanism), motion("stop", [0.0, 0.3], height=0.3).bars  # type: ignore[attr-defined]  # it is one
+    units, bars = natural_units(scene.elements[0].mechanism), true_motion("stop", [0.0, 0.3], height=0.3).bars  # type: ignore[attr-defined]  # it is one
     assert bars["q"][-1] >= TOLERANCES[0] * units.length
     assert bars["v"][-1] >= TOLERANCES[0] * units.length / units.time
 
@@ -484,7 +460,7 @@ def test_a_joint_that_passes_or_misses_its_stop_for_certain_is_well_posed(inside
 @pytest.mark.parametrize("apart", [1e-12, 0.0, -1e-12])
 def test_spheres_that_graze_each_other_are_ill_posed(apart: float) -> None:
     """Spheres that pass at the sum of their radii, within what lengths are known to, touch or do not."""
-    found = motion("two_spheres", [0.0, 0.2], passing=0.08 + apart)
+    found = true_motion("two_spheres", [0.0, 0.2], passing=0.08 + apart)
     assert found.horizon == pytest.approx(0.12533, abs=1e-4)
     assert found.events == ()
 

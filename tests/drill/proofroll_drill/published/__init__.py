@@ -66,7 +66,7 @@ def held(scenes: list[str]) -> Iterator[Held]:
     known = dict.fromkeys([*(entry["scene"] for kind in ("truths", "errors") for entry in file[kind]), *peers])
     for name in scenes:
         require_known("scene", name, known, "no number of it was published; choose from")
-    for kind, hold in (("truths", _truths), ("errors", _errors)):
+    for kind, hold in (("truths", of_motion), ("errors", _errors)):
         for entry in file[kind]:
             if not scenes or entry["scene"] in scenes:
                 yield from hold(entry)
@@ -103,15 +103,20 @@ def _motion(scene: str, times: tuple[float, ...], parameters: tuple[tuple[str, f
 
 
 def true_values(scene: str) -> list[dict[str, Any]]:
-    """Entries of a scene's true motions; the tests hold them at their own tolerances."""
+    """Entries of a scene's true motions; tests of engines hold them at their own tolerances."""
+    return [entry for entry in true_motions() if entry["scene"] == scene]
+
+
+def true_motions() -> list[dict[str, Any]]:
+    """All entries of true motions."""
     entries: list[dict[str, Any]] = tomllib.loads(FILE.read_text(encoding="utf-8"))["truths"]
-    return [entry for entry in entries if entry["scene"] == scene]
+    return entries
 
 
-def _truths(entry: Mapping[str, Any]) -> Iterator[Held]:
+def of_motion(entry: Mapping[str, Any]) -> Iterator[Held]:
+    """Each number of a true motion beside ours."""
     name, at = entry["scene"], entry["at"]
-    scene = load_scene(name, **entry.get("parameters", {}))
-    found = simulate(scene, "truth", until=at, every=at / 2)
+    found = run_of(entry)
     for variable, published in entry.get("values", {}).items():
         values = np.ravel(found[variable].to_numpy()[-1])
         for place, one in enumerate(np.atleast_1d(published)):
@@ -125,6 +130,12 @@ def _truths(entry: Mapping[str, Any]) -> Iterator[Held]:
         yield _value(name, f"event {number} [s]", time, times[number - 1] if number <= len(times) else np.nan)
     if "rests" in entry:
         yield _value(name, "rest [s]", entry["rests"], times[-1])
+
+
+def run_of(entry: Mapping[str, Any]) -> xr.Dataset:
+    """Truth at the start, half-way and at the end of a true motion."""
+    at, parameters = float(entry["at"]), tuple(sorted(entry.get("parameters", {}).items()))
+    return _motion(entry["scene"], (at / 2, at), parameters)
 
 
 def _value(scene: str, what: str, published: float, ours: float) -> Held:

@@ -21,14 +21,6 @@ KINDS: tuple[JointKind, ...] = (
     JointKind.FREE,
     JointKind.CYLINDRICAL,
 )
-CLOSING = (
-    JointKind.REVOLUTE,
-    JointKind.PRISMATIC,
-    JointKind.CYLINDRICAL,
-    JointKind.UNIVERSAL,
-    JointKind.SPHERICAL,
-    JointKind.PLANAR,
-)
 STYLES = ("tree", "loop", "planar tree", "planar loop")
 _CLEAR = 0.05  # least relative singular value of a loop's rows: what is nearer to a singular pose may well be refused
 

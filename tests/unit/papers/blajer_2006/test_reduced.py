@@ -8,8 +8,7 @@ import pytest
 from proofroll.conformance.subject import scenes
 from proofroll.core import heyoka_library as library
 from proofroll.core.engine_abilities import Level, TellsLevels
-from proofroll.core.errors import Diverged, InputError, Missing, Refused
-from proofroll.core.plugins import resolve_settings
+from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
@@ -75,22 +74,6 @@ def test_taylor_without_heyoka_is_refused_in_one_line(monkeypatch: pytest.Monkey
         build(SCENES["cylinder"], TAYLOR)
     assert "heyoka" not in Reduced.version()
     build(SCENES["cylinder"], "reduced").advance(0.1)
-
-
-@pytest.mark.parametrize(
-    ("options", "field"),
-    [
-        ({"formulation": "closed_form", "rtol": 1e-6}, "rtol"),
-        ({"formulation": "closed_form", "integrator": "dop853"}, "integrator"),
-        ({"rtol": 1e-15}, "rtol"),
-        ({"integrator": "taylor", "rtol": 1e-17}, "rtol"),
-        ({"integrator": None}, "integrator"),
-    ],
-)
-def test_settings_without_effect_are_refused(options: dict[str, object], field: str) -> None:
-    """A setting that would do nothing, or cannot be kept, is an error that names it."""
-    with pytest.raises(InputError, match=f"reduced: {field}"):
-        resolve_settings(Reduced, options)
 
 
 def test_levels_and_terms() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import Force, Mechanism, Spring
@@ -14,7 +15,6 @@ from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.elements.mechanism.scene.spring_law import SpringLaw
-from proofroll.files.scene_file import load_scene
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
@@ -33,7 +33,7 @@ SCENES = ("sled", "eccentric_sphere", "falling_rod", "rattleback", "tilted_disc"
 
 def routes(scene: str) -> list[ContactStretches]:
     """Both routes of a scene, in natural units."""
-    return routes_of(load_scene(scene).elements[0].mechanism)  # type: ignore[attr-defined]
+    return routes_of(mechanism_named(scene))
 
 
 def routes_of(si: Mechanism) -> list[ContactStretches]:
@@ -89,7 +89,7 @@ def test_compiled_values_of_a_slip_that_leads_are_those_of_the_route(number: int
 def test_a_falling_rod_slips_when_it_does_without_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
     """A rod slips at the same time and place either way, and each route names the integrator that it used."""
     pytest.importorskip("heyoka")
-    mechanism = load_scene("falling_rod").elements[0].mechanism  # type: ignore[attr-defined]
+    mechanism = mechanism_named("falling_rod")
     compiled = truth_of(mechanism, np.array([0.0, 0.3, 0.6]))
     assert [route.split(", ")[1] for route in compiled.routes] == ["collocation", "Taylor series"]
     monkeypatch.setattr(contact_taylor, "heyoka", None)
@@ -107,7 +107,7 @@ def test_a_sweep_compiles_once() -> None:
     pytest.importorskip("heyoka")
     ends, counts = [], []
     for friction in (0.31, 0.33, 0.35):
-        mechanism = load_scene("falling_rod", friction=friction).elements[0].mechanism  # type: ignore[attr-defined]
+        mechanism = mechanism_named("falling_rod", friction=friction)
         ends.append(float(truth_of(mechanism, np.array([0.0, 0.7])).record.p_WB[-1, 0, 0]))
         counts.append(len(compiled_once._MODES))
     assert counts[0] == counts[1] == counts[2]
@@ -116,7 +116,7 @@ def test_a_sweep_compiles_once() -> None:
 
 def driven_turntable(target: Any, torque: Any) -> Mechanism:
     """A ball on a turntable with a motor, a drive and applied forces, held by a spring off its centre."""
-    m = load_scene("free_turntable").elements[0].mechanism  # type: ignore[attr-defined]
+    m = mechanism_named("free_turntable")
     motor = Actuator("motor", "axle", "position", target=target, kp=0.3, kd=0.01, gear=2.0)
     ends = ("world", "ball", (0.5, 0.1, 0.4), (0.01, 0.0, 0.03))
     spring = Spring("band", *ends, stiffness=0.7, damping=0.1, length=0.1, force=SpringLaw("0.2*L^3 + 0.1*dL"))
@@ -166,7 +166,7 @@ def test_another_table_compiles_nothing_anew() -> None:
 def test_stops_and_dry_friction_of_joints_are_compiled(law: dict[str, Any]) -> None:
     """Laws of a joint beside a contact of bodies are rows of both routes' compiled modes, and guards of them."""
     pytest.importorskip("heyoka")
-    m = load_scene("free_turntable").elements[0].mechanism  # type: ignore[attr-defined]
+    m = mechanism_named("free_turntable")
     for route in routes_of(replace(m, joints=(replace(m.joints[0], **law), *m.joints[1:]))):
         begun = route.begin()
         assert begun.mode is not None
@@ -183,7 +183,7 @@ def test_stops_and_dry_friction_of_joints_are_compiled(law: dict[str, Any]) -> N
 def test_an_effort_at_its_limit_is_compiled() -> None:
     """A motor reaches its limit and comes back: both routes stay compiled, with the limit as a guard."""
     pytest.importorskip("heyoka")
-    found = truth_of(load_scene("flick").elements[0].mechanism, np.array([0.0, 0.08]))  # type: ignore[attr-defined]
+    found = truth_of(mechanism_named("flick"), np.array([0.0, 0.08]))
     assert [route.split(", ")[1] for route in found.routes] == ["collocation", "Taylor series"]
     assert [(event.kind, event.name) for event in found.events] == [("slip", "push")]
     assert found.events[0].time == pytest.approx(0.060258231738, abs=1e-11)
@@ -193,9 +193,9 @@ def test_a_load_that_contacts_share_compiles_nothing(monkeypatch: pytest.MonkeyP
     """A box that slides on its four corners has no compiled mode: it takes seconds for many contacts."""
     compiled: list[object] = []
     monkeypatch.setattr(contact_taylor.CompiledModes, "of", lambda *given: compiled.append(given))
-    four = [replace(load_scene("sled").elements[0].mechanism.geometries[1], name=f"foot{k}", position=(x, y, -0.08))  # type: ignore[attr-defined]
+    four = [replace(mechanism_named("sled").geometries[1], name=f"foot{k}", position=(x, y, -0.08))
             for k, (x, y) in enumerate([(0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1)])]  # fmt: skip
-    sled = load_scene("sled", spin=0.0).elements[0].mechanism  # type: ignore[attr-defined]
+    sled = mechanism_named("sled", spin=0.0)
     pairs = [replace(sled.pairs[0], name=each.name, geometries=(each.name, "floor")) for each in four]
     truth_of(replace(sled, geometries=(sled.geometries[0], *four), pairs=tuple(pairs)), np.array([0.0, 0.01]))
     assert not compiled
@@ -210,7 +210,7 @@ def test_a_slip_lands_on_the_end_of_its_stretch_but_for_round_off(monkeypatch: p
         return np.nextafter(found, start) if len(times) == 1 else found
 
     monkeypatch.setattr(contact_taylor.CompiledMode, "_places", places)
-    sled = load_scene("sled").elements[0].mechanism  # type: ignore[attr-defined]
+    sled = mechanism_named("sled")
     assert not any("DOP853" in route for route in truth_of(sled, np.array([0.0, 0.05])).routes)
 
 
@@ -222,6 +222,6 @@ def test_a_route_names_the_compiled_integrator_that_failed(monkeypatch: pytest.M
         raise Diverged("its steps became too short")
 
     monkeypatch.setattr(contact_taylor.CompiledMode, "walk", fails)
-    mechanism = load_scene("falling_rod").elements[0].mechanism  # type: ignore[attr-defined]
+    mechanism = mechanism_named("falling_rod")
     names = [route.split(", ")[1] for route in truth_of(mechanism, np.array([0.0, 0.1])).routes]
     assert names == ["DOP853 where collocation failed", "DOP853 where Taylor series failed"]

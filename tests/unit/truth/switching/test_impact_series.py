@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 from scipy.integrate import quad
 
 from proofroll.core.errors import NotUnique
@@ -13,7 +14,6 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contact.sequences import Outcomes, refuse_spread
 from proofroll.elements.mechanism.dynamics import switches
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
-from proofroll.files.scene_file import load_scene
 from proofroll.truth.laws import impacts
 from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.switching.impact_series import GeometricSeries, Impact, ImpactSeries
@@ -55,7 +55,7 @@ def _angle(high: float, slope: float) -> float:
 @pytest.mark.drill
 def test_a_block_rocks_to_its_rest() -> None:
     """Infinitely many impacts of both corners in turn end when their geometric series says."""
-    block = load_scene("rocking_block").elements[0].mechanism  # type: ignore[attr-defined]
+    block = mechanism_named("rocking_block")
     times, rests = housner(0.1, 0.25, 0.15)
     found = truth_of(block, np.array([0.0, 1.0, 1.6]))
     assert (found.ended, found.horizon) == ("", np.inf)
@@ -151,7 +151,7 @@ def test_a_series_of_impacts_is_summed_when_speeds_and_intervals_shrink_alike() 
 @pytest.mark.drill
 def test_the_error_of_impacts_cut_short_is_within_the_bars(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the sum of a series begins changes the motion of a rocking block within its bars."""
-    block = load_scene("rocking_block").elements[0].mechanism  # type: ignore[attr-defined]
+    block = mechanism_named("rocking_block")
     monkeypatch.setattr(switches, "SETTLED", 1e-3)
     monkeypatch.setattr(impacts, "_SETTLED", 1e-3)  # the law check knows the cut by its own number
     rough = truth_of(block, np.array([0.0, 1.6]))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
@@ -164,7 +165,7 @@ def test_a_convex_cone_at_an_impact_is_not_called_restitution() -> None:
 
 def test_a_model_that_leaves_an_impact_open_fits_none() -> None:
     """A rod whose friction is ten times the scene's tears at the floor; the scene's own law has a finite residual."""
-    mechanism = load_scene("painleve_rod", friction=0.2).elements[0].mechanism
+    mechanism = mechanism_named("painleve_rod", friction=0.2)
     (joint,) = mechanism.joints
     struck = [impacts._Struck(0, np.array(joint.q0), np.array([-10.0, 1.0, 0.0]), np.zeros(3), np.eye(3))]
     assert np.all(np.isfinite(impacts._missed(mechanism, struck)))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.run.optional_terms import optional_terms
-from proofroll.files.scene_file import load_scene
 
 JOINTS, CONTACTS = "dry friction of joints", "friction of contacts"
 
@@ -24,7 +24,7 @@ def test_a_parameter_belongs_to_the_law_that_has_its_value(
     parameters: dict[str, float], taken: dict[str, dict[str, float]]
 ) -> None:
     """Where joints and contacts rub, a parameter is left out of those alone which have its number."""
-    flick = load_scene("flick").elements[0].mechanism  # type: ignore[attr-defined]
+    flick = mechanism_named("flick")
     assert isinstance(flick, Mechanism)
     knuckle, *others = flick.joints
     pairs = tuple(replace(pair, friction=0.3) for pair in flick.pairs)

@@ -2,10 +2,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.dynamics.analysis import analyse
-from proofroll.files.scene_file import load_scene
 
 LENGTH = 'unit = "m"\nsource = "this test"'
 MASS = 'unit = "kg"\nsource = "this test"'
@@ -84,7 +84,7 @@ def read(tmp_path: Path):
 
     def mechanism(text=SLIDER_CRANK, **given):
         (tmp_path / "scene.toml").write_text(f'title = "a mechanism"\nsource = "this test"\n{text}')
-        return load_scene(str(tmp_path), **given).elements[0].mechanism
+        return mechanism_named(str(tmp_path), **given)
 
     return mechanism
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
@@ -48,7 +49,7 @@ child = "c"
 def mechanism(tmp_path: Path, more: str) -> Mechanism:
     """The mechanism of a scene with two joints and this besides."""
     (tmp_path / "scene.toml").write_text(PLAIN + more)
-    return load_scene(str(tmp_path)).elements[0].mechanism  # type: ignore[attr-defined,no-any-return]
+    return mechanism_named(str(tmp_path))  # type: ignore[attr-defined,no-any-return]
 
 
 def slider(**more: object) -> Mechanism:
@@ -282,7 +283,7 @@ def test_a_coupled_joint_takes_its_start_from_the_other(tmp_path: Path) -> None:
     more = PLAIN.replace('child = "c"', 'child = "c"\ndependent = true').replace('child = "b"', 'child = "b"\nv0 = 2.0')
     coupling = '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = 3\noffset = 0.5'
     (tmp_path / "scene.toml").write_text(more + coupling)
-    made = load_scene(str(tmp_path)).elements[0].mechanism  # type: ignore[attr-defined]
+    made = mechanism_named(str(tmp_path))
     q, v = made.start()
     assert q == pytest.approx([0.0, 0.5])
     assert v == pytest.approx([2.0, 6.0])
@@ -294,7 +295,7 @@ def test_a_scene_whose_forces_are_not_determinate_can_be_read(tmp_path: Path) ->
     """Friction in both joints of a coupling is no mistake of a file: what cannot be solved is refused by who solves."""
     text = PLAIN.replace('child = "b"', 'child = "b"\nfriction = 1').replace('child = "c"', 'child = "c"\nfriction = 1')
     (tmp_path / "scene.toml").write_text(text + '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = 1')
-    made = load_scene(str(tmp_path)).elements[0].mechanism  # type: ignore[attr-defined]
+    made = mechanism_named(str(tmp_path))
     with pytest.raises(Refused, match="keep the friction or the stop of one of them"):
         JointCoordinates(made).solve(*made.start())
 

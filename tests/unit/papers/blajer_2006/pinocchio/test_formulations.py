@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import numpy as np
 import pytest
-from placed_balls import compared, placed, scene_with
+from placed_balls import compared, leaning_cylinder, placed, scene_with
 from true_runs import true_run
 
 from proofroll.core.certificate import Standing, certify
-from proofroll.core.errors import Diverged, InputError
-from proofroll.core.gravity import Gravity
+from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
@@ -26,13 +24,6 @@ RESISTANCE = 5e-4  # 0.02 a, the paper's value
 def cylinder(**parameters: float) -> Scene:
     """The paper's case, with some parameters set."""
     return load_scene("sphere_in_cylinder", **parameters)
-
-
-def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
-    """The cylinder with its axis, and gravity along it, leaning by ``tilt`` [rad]."""
-    scene = load_scene("sphere_in_cylinder", **parameters)
-    gravity = Gravity(9.81, (-math.sin(tilt), 0.0, -math.cos(tilt)))
-    return scene_with(scene, surface=dataclasses.replace(placed(scene).surface, tilt=tilt), gravity=gravity)
 
 
 SCENES = {
@@ -124,49 +115,10 @@ def test_orientation_is_absent_where_it_is_not_integrated() -> None:
         assert "q_WB" not in simulate(cylinder(), f"pinocchio[{options}]", until=0.01)
 
 
-def test_samples_keep_their_values() -> None:
-    """A sample is a copy: later steps do not change it."""
-    engine = build(cylinder(), "pinocchio")
-    sample = engine.sample()
-    before = sample.p_WB.copy(), sample.w_WB.copy()
-    engine.advance(0.01)
-    np.testing.assert_array_equal((sample.p_WB, sample.w_WB), before)
-
-
 def test_accuracy_does_not_depend_on_sampling() -> None:
     """Samples further apart than the steps, or closer, are as accurate: each is the end of a step."""
     for until, every in ((1.0, 1.0), (0.1, 1e-3)):
         assert largest_errors(cylinder(), "pinocchio[preset=tuned]", until=until, every=every)["z"] < 5e-13
-
-
-@pytest.mark.parametrize(
-    ("options", "field", "advice"),
-    [
-        ("dt=1e-3", "dt", "preset=default"),
-        ("preset=default,rtol=1e-8", "rtol", "fixed step"),
-        ("preset=default,integrator=dop853", "dt", "set rtol"),
-        ("integrator=rk4", "rtol", "preset=default"),
-        ("rtol=1e-16", "rtol", "greater than or equal"),
-        ("preset=default,dt=0", "dt", "greater than 0"),
-        ("preset=default,dt=0.003", "dt", "no whole number of steps"),
-        ("formulation=rigid", "formulation", "composite"),
-        ("integrator=euler", "integrator", "'rk4'"),
-        ("preset=default,integrator=midpoint", "integrator", "only impulses"),
-        ("formulation=impulses,projection=true", "projection", "leave it out"),
-        ("formulation=impulses,solver=newton", "solver", "'admm'"),
-        ("formulation=impulses,solver_tolerance=0", "solver_tolerance", "greater than 0"),
-        ("solver=pgs", "solver", "formulation=impulses"),
-        ("formulation=composite,solver=admm", "solver", "no contact solver; leave it out"),
-        ("preset=default,solver_tolerance=1e-6", "solver_tolerance", "leave it out"),
-    ],
-)
-def test_wrong_settings_give_one_line(options: str, field: str, advice: str) -> None:
-    """A setting that makes no sense is answered with one line: which, and what to do."""
-    with pytest.raises(InputError) as caught:
-        simulate(cylinder(), f"pinocchio[{options}]", until=0.01)
-    assert field in caught.value.field
-    assert advice in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_singular_rows_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -181,16 +133,6 @@ def test_singular_rows_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(np.linalg, "solve", singular)
     with pytest.raises(Diverged, match="singular"):
         engine.advance(0.01)
-
-
-def test_summary_is_one_sentence() -> None:
-    """What is shown of the engine says what it is, in one line."""
-    from proofroll.engines.pinocchio import Pinocchio
-
-    first, *rest = (Pinocchio.__doc__ or "").splitlines()
-    assert rest == []
-    assert "Pinocchio" in first
-    assert first.endswith(".")
 
 
 def test_resistance_is_read_at_rest() -> None:

@@ -126,29 +126,3 @@ def test_dense_samples_do_not_shrink_the_adaptive_step():
     engine.advance(0.1 + 1e-9)
     assert solver.h_abs >= wanted
     assert solver.nfev - evaluations < 20
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"dt": "1e-4"}, "projection: dt = 0.0001: dop853 chooses its own steps; set rtol, or add integrator=rk4"),
-        ({"preset": "default", "rtol": "1e-9"}, "rk4 has a fixed step; set dt, or add integrator=dop853"),
-        ({"rtol": "1e-16"}, "double precision allows no less than 2.22e-14"),
-        ({"integrator": "rk4", "dt": "0"}, "projection: dt"),
-        ({"integrator": "euler"}, "projection: integrator"),
-        ({"preset": "best"}, "euler has default, matched, tuned"),
-    ],
-)
-def test_wrong_settings_give_one_clear_line(options, message):
-    """A setting that is wrong, or would be ignored, is refused in one line that says what to do."""
-    with pytest.raises(InputError) as caught:
-        resolve_settings(Projection, options)
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-def test_step_that_does_not_divide_the_interval():
-    """A fixed step that cannot reach the asked time is refused."""
-    engine = build(load("sphere_in_cylinder"), CLASSICAL[0], dt=3e-3)
-    with pytest.raises(InputError, match="dt"):
-        engine.advance(0.01)

@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.errors import InputError
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.run.reader import made_mechanism
-from proofroll.files.scene_file import load_scene
 
 PLANE = {"name": "floor", "body": "world", "kind": "plane"}
 BALL = {"name": "ball", "body": "b", "kind": "sphere", "radius": 0.1}
@@ -168,7 +168,7 @@ def test_a_box_touches_with_its_vertices() -> None:
 
 def test_contact_is_asked_of_a_formulation() -> None:
     """A sled asks for contact and its friction; a pair with restitution for rebounds too."""
-    sled = load_scene("sled").elements[0].mechanism  # type: ignore[attr-defined]
+    sled = mechanism_named("sled")
     assert required(sled) == {
         MechanismCapability.FREE,
         MechanismCapability.CONTACT,
