@@ -24,6 +24,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Geometr
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.plots import point_curves
+from proofroll.report.kinds import group_of
 from proofroll.report.page.growing import begun
 from proofroll.report.replay.records import Replayed
 from proofroll.running.runner import Runner
@@ -216,3 +217,10 @@ def test_nothing_is_replayed_of_a_motion_that_is_not_unique() -> None:
     true = truth(scene, np.linspace(0.0, 0.01, 3))
     with pytest.raises(Refused, match="no true motion is known"):
         draw_mechanism(Replayed(scene, true, Path("none"), [], "rod", "as it is"))
+
+
+def test_balls_on_surfaces_are_kinds_of_their_own() -> None:
+    """A lone ball that keeps touching rolls or slips, by its friction; one that flies, or is no ball, is a contact."""
+    scenes = {name: group_of(load_scene(name)) for name in ("inclined_plane", "slide_to_roll", "bouncing_ball", "sled")}
+    assert list(scenes.values()) == ["ball rolling", "ball slipping", "contact", "contact"]
+    assert group_of(load_scene("inclined_plane", mu_static=0.1)) == "ball slipping"

@@ -88,15 +88,17 @@ def mechanism_drawing(element: MechanismElement) -> Drawing:
 
 
 def _reach(element: MechanismElement) -> float:
-    """Length of the mechanism, or of its longest shape if that is longer [m]."""
-    shapes = [shape for contact in element.mechanism.contacts for shape in (contact.shape_a, contact.shape_b)]
+    """Length of the mechanism, of its longest shape, or half of the widest gap if that is longer [m]."""
+    mechanism = element.mechanism
+    gaps = [0.5 * touch.gap for touch in touches(mechanism, Tree(mechanism).at(*mechanism.start()))]
+    shapes = [shape for contact in mechanism.contacts for shape in (contact.shape_a, contact.shape_b)]
     sizes = [
         float(np.linalg.norm(shape.support(axis)[0] - shape.support(-axis)[0]))
         for shape in shapes
         if not isinstance(shape, Wall)
         for axis in np.eye(3)
     ]
-    return max([element.length, *sizes])
+    return max([element.length, *sizes, *gaps])
 
 
 def _shapes(picture: Drawing, view: View, element: MechanismElement) -> None:

@@ -37,6 +37,8 @@ class MechanismReport(ReportKind):
 
     replay_script: ClassVar[str] = "replay_mechanism.js"
     groups: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "ball rolling": ("Rolling balls", "a ball rolls without slip on a surface"),
+        "ball slipping": ("Slipping balls", "a ball sticks and slips on a surface, and may fall: bounded friction"),
         "contact": ("Contact", "bodies that touch, slide and hit each other"),
         "joint laws": ("Joint laws", "joints with friction, stops, couplings or limits of a drive"),
         "loops": ("Closed loops", "joints that close rings, with redundant constraints"),
@@ -56,8 +58,11 @@ class MechanismReport(ReportKind):
 
     @staticmethod
     def group(scene: Scene) -> str:
-        """Group of its hardest part: contact, switching joint laws, loops, springs and drives; else trees."""
-        needs = the_mechanism(scene).requires
+        """Group of its hardest part: ball on a surface, contact, joint laws, loops, springs and drives; else trees."""
+        element = the_mechanism(scene)
+        needs, ball = element.requires, element.on_wall
+        if ball is not None and not ball.flies:
+            return "ball slipping" if np.isfinite(ball.contact.mu_static) else "ball rolling"
         if needs & _CONTACTS:
             return "contact"
         if needs & _LAWS:

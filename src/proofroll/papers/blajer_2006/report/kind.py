@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.report.kind import MechanismReport
 from proofroll.papers.blajer_2006.ball.as_body import ball_of, rolling_ball
-from proofroll.papers.blajer_2006.ball.element import EvenRolling
 from proofroll.papers.blajer_2006.report import onsets
 from proofroll.report.kinds import ReportKind
 
@@ -22,10 +22,6 @@ class BallReport(ReportKind):
     template: ClassVar[str] = "slips.html"
     names: ClassVar[Mapping[str, Any]] = {"onsets": onsets}
     replay_script: ClassVar[str] = "replay_ball.js"
-    groups: ClassVar[Mapping[str, tuple[str, str]]] = {
-        "ball rolling": ("Rolling balls", "a ball rolls without slip on a wall"),
-        "ball slipping": ("Slipping balls", "a ball sticks, slips and may fall: bounded friction"),
-    }
     caption: ClassVar[str] = (
         "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e₁ into the wall, e₂ "
         "and e₃ along its coordinates. N, F₂, F₃ are drawn as forces on the ball, in their positive sense."
@@ -37,11 +33,7 @@ class BallReport(ReportKind):
         (element,) = scene.elements if len(scene.elements) == 1 else (None,)
         return element is not None and ball_of(element) is not None
 
-    @staticmethod
-    def group(scene: Scene) -> str:
-        """Group of the ball's contact with the wall: slipping or rolling."""
-        (element,) = scene.elements
-        return "ball rolling" if isinstance(element, EvenRolling) else "ball slipping"
+    group = staticmethod(MechanismReport.group)
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
