@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,6 +57,10 @@ def test_forces_and_engines_of_several_scenes(proofroll: Proofroll, report: Path
     assert code == 0
     assert "Tolerance: 1e-3 of the path, with forces." in out
     assert "alpha joints, tuned, dt 1e-3 s" in " ".join(out.split())
+    assert proofroll("recommend", "arm", "--forces", *given[:-1], "1e-3")[1] == out, "a bare number is a part"
+    (lines,) = (line.split(maxsplit=1)[1] for line in out.splitlines() if line.endswith("--lines"))
+    assert "--forces" in lines
+    assert "alpha" in proofroll(*shlex.split(lines), *given[:2])[2], "the command that is told names the same choice"
     code, out, _ = proofroll("recommend", "arm", "ball", "--engine", "alpha", *given)
     assert code == 1
     assert "nothing holds it for ball" in " ".join(out.split())
@@ -112,7 +117,7 @@ def test_without_a_report_no_option_is_blamed_that_was_not_given(proofroll: Proo
         (["arm", "--lines"], "alpha"),
         (["arm", "ball", "--engine", "nobody"], "nobody"),
         (["arm", "ball", "--tolerance", "1 kg"], "its unit is m"),
-        (["arm", "ball", "--forces"], "motion and forces have different units; give a part"),
+        (["arm", "ball", "--forces", "--tolerance", "1 mm"], "motion and forces have different units; give a part"),
         (["arm", "--report", "nowhere.json"], "proofroll report writes one"),
     ],
 )

@@ -236,7 +236,7 @@ def _from_report(
         studies |= {line.study: ChoiceStudy(line.study, "") for line in of_name}
     lines = [line for line in lines if line.study in studies]
     unit = _unit_of(lines)
-    bound = _tolerance(tolerance, unit) if tolerance else Tolerance(FIRST_TOLERANCE, True)
+    bound = _tolerance(tolerance, unit, bare_is_part=forces) if tolerance else Tolerance(FIRST_TOLERANCE, True)
     if not bound.relative:
         if forces:
             advice_of_parts = "motion and forces have different units; give a part, as '0.01 %' or '1e-4 of path'"
@@ -298,14 +298,19 @@ def _engine_costs(matrix: ChoiceMatrix, tolerance: float, *, forces: bool) -> li
     return costs
 
 
-def _tolerance(text: str, unit: str) -> Tolerance:
-    """Tolerance of the option. Raises InputError for another form or unit, ProofrollError if there is none."""
+def _tolerance(text: str, unit: str, *, bare_is_part: bool = False) -> Tolerance:
+    """Tolerance of the option; ``bare_is_part``: a number without a unit is a part of the path.
+
+    Raises:
+        InputError: it has another form or unit.
+        ProofrollError: there is none.
+    """
     from proofroll.core.comparison import Tolerance
 
     if not text:
         words = "give the largest error that you can bear, e.g. --tolerance 1e-3, or --tolerance '1 %' of the scale"
         raise ProofrollError(f"--tolerance is missing: {words}")
-    part = _OF_PATH.fullmatch(text)
+    part = _OF_PATH.fullmatch(text) or (_OF_PATH.fullmatch(f"{text} of path") if bare_is_part else None)
     return Tolerance.of_quantity("tolerance", f"{100 * float(part[1]):.17g} %" if part else text, unit)
 
 

@@ -55,11 +55,10 @@ def advice_lines(
     if len(scenes) == 1:
         (item,), name = scenes, scenes[0].column.name
         yield from (*take_lines(item, tolerance, shown), "", *setting_lines(of_scene[name]), "")
-        is_open = (
-            "Lead open: an engine that holds it ran no coarser step. To settle it" if lead_open(item) else "Finer steps"
-        )
-        yield f"{is_open}, and lines for your model (--lines):"
-        yield f"  proofroll recommend {name} --tolerance '{tolerance}' --measure"
+        command = f"  proofroll recommend {name} --tolerance '{tolerance}'"
+        yield from ("Lines for your model:", f"{command}{' --forces' if item.asked.forces else ''} --lines")
+        yield "Lead open: an engine that holds it ran no coarser step:" if lead_open(item) else "Finer steps:"
+        yield f"{command} --measure"
         return
     yield from (*kind_sentences(columns), "", *scene_lines(columns))
     for item in columns:
@@ -68,7 +67,7 @@ def advice_lines(
     for name, lines in of_scene.items() if every_setting else ():
         yield from ("", name, *setting_lines(lines))
     yield from ("", over_all) if len(columns) - len(scenes) > 1 else ()
-    yield from ("", shown)
+    yield from ("", shown, "One scene by name: its next settings, and with --lines the lines for your model.")
 
 
 def _shown_over(durations: Mapping[str, float]) -> str:

@@ -21,7 +21,6 @@ from proofroll.report.comparison.records import (
 )
 from proofroll.report.comparison.scores import furthest_off
 from proofroll.report.comparison.spread import ALONE, Spread
-from proofroll.report.comparison.tables import COMPILES
 from proofroll.report.labels import SYMBOLS, engine_title, omitted_lines, row_words, symbol, unit, unjudged
 from proofroll.report.page.choice_cell import speed
 from proofroll.report.terminal.screen import WIDTH, numeric, plain_table, unbroken
@@ -31,6 +30,7 @@ from proofroll.studies.comparison.outcome import SEVERITY
 _SETTING, _ERROR, _SPEED = 42, 27, 9  # characters of the columns behind the sign
 _INDENT = 4
 _WIDEST = 8  # largest number of spreads that are listed
+_COMPILES = 10.0  # s before the first step, beyond which the time is told; to compile equations takes one or two
 _PREFIXES = {-3: "m", -6: "µ", -9: "n"}
 _HOLDS = (Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE)
 STYLES = {
@@ -217,7 +217,7 @@ def row_lines(
         notes += [_judged(item) for item in row.observables.values()]
         notes += [remark for remark in row.remarks if remark != row.shared]
     build = max((run.build_seconds or 0.0 for run in runs), default=0.0)
-    notes += [f"{number(build)} s before its first step"] if build > COMPILES else []
+    notes += [f"{number(build)} s before its first step"] if build > _COMPILES else []
     for note in filter(None, notes):
         yield indented(note)
 
