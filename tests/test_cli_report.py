@@ -243,7 +243,7 @@ def test_a_page_after_the_first_comparison(
     assert content["awaited"] == []
     assert [run["parameters"] for run in content["comparisons"][0]["runs"]] == [{"speed": 4.0}]
     assert content["left_out"] == ["balls/third"]
-    assert "<summary>Comparisons that this report leaves out: 1</summary>" in first
+    assert "<dt>Left out</dt><dd><details><summary>1 comparison</summary>" in first
     assert "Their names: <code>balls/third</code>." in whole(first)
     assert "left out: 1 (balls 1). proofroll report --budget 3600 runs all" in " ".join(said.split())
 

@@ -175,7 +175,7 @@ def test_facts_stand_above_the_cards(two_kinds: Path, everything: Any, visit: Vi
         assert told[0].startswith(f"{2 * kept.verdicts['agrees']} of {2 * total} settings agree")
         assert told[1].startswith(f"{2 * kept.silent} are wrong without a warning. Worst: {kept.worst}")
         assert told[2].startswith(f"{kept.passed} of {kept.boundaries} limits of stability")
-        assert told[3].startswith(statements)
+        assert told[3].startswith(statements.replace("statements", "statements of the paper"))
         assert facts.locator("a").get_attribute("href") == f"#{section}"
         ends = "['#facts', '#answer-cards'].map((name) => document.querySelector(name).getBoundingClientRect().top)"
         above, below = seen.page.evaluate(ends)

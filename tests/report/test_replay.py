@@ -189,7 +189,7 @@ def test_numbers_survive_being_packed() -> None:
 def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) -> None:
     """One ghost of each engine is shown at first: the default one where there is one; the numbers fill what is said."""
     content = plain(replay_content([made[0]], BallReport.replay()))
-    assert [case["label"] for case in content["cases"]] == ["speed=3", "speed=4"]
+    assert [case["label"] for case in content["cases"]] == ["speed 3", "speed 4"]
     assert content["start"] == 1, "the scene as its file has it"
     for case, numbers in zip(content["cases"], content["packed"], strict=True):
         names = {ball["name"]: ball["shown"] for ball in case["runs"]}

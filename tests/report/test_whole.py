@@ -87,10 +87,10 @@ def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
         "sec-profile",
         "use",
         "verdicts",
+        "evidence-invented",
         "chapter-sphere_in_cylinder",
         "study-tradeoff",
         "study-stability",
-        "evidence-invented",
         "made",
     ]
     assert "1 of 2 boundaries are passed in silence" in elements.text

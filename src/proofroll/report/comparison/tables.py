@@ -14,8 +14,6 @@ from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import bound_words, names, symbol
 from proofroll.running.timing import Interval
 
-COMPILES = 10.0  # s before the first step, beyond which the time is listed; to compile equations takes one or two
-
 
 def observables(content: ReportedComparison) -> dict[str, str]:
     """Judged observables with their units; observables of the row that has most come first."""

@@ -110,7 +110,7 @@ class ColumnAnswer:
     def failures(self) -> list[ChoiceCell]:
         """Cells of settings that fail, one per formulation; ``name`` for a reader, ``why`` in at most twelve words.
 
-        Where another setting of the formulation holds the tolerance, only a failing default has an entry.
+        Where another setting of the formulation holds it, only a failing default has an entry, whose ``text`` is !.
         """
         entries: list[tuple[int, float, ChoiceCell, str]] = []
         for row in self.matrix.rows:
@@ -118,7 +118,8 @@ class ColumnAnswer:
                 continue
             for study in self.column.studies:
                 asked = (study, self.asked.tolerance, self.asked.forces)
-                if row.setting != "default" and self.matrix.held(row.engine, row.formulation, *asked):
+                mended = self.matrix.held(row.engine, row.formulation, *asked)
+                if row.setting != "default" and mended:
                     continue
                 for number_of_row, (expected, short) in self.matrix.studies[study].short.items():
                     steps = [item for item in row.found.get(study, ()) if item.row == number_of_row]
@@ -128,7 +129,8 @@ class ColumnAnswer:
                     if cell.state == Verdict.REFUSED and Verdict.REFUSED not in expected:
                         continue  # the text is about other points
                     sizes = [size for item in steps if (size := item.tolerance(self.asked.forces)) is not None]
-                    failure = cell._replace(name=f"{take_words(self.matrix, row)} {row.setting}", why=short)
+                    name, sign = f"{take_words(self.matrix, row)}, {row.setting}", "!" if mended else ""
+                    failure = cell._replace(name=name, why=short, text=sign)
                     place = _STATES.index(cell.state) if cell.state in _STATES else len(_STATES)
                     entries.append((place, -min(sizes, default=0.0), failure, row.name))
         entries.sort(key=lambda item: item[:2])

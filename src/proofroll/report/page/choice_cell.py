@@ -20,7 +20,7 @@ ORDER = [
 TIE = 2.0
 _WHY = {
     LimitResult.WITHIN: "finer steps come closer",
-    LimitResult.NO_LADDER: "the closest of what was run",
+    LimitResult.NO_LADDER: "smaller steps were not run",
     LimitResult.NOT_SHOWN: "no limit of small steps is shown",
     LimitResult.ANOTHER: "its limit of small steps is another",
 }

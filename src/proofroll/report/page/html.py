@@ -119,7 +119,6 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "values": labels.values,
         "settings": labels.settings_text,
         "name_of": labels.name_of,
-        "family_and_caveat": labels.family_and_caveat,
         "plain": plain,
     }
     made.globals |= {

@@ -55,7 +55,7 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind, page_engines: Sequ
         ghosts = _chosen(ghosts, kind.seen(point.scene))
         # The comparison with the most runs at this point names the case.
         title = max(shared, key=lambda pair: len(runs_at(*pair)))[0].comparison.title
-        label = point_name(point.case.parameters) or point.scene.title
+        label = point_name(point.case.parameters).replace("_", " ").replace("=", " ") or point.scene.title
         replayed = Replayed(
             scene=point.scene,
             true=point.reference.dataset,

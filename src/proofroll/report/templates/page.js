@@ -77,11 +77,11 @@ const folds = (() => {
     await ready();
     if (empty()) build(empty());
   }, true);
-  async function all() {
-    await ready();
+  function open() {
     every("[data-fold]");
     document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
   }
+  const all = () => ready().then(open);
   // Opens what is in sight, the rest when it is scrolled to or printed: all at once would take a browser seconds.
   let watch = null;
   const follow = (part) => part.querySelectorAll("details:not([open])").forEach((fold) => watch.observe(fold));
@@ -95,12 +95,8 @@ const folds = (() => {
     button.setAttribute("aria-pressed", "true");
   });
   document.addEventListener("built", ({ target }) => { if (watch) follow(target); });
-  // Print shows folds, but not each run; printing does not wait, so the texts are unpacked before.
-  addEventListener("beforeprint", () => {
-    if (!texts) return;
-    every(watch ? "[data-fold]" : "[data-fold]:not(.run > *)");
-    if (watch) document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
-  });
+  // Print shows what is open; all of it after "Open all".
+  addEventListener("beforeprint", () => { if (watch) open(); });
   addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(ready));
   // What a reader opened is in the address: folds of the class "kept" and rows of the matrix.
   const opened = () => [...document.querySelectorAll("details.kept[open], [data-unfold][aria-expanded=true]")];

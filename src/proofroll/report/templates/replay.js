@@ -268,9 +268,10 @@
     ui.key.hidden = false;
   }
 
-  // A camera that shows the whole path, or follows the body if that would be too small in it.
+  // A camera that shows the whole path, or follows the body with its ghosts if that would be too small in it.
   function reset() {
-    const reach = kind.reach(stage.size);
+    const off = shown.runs.slice(1).filter((run) => run.shown && there(run)).map((run) => kind.compare(run, true).off);
+    const reach = Math.min(stage.size, Math.max(kind.reach(stage.size), ...off));
     ui.follow.checked = reach < stage.size;
     view.turn = shown.from[0];
     view.lift = shown.from[1];
@@ -309,8 +310,9 @@
     time = 0;
     rows();
     strip.choices(shown.readings);
-    if (view) { build(); reset(); }
+    if (view) build();
     largest();
+    if (view) reset();
   }
 
   // Draws the errors of the quantity that is chosen, and goes to the largest one in sight.
@@ -365,7 +367,9 @@
       else return;
       event.preventDefault();
     });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (view) build(); update(); });
+    const paint = () => { if (stage) { build(); draw(); } };
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
+    for (const event of ["beforeprint", "afterprint"]) addEventListener(event, paint);  // one still, on paper's ground
   }
 
   async function open() {

@@ -124,7 +124,7 @@ def test_what_fails_is_told_in_the_words_of_its_comparison() -> None:
     matrix = choice_matrix([LINE, wrong, refused], STUDIES | {"arm": STUDIES["arm"]._replace(short=short)})
     told = answer(matrix, 1e-6, False).kinds[0].failures
     assert [(item.name, item.why) for item in told] == [
-        ("delta joints default", "it falls"), ("alpha joints default", "it is soft"),
+        ("delta joints, default", "it falls"), ("alpha joints, default", "it is soft"),
     ]  # fmt: skip
     assert [item.why for item in answer(matrix, 1e-2, False).kinds[0].failures] == ["it falls"]
 
@@ -138,12 +138,12 @@ def test_what_another_setting_mends_is_told_of_defaults_alone() -> None:
     short = {row: (["differs"], f"reason {row}") for row in range(2)}
     studies = STUDIES | {"arm": STUDIES["arm"]._replace(short=short)}
     for chosen, told in (
-        (settings, ["alpha joints default"]),
+        (settings, ["! alpha joints, default"]),
         (settings[1:], []),
-        (settings[1:2], ["alpha joints matched"]),
+        (settings[1:2], [" alpha joints, matched"]),
     ):
         found = answer(choice_matrix(chosen, studies), 1e-4, False).kinds[0].failures
-        assert [item.name for item in found] == told
+        assert [f"{item.text} {item.name}" for item in found] == told
 
 
 @pytest.mark.parametrize(
