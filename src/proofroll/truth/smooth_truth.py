@@ -140,7 +140,7 @@ class _SmoothTruth:
         by_tree, by_bodies = self._by_tree(paths[0], count), self._by_bodies(paths[1], count)
         by_bodies = on_same_turns(self._mechanism, by_tree, by_bodies)
         self._check_energy(by_tree, "joint coordinates", early, partial(self._tree_at, paths[0]))
-        self._check_energy(by_bodies, "maximal coordinates", early, partial(self._bodies_at, paths[1]))
+        self._check_energy(by_bodies, "maximal coordinates", early, partial(self._bodies_beside, paths[1], by_tree))
         chaotic = growth * NUDGE > CHAOS
         if chaotic.any():
             by_the_tree = early.run(partial(self._growth_of_tree, paths[0]), self._times)
@@ -251,6 +251,12 @@ class _SmoothTruth:
         """Record of the second route at rising times."""
         states = self._bodies.within(path.stretches[0], times)
         return self._in_seconds(self._second.recorded(times, states[:, :-1]))
+
+    def _bodies_beside(self, path: FollowedPath, guide: Record, times: Array) -> Record:
+        """Record of the second route at rising times, with angles on the turns of a record at the first samples."""
+        record = self._bodies_at(path, times)
+        near = [np.interp(times, self._times[: len(guide.q)], column) for column in guide.q.T]
+        return on_same_turns(self._mechanism, replace(record, q=np.array(near).T), record)
 
     def _from_form(self, form: ClosedForm, seconds: Array) -> Record:
         """Record of a closed form at times [s].
@@ -399,19 +405,19 @@ class _SmoothTruth:
         parts, scale = record.placed(mechanism).energies(), natural_scale(mechanism)
         change = np.abs(parts.sum(axis=1) - parts[0].sum())
         natural = mechanism.mass * (scale.length * scale.rate) ** 2  # a mechanism in balance may have no energy
-        allowed = ENERGY * max(natural, float(np.abs(parts).sum(axis=1).max()))
+        allowed = ENERGY * np.maximum(natural, np.maximum.accumulate(np.abs(parts).sum(axis=1)))
         lost = np.flatnonzero(change > allowed)
         if len(lost):
-            reason = f"the route in {route} changes the energy by {change[lost[0]]:.2g} J"
+            most = float(allowed[lost[0] - 1])
 
             def loses(time: Array) -> bool:
-                return bool(abs(record_at(time).placed(mechanism).energies().sum() - parts[0].sum()) > allowed)
+                return bool(abs(record_at(time).placed(mechanism).energies().sum() - parts[0].sum()) > most)
 
             end = self._first_time(loses, lost[0])
             rows = self._equations.rows(record_at(np.array([end])).q[0])
             values, rank = singular_values(rows.C), self._equations.rank
             at_pose = ", at a singular pose of the loops" if rank and values[rank - 1] < _SINGULAR * values[0] else ""
-            early.at(end, reason + at_pose)
+            early.at(end, f"the route in {route} changes the energy by more than {most:.1g} J{at_pose}")
 
     def _check_branch(
         self,
