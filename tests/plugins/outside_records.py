@@ -363,7 +363,7 @@ FITTED: Mapping[str, tuple[str, str, dict[str, Any], str]] = {
         "FL_KFE 0.5 of the right",
     ),
     "scale and pose": ("affine_target", "target", {"scale": 0.7 * SCALE, "pose": POSE + 0.1 * ONE}, "FL_KFE +0.1"),
-    "sign of actions": ("affine_target", "target", {"scale": -SCALE}, "actions have the other sign"),
+    "sign of actions": ("scale", "target", {"scale": -SCALE}, "the scale of actions has the other sign"),
     "low pass from the first": ("smoothing", "target", {"meaning": "filtered"}, "of which 0.3 is new at each instant"),
     "mixed": ("mixed_actions", "target", {"meaning": "mixed"}, "mix 0.5 of an action with 0.5 of the one before"),
     "squashed": ("squashed", "target", {"meaning": "squashed"}, "actions pass a tanh"),

@@ -204,7 +204,7 @@ class ReportContent:
         """Work–precision pictures by the id of their section, in the page's order, where enough runs are timed."""
         tradeoffs = {item.name: item.section for item in self.entries.get("tradeoffs", ())}
         others = {item.name: item.section for item in self.comparisons if item.name not in tradeoffs}
-        sections = tradeoffs | others
+        sections = others | tradeoffs
         lines: dict[str, list[TableLine]] = {name: [] for name in sections}
         for line in self.table.lines:
             lines.get(line.study, []).append(line)
