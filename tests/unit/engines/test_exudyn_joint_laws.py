@@ -74,6 +74,16 @@ def test_friction_slows_a_mass_and_holds_it():
     assert abs(run.sample().v_WB[0, 2]) < 1e-6
 
 
+def test_a_hinge_rubs_beyond_a_turn():
+    """A wheel on an axle loses its spin at the rate M/I, also where its angle has passed a whole turn."""
+    wheel = Body("wheel", 1.0, inertia=(0.1, 0.1, 0.2))
+    axle = Joint("axle", "revolute", "world", "wheel", v0=(5.0,), friction=0.2)
+    run = runs.build("redundant", Mechanism((wheel,), (axle,), gravity=(0.0, 0.0, 0.0)), dt=1e-3)
+    run.advance(2.0)
+    assert run.sample().w_WB[0, 2] == pytest.approx(3.0, abs=0.02)
+    assert run.sample().joint_torque[0, 2] == pytest.approx(-0.2, rel=1e-6)
+
+
 def test_each_force_is_that_of_its_joint():
     """Beside a joint without a law, friction is reported at the joint that rubs, and a stop's force at its joint."""
     names = ("free", "rubs", "rests")
