@@ -16,9 +16,10 @@ from robot_templates import urdf
 from proofroll.robots.control.bookkeeping.air import Scheme
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, orders
+from proofroll.robots.control.columns import readings_of_early_rates
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.layers import record_layers
-from proofroll.robots.control.record import _roundings
+from proofroll.robots.control.record import _roundings, record_of
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ROBOT = legged()
@@ -214,6 +215,16 @@ def test_digits_of_a_stream_are_rounding(digits: int) -> None:
     bars = _roundings({"q.a": written})["q.a"]
     assert np.all(np.abs(written - values) <= bars)
     assert bars[[0, 2]] == pytest.approx(0.5 * 10.0 ** np.array([3.0 - digits, 1.0 - digits]), rel=1e-9)
+
+
+def test_rates_that_are_not_there_are_not_early() -> None:
+    """A record without velocities has no reading with early ones, and one of a base alone has those of the base."""
+    times, names = 0.01 * np.arange(9), ("v_WB.x", "v_WB.y", "v_WB.z")
+    targets = {f"{kind}.j": np.sin(times) for kind in ("action", "target")}
+    assert [*readings_of_early_rates(record_of(times, targets))] == []
+    (reading,) = readings_of_early_rates(record_of(times, {name: np.cos(times) for name in names}))
+    assert reading.layer is not None
+    assert reading.layer.causes[0].sentence.startswith("v_WB: one row early")
 
 
 def test_what_no_cause_explains_is_not_called_rounding() -> None:

@@ -113,12 +113,12 @@ def framed_readings(record: ControlRecord, law: ControlLaw, frames: Sequence[Bas
 
 def reading_in_degrees(record: ControlRecord) -> StateReading | None:
     """Record with joints in degrees and degrees per second, which no integral shows; None: no angle passes a turn."""
-    places = {name: np.abs(item) for name, item in record.columns.items() if name.startswith("q.")}
-    column = max(places, key=lambda name: float(places[name].max()), default="")
-    if not column or places[column].max() <= 2 * np.pi:
+    places = _sizes(record, "q.")
+    column = max(places, key=places.__getitem__, default="")
+    if not column or places[column] <= 2 * np.pi:
         return None
     words = "q.JOINT and v.JOINT are in degrees: name them q.JOINT[deg] and v.JOINT[deg/s]"
-    off = (1 - _DEGREE) * float(places[column].max())
+    off = (1 - _DEGREE) * places[column]
     changed = _after(_scaled("q.", _DEGREE), _scaled("v.", _DEGREE))(record)
     return _silent(changed, "degrees", words, off, column)
 
@@ -133,11 +133,13 @@ def readings_by_frames(record: ControlRecord, frames: Sequence[BaseFrame]) -> It
 
 def readings_of_early_rates(record: ControlRecord) -> Iterator[StateReading]:
     """Readings of a record with velocities of after a step beside places of before it, which a scheme may imitate."""
-    names = ("v.", "v_WB.", "w_WB.") if "v_WB.x" in record.columns else ("v.",)
-    for kinds in (names, *((name,) for name in names if len(names) > 1)):
+    rates = {kind: _sizes(record, kind) for kind in ("v.", "v_WB.", "w_WB.")}
+    kinds_of_record = tuple(kind for kind, sizes in rates.items() if sizes)
+    several = [kinds_of_record] if len(kinds_of_record) > 1 else []
+    for kinds in (*several, *((kind,) for kind in kinds_of_record)):
         told = ", ".join(_NAMES.get(kind[:-1], kind[:-1]) for kind in kinds)
-        size = max(float(np.abs(item).max()) for name, item in record.columns.items() if name.startswith(kinds))
         words = f"{told}: one row early, as velocities after a step beside places before it"
+        size = max(max(rates[kind].values()) for kind in kinds)
         yield _silent(_moved(kinds, -1)(record), "early", words, size, kinds[0][:-1])
 
 
@@ -153,16 +155,21 @@ def untold_lags(record: ControlRecord) -> Iterator[str]:
 def readings_of_late_efforts(readings: Sequence[StateReading]) -> Iterator[StateReading]:
     """The readings with efforts that are a row late, as where a program returns those of its last step."""
     for reading in readings:
-        efforts = {name: np.abs(item) for name, item in reading.record.columns.items() if name.startswith("effort.")}
+        efforts = _sizes(reading.record, "effort.")
         if not efforts:
             continue
         words = "the columns effort.JOINT are one row late: each row has those of the step before it"
-        column, sooner = max(efforts, key=lambda name: float(efforts[name].max())), _moved("effort.", 1)
-        late = _silent(sooner(reading.record), "late_effort", words, float(efforts[column].max()), column)
+        column, sooner = max(efforts, key=efforts.__getitem__), _moved("effort.", 1)
+        late = _silent(sooner(reading.record), "late_effort", words, efforts[column], column)
         if reading.layer is not None and late.layer is not None:
             late = late._replace(layer=replace(reading.layer, causes=(*reading.layer.causes, *late.layer.causes)))
         reported = None if reading.reported is None else sooner(reading.reported)
         yield late._replace(frame=reading.frame, reported=reported)
+
+
+def _sizes(record: ControlRecord, kind: str) -> dict[str, float]:
+    """Columns of a kind, each with its largest size."""
+    return {name: float(np.abs(item).max()) for name, item in record.columns.items() if name.startswith(kind)}
 
 
 def _silent(record: ControlRecord, name: str, words: str, off: float, column: str) -> StateReading:
