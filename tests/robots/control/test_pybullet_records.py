@@ -68,7 +68,7 @@ def test_rows_at_a_stop_are_left_out() -> None:
     """A joint that reaches its limit is told with the time, and its rows do not count."""
     layer = judge_record(FOLDER / "stop.csv", ROBOT, None).layers[-1]
     assert layer.holds
-    assert layer.reason == "rows at an end of the range of a joint are left out: q.jb from 0.03333 s on"
+    assert layer.reason == "rows at an end of the range of a joint are left out: q.jb, first at 0.02917 s"
 
 
 def test_a_part_of_a_base_is_no_base(tmp_path: Path) -> None:

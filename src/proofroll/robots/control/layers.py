@@ -43,7 +43,7 @@ from proofroll.robots.control.differences import (
 from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
 from proofroll.robots.control.record import OBSERVED, ControlRecord, Layer, LayerCause
-from proofroll.robots.control.standing_joints import held_joints, rows_off_stops
+from proofroll.robots.control.standing_joints import standing_fit
 from proofroll.robots.model import Array
 
 # Part of the largest forces up to which what is left without a cause is taken for the program's steps between the rows:
@@ -160,11 +160,8 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], *, stepwise: bool) -> 
     efforts = record.stacked("effort", law.joints)
     if efforts is None:
         return Layer("acceleration", reason="the record has no columns effort.JOINT")
-    off_stops, remark = rows_off_stops(record, evidence.in_air.ranges)
-    fit = acceleration_fit(record, law, evidence.in_air.held, efforts, held_rows(record, law), off_stops)
-    differs = isinstance(fit, AirFit) and (fit.off > fit.bar or fit.bar >= 1)
-    if differs and (held := held_joints(record, law, evidence.in_air.held, efforts)) is not None:
-        fit = AirFit(off=1.0, bar=held.after, causes=(held,))
+    steady, ranges = held_rows(record, law), evidence.in_air.ranges
+    fit, off_stops, remark = standing_fit(record, law, evidence.in_air.held, efforts, steady, ranges)
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
     if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
