@@ -99,6 +99,7 @@ class Mistake:
         if self.opposite and abs(size + 1) < _NOTHING:
             return self.opposite
         words = self.at_least if larger else self.words
+        size = 0.0 if self.none and abs(size) < _NOTHING else size  # an armature beside none may be as small
         return words.format(size=f"{round(size, 12):.5g}")
 
 
