@@ -12,6 +12,8 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots.control.record import ControlRecord
 from proofroll.robots.model import Array, Robot
 
+_EQUAL, _DIGITS = 1e-9, 9  # part of the largest moment by which equal ones differ, and decimals of equal turns
+
 
 @dataclass(frozen=True)
 class BaseFrame:
@@ -92,9 +94,24 @@ def base_frames(robot: Robot) -> tuple[BaseFrame, ...]:
 
 
 def _principal(inertia: Array, axes: Array) -> Array:
-    """Principal axes of an inertia, in these axes: of the orders and signs of them those that are turned least."""
-    _, vectors = np.linalg.eigh(axes.T @ inertia @ axes)
-    orders = [vectors[:, list(order)] for order in itertools.permutations(range(3))]
-    signs = [np.diag(row) for row in itertools.product((1.0, -1.0), repeat=3)]
-    turned = [item @ sign for item in orders for sign in signs if np.linalg.det(item @ sign) > 0]
-    return max(turned, key=np.trace)
+    """Principal axes of an inertia, in these axes: of the orders and signs of them those that are turned least.
+
+    Equal moments have any axes in their plane: those nearest to the given ones.
+    """
+    moments, vectors = np.linalg.eigh(axes.T @ inertia @ axes)
+    turned = []
+    for order in map(list, itertools.permutations(range(3))):
+        nearest = _nearest(moments[order], vectors[:, order])
+        signed = (nearest @ np.diag(signs) for signs in itertools.product((1.0, -1.0), repeat=3))
+        turned += [item for item in signed if np.linalg.det(item) > 0]
+    return max(turned, key=lambda item: round(float(np.trace(item)), _DIGITS))
+
+
+def _nearest(moments: Array, vectors: Array) -> Array:
+    """Principal axes, those of equal moments turned to be nearest to the first, second and third given axis."""
+    nearest = vectors.copy()
+    for moment in moments:
+        equal = np.abs(moments - moment) <= _EQUAL * moments.max()
+        left, _, right = np.linalg.svd(vectors[:, equal].T[:, equal])
+        nearest[:, equal] = vectors[:, equal] @ left @ right
+    return nearest
