@@ -217,6 +217,17 @@ def test_digits_of_a_stream_are_rounding(digits: int) -> None:
     assert bars[[0, 2]] == pytest.approx(0.5 * 10.0 ** np.array([3.0 - digits, 1.0 - digits]), rel=1e-9)
 
 
+def test_an_inertia_that_is_another_has_no_size() -> None:
+    """An inertia of a body is named with what is off with it alone; it is no mass."""
+    trunk, *legs = ROBOT.bodies
+    turned = replace(trunk, inertia=((0.03, 0.004, 0.0), (0.004, 0.05, 0.0), (0.0, 0.0, 0.045)))
+    record = recorded(replace(ROBOT, bodies=(turned, *legs)), LAW, LAW)
+    (cause,) = record_layers(record, LAW, ROBOT, grounded=False)[-1].causes
+    assert cause.sentence.startswith("the inertia of trunk is another (")
+    assert cause.size is None
+    assert cause.after < 1e-9
+
+
 def test_rates_that_are_not_there_are_not_early() -> None:
     """A record without velocities has no reading with early ones, and one of a base alone has those of the base."""
     times, names = 0.01 * np.arange(9), ("v_WB.x", "v_WB.y", "v_WB.z")

@@ -166,7 +166,7 @@ def acceleration_fit(
     except (Diverged, Refused) as error:
         return str(error)
     if not trials:
-        return "too few rows lie between instants"
+        return "too few rows are left"
     return _judged(trials, law, robot)
 
 
@@ -234,14 +234,14 @@ def _numbers(rows: _Rows, law: ControlLaw) -> Iterator[LayerCause]:
         yield _cause(name, f"{words} {text} ± {interval} {in_unit}", value, rows, distance)
 
 
-def _cause(name: str, sentence: str, value: float, rows: _Rows, distance: float) -> LayerCause:
+def _cause(name: str, sentence: str, value: float | None, rows: _Rows, distance: float) -> LayerCause:
     proof = f"forces off by {short(rows.off / rows.size)} of their size, by {short(distance / rows.size, 1)} with that"
     return LayerCause(name, f"{sentence} ({proof})", value, distance / rows.size)
 
 
 def _heavier(rows: _Rows, robot: AirRobot) -> Iterator[LayerCause]:
     """A body that weighs more: a mass at a point of it, else any inertia."""
-    heavier_bodies: list[tuple[float, str, float, str]] = []
+    heavier_bodies: list[tuple[float, str, float | None, str]] = []
     for body, columns in rows.added.items():
         sizes = np.linalg.norm(columns, axis=0)
         seen = sizes > _ROUND_OFF * sizes.max()
@@ -262,14 +262,16 @@ def _heavier(rows: _Rows, robot: AirRobot) -> Iterator[LayerCause]:
             words = f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"
             heavier_bodies.append((distance, body, float(numbers[0]), words))
         elif mass + values[0] > 0:
-            distance = _rms(rows.left - columns @ values)
             moments = columns[:, 4:] @ np.linalg.lstsq(columns[:, 4:], rows.left, rcond=_SMALL)[0]
+            if rows.explained(_rms(rows.left - moments)):
+                words = f"the inertia of {body} is another"
+                heavier_bodies.append((_SAFETY * _rms(rows.left - moments), body, None, words))
+                continue
             words = f"mass, centre and inertia of {body} are others, {values[0]:+.3g} kg"
             words = words if seen[0] else f"centre and inertia of {body} are others"
-            words = f"the inertia of {body} is another" if rows.explained(_rms(rows.left - moments)) else words
-            heavier_bodies.append((_SAFETY * distance, body, float(values[0]), words))
-    for distance, _, mass, words in sorted(heavier_bodies)[:1]:
-        yield _cause(FITTED, words, mass, rows, distance)
+            heavier_bodies.append((_SAFETY * _rms(rows.left - columns @ values), body, float(values[0]), words))
+    for distance, _, size, words in sorted(heavier_bodies)[:1]:
+        yield _cause(FITTED, words, size, rows, distance)
 
 
 def _point(numbers: Array) -> Array:
