@@ -41,6 +41,8 @@ from proofroll.robots.check.records import (
     UnlikeValue,
     UsedTruth,
 )
+from proofroll.robots.control.judge import RecordJudgement
+from proofroll.robots.control.record import Layer, LayerCause
 from proofroll.robots.files.robot_file import LintRemark
 from proofroll.running.timing import Interval
 from proofroll.studies.claim_judgement import JudgedFile
@@ -178,6 +180,7 @@ TRADEOFF = (
     [
         ("json.md", "`check --json` of a robot file", ROBOT),
         ("json.md", "`check --against --json`", (UnlikeValue,)),
+        ("json.md", "`judge --robot --json`", (RecordJudgement, Layer, LayerCause)),
         ("json.md", "`compare --json`", COMPARISON),
         ("json.md", "`stability --json`", MAP),
         ("tradeoff.md", "JSON", (*TRADEOFF, Recommendation, Answer, CheckedOver)),
@@ -202,7 +205,7 @@ TRADEOFF = (
             ),
         ),
     ],
-    ids=["robots", "against", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
+    ids=["robots", "against", "record", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
 )
 def test_fields_of_records(page: str, title: str, records: tuple[type, ...]) -> None:
     """Each field of what a command prints as records is named where its JSON is described."""

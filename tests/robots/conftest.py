@@ -17,7 +17,7 @@ PLUGINS = Path(__file__).parents[1] / "plugins"
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Searches for mistakes in records end by what they find, not by the speed of this processor."""
-    monkeypatch.setattr("proofroll.robots.control.layers.SEARCH_TIME", 1e4)
+    monkeypatch.setattr("proofroll.robots.control.judge.SEARCH_TIME", 1e4)
 
 
 @pytest.fixture

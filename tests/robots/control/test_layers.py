@@ -13,12 +13,12 @@ from air_records import recorded
 from air_robots import law_of, legged, solo12
 from robot_templates import urdf
 
-from proofroll.robots.control.bookkeeping.air import Scheme
+from proofroll.robots.control.bookkeeping.air import HeldRobot, Scheme
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, orders
 from proofroll.robots.control.columns import readings_of_early_rates
 from proofroll.robots.control.controlled import ControlledScenes
-from proofroll.robots.control.layers import record_layers
+from proofroll.robots.control.layers import BETWEEN, InAir, record_layers
 from proofroll.robots.control.record import _roundings, record_of
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -236,6 +236,30 @@ def test_rates_that_are_not_there_are_not_early() -> None:
     (reading,) = readings_of_early_rates(record_of(times, {name: np.cos(times) for name in names}))
     assert reading.layer is not None
     assert reading.layer.causes[0].sentence.startswith("v_WB: one row early")
+
+
+def test_the_fewest_causes_tell_the_importer() -> None:
+    """Of robots that importers make, the one that needs no further cause is named, though another comes before it."""
+    masses = [(1.2 if k % 2 else 0.8) * body.mass for k, body in enumerate(ROBOT.bodies)]
+    bodies = tuple(replace(body, mass=mass) for body, mass in zip(ROBOT.bodies, masses, strict=True))
+    lighter = replace(ROBOT, gravity=(0.0, 0.0, -9.5))
+    importers = [
+        replace(HeldRobot.of(robot), causes=(name,), words=name)
+        for name, robot in (("another gravity", lighter), ("right", ROBOT))
+    ]
+    in_air = InAir(HeldRobot.of(replace(ROBOT, bodies=bodies)), imported=lambda: importers)
+    layer = record_layers(recorded(ROBOT, LAW, LAW), LAW, ROBOT, grounded=False, in_air=in_air)[-1]
+    assert [cause.id for cause in layer.causes] == ["right"]
+
+
+def test_assumed_steps_decide_nothing() -> None:
+    """What steps between the rows may explain is not decided where rows are steps only by the usual step."""
+    record = recorded(ROBOT, LAW, LAW, scheme="rk4", step=2e-3, count=50)
+    in_air = InAir(HeldRobot.of(ROBOT), assumed="rows are the usual step")
+    plain, assumed = (record_layers(record, LAW, ROBOT, grounded=False, in_air=item)[-1] for item in (None, in_air))
+    assert plain.reason.startswith(BETWEEN)
+    assert assumed.undecided
+    assert assumed.reason.endswith("rows are the usual step")
 
 
 def test_what_no_cause_explains_is_not_called_rounding() -> None:

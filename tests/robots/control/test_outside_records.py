@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from outside_records import (
+    CENTRE,
     CONTROL,
     FITTED,
     JOINTS,
@@ -23,6 +24,7 @@ from outside_records import (
     urdf,
     written,
 )
+from scipy.spatial.transform import Rotation
 
 from proofroll.robots.control.judge import RecordJudgement, judge_record
 
@@ -159,6 +161,25 @@ def test_a_lag_that_no_digit_shows_is_left_open(judged: Judged) -> None:
     assert "the digits of the record do not tell whether" in judgement.remarks[0]
 
 
+def test_rates_whose_rows_are_told_are_not_left_open(judged: Judged) -> None:
+    """Rates that are called a row early are not called untold beside that."""
+    judgement = judged(columns_of(miswritten(Loop().record(PROGRAMS["pinocchio"]), "early velocities")), "2")
+    assert [cause.id for cause in judgement.layers[0].causes] == ["early"]
+    assert list(judgement.remarks) == []
+
+
+def test_a_layer_that_stays_open_tells_no_column(judged: Judged) -> None:
+    """A base at its centre of mass, which layers alone tell, is not claimed where an observation stays open."""
+    record = dict(Loop().record(PROGRAMS["mujoco"]))
+    offset = Rotation.from_quat(record["q_WB"], scalar_first=True).apply(CENTRE)
+    record["p_WB"] = record["p_WB"] + offset
+    record["v_WB"] = record["v_WB"] + np.cross(record["w_WB"], offset)
+    assert [cause.id for cause in judged(columns_of(record)).layers[0].causes] == ["base_frame"]
+    noise = np.random.default_rng(0).normal(size=record["q"].shape)
+    judgement = judged(columns_of({**record, "observed.q": record["observed.q"] + noise}))
+    assert not any("the layers behind it tell so" in line for line in judgement.lines())
+
+
 @pytest.mark.parametrize(
     ("columns_of_actions", "words"),
     [("scaled", "have the scale of the controller already"), ("late", "are one instant")],
@@ -272,7 +293,7 @@ def test_a_search_that_ran_out_of_time_decides_nothing(
     proofroll: Proofroll, legs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """States that are off, and that no search has explained, are neither right nor wrong: exit 3, with the reason."""
-    monkeypatch.setattr("proofroll.robots.control.layers.SEARCH_TIME", 0.0)
+    monkeypatch.setattr("proofroll.robots.control.judge.SEARCH_TIME", 0.0)
     record = written(only(recorded("spin in the world", step=5e-3, steps=20)), tmp_path / "record.csv", "single")
     code, out, err = proofroll("judge", str(record), *legs)
     assert code == 3, out + err
@@ -359,8 +380,6 @@ def test_a_record_with_names_and_units_of_its_own(proofroll: Proofroll, legs: li
 
 def _in_base(quaternion: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Vectors along the axes of the base."""
-    from scipy.spatial.transform import Rotation
-
     return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).inv().apply(vectors))
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from proofroll.core.errors import InputError
 from proofroll.files.csv_table import read_csv
+from proofroll.robots.control.bookkeeping.mistakes import SearchTime
 from proofroll.robots.control.judge import RecordJudgement, judge_record
 
 FOLDER = Path(__file__).parent / "pybullet_records"
@@ -55,6 +56,47 @@ def test_arrays_of_pybullet_have_its_frame(name: str, tmp_path: Path) -> None:
     judgement = judge_record(arrays(name, tmp_path), ROBOT, None, layout="pybullet")
     assert named(judgement) == [item for item in NAMED[name] if item[1] != "base_frame"]
     assert judgement.looked_at
+
+
+def test_degrees_keep_the_frame_of_the_base(tmp_path: Path) -> None:
+    """Arrays with joints in degrees are held against the robot with PyBullet's frame of the base, which is exact."""
+    robot = tmp_path / "floater.urdf"
+    robot.write_text(ROBOT.read_text().replace('lower="-2" upper="2"', 'lower="-200" upper="200"'))
+    path = arrays("honest", tmp_path)
+    content = dict(np.load(path))
+    content |= {name: np.degrees(content[name]) for name in ("joint_positions", "joint_velocities")}
+    np.savez(path, **content)
+    judgement = judge_record(path, robot, None, layout="pybullet")
+    assert named(judgement) == [("state", "degrees")], "\n".join(judgement.lines())
+
+
+def test_searches_of_a_record_share_one_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All searches of a record have one time, and one that ended among importers is told."""
+    ends: list[float] = []
+    begin = SearchTime.__init__
+
+    def begun(time: SearchTime, seconds: float = np.inf) -> None:
+        ends.extend([seconds] if 0 < seconds < np.inf else [])
+        begin(time, seconds)
+
+    monkeypatch.setattr(SearchTime, "__init__", begun)
+    judge_record(FOLDER / "defaults.csv", ROBOT, None)
+    assert len(ends) == 1
+    monkeypatch.setattr("proofroll.robots.control.judge.SEARCH_TIME", 0.0)
+    layer = judge_record(FOLDER / "defaults.csv", ROBOT, None).layers[-1]
+    assert "the search for robots as importers read it ended after" in layer.reason
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_steps_that_are_assumed_are_told(known: bool, tmp_path: Path) -> None:
+    """Where forces differ and the file has no ``sim_dt``, the answer says that PyBullet's usual step was assumed."""
+    path = arrays("honest", tmp_path)
+    content = dict(np.load(path))
+    content["torques"] = content["torques"] + np.random.default_rng(0).normal(size=content["torques"].shape)
+    np.savez(path, **content, **({"sim_dt": 1 / 240} if known else {}))
+    layer = judge_record(path, ROBOT, None, layout="pybullet").layers[-1]
+    assert not layer.holds
+    assert ("the usual step of pybullet" in layer.reason) != known
 
 
 def test_drag_has_its_size() -> None:

@@ -62,7 +62,7 @@ class RecordedRobot:
     refs: Mapping[str, float]
     base_frames: tuple[BaseFrame, ...]
     held: Callable[[BaseFrame | None], HeldRobot]
-    imported: Callable[[BaseFrame | None], Iterator[HeldRobot]]
+    imported: Callable[[BaseFrame | None, int], Iterator[HeldRobot]]
 
 
 class ControlledScenes:
@@ -145,7 +145,7 @@ class ControlledScenes:
             refs={joint.name: joint.ref for joint in robot.moving if joint.ref},
             base_frames=base_frames(robot),
             held=partial(held, robot),
-            imported=lambda frame: imported_robots(file, robot, partial(held, frame=frame)),
+            imported=lambda frame, most: imported_robots(file, robot, partial(held, frame=frame), most),
         )
 
     def _tables(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -27,31 +27,40 @@ _NOTHING = Reading(
     g=np.empty(0),
     h=np.empty(0),
 )
-_MOST = 2  # causes that act together
+MOST = 2  # causes that act together
 
 
-def imported_robots(file: RobotFile, robot: Robot, held: Callable[[Robot], HeldRobot]) -> Iterator[HeldRobot]:
-    """Robots by one cause, then by two.
+def imported_robots(
+    file: RobotFile, robot: Robot, held: Callable[[Robot], HeldRobot], most: int = MOST
+) -> Iterator[HeldRobot]:
+    """Robots by one cause, then by two, up to ``most``.
 
     Args:
         file: of the robot.
         robot: that the file describes.
         held: robot as a program holds it.
+        most: number of causes that act together.
     """
     begun: list[tuple[tuple[RobotHypothesis, ...], Robot]] = [((), robot)]
-    for _ in range(_MOST):
-        begun = [
-            ((*causes, cause), changed)
-            for causes, earlier in begun
-            for cause in hypotheses()
-            if cause.id not in {item.id for item in causes}
-            and (changed := _changed(file, earlier, cause)) is not None
-            and (not causes or cause.id > causes[-1].id)
-        ]
-        for causes, changed in begun:
+    for _ in range(most):
+        changes, begun = _further(file, begun), []
+        for causes, changed in changes:
+            begun.append((causes, changed))
             with suppress(InputError, Refused):
                 ids, words = tuple(item.id for item in causes), "; ".join(_told(item) for item in causes)
                 yield replace(held(changed), causes=ids, words=words)
+
+
+def _further(
+    file: RobotFile, begun: Sequence[tuple[tuple[RobotHypothesis, ...], Robot]]
+) -> Iterator[tuple[tuple[RobotHypothesis, ...], Robot]]:
+    """Robots with causes and one more, each pair of causes once; one after another, as a search may end before."""
+    for causes, earlier in begun:
+        for cause in hypotheses():
+            if causes and cause.id <= causes[-1].id:
+                continue
+            if (changed := _changed(file, earlier, cause)) is not None:
+                yield (*causes, cause), changed
 
 
 def _told(cause: RobotHypothesis) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from proofroll.elements.mechanism.run.step_limits import servo_steps
 from proofroll.robots.control.air_fit import FITTED
 from proofroll.robots.control.base_frames import BaseFrame
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME
+from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME, SearchTime
 from proofroll.robots.control.columns import (
     StateReading,
     framed_readings,
@@ -32,11 +33,13 @@ from proofroll.robots.control.columns import (
 )
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
+from proofroll.robots.control.imported import MOST
 from proofroll.robots.control.layers import BETWEEN, InAir, record_layers
 from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
 _Judged = tuple[StateReading, list[Layer]]
+_LAGS = ("late", "early")  # ids of rates at other rows
 _SAME_STEP = 1e-3  # part of the interval between rows by which the step of the program may differ from it
 
 
@@ -135,7 +138,7 @@ def judge_record(
     """
     scenes = ControlledScenes(control)
     law_of = ControlLaw.of if control else ControlLaw.of_efforts
-    stepwise = False
+    stepwise, assumed = False, ""
     if layout:
         if names:
             raise InputError("--map", ", ".join(names), f"--as {layout} names the arrays; leave one of both out")
@@ -150,8 +153,12 @@ def judge_record(
         eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
         digits = max(eps, default=0.0) / 2
         read = record_of(time, columns, record, digits=digits)
-        sim_dt = _step_of(record, arrays["sim_dt"]) if "sim_dt" in arrays else LAYOUTS[layout].step
-        stepwise = sim_dt is not None and bool(np.isclose(sim_dt, _step(read), rtol=_SAME_STEP))
+        usual = LAYOUTS[layout].step
+        if "sim_dt" in arrays:
+            stepwise = _are_steps(read, _step_of(record, arrays["sim_dt"]))
+        elif usual is not None and _are_steps(read, usual):
+            rows = f"rows are {usual:.4g} s apart, the usual step of {layout}"
+            assumed = f"{rows}: if it stepped so, add sim_dt = {usual:.7g} to the file; else log every step"
     else:
         if record.suffix in ARRAYS:
             raise InputError("--as", "", f"say whose arrays these are: {', '.join(LAYOUTS)}")
@@ -162,13 +169,14 @@ def judge_record(
     law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
     names_of_layers = DIFFERENCES if control else ()
 
-    def layers_of(reading: StateReading, *, imported: bool = False) -> list[Layer]:
+    def layers_of(reading: StateReading, time: SearchTime, imported: int = 0) -> list[Layer]:
         state_layers = [] if reading.layer is None else [reading.layer]
         held = InAir(
             held=model.held(reading.frame),
-            imported=partial(model.imported, reading.frame) if imported else tuple,
+            imported=partial(model.imported, reading.frame, imported),
             reported=reading.reported,
             ranges=model.ranges,
+            assumed=assumed,
         )
         return [
             *state_layers,
@@ -180,6 +188,7 @@ def judge_record(
                 names=names_of_layers,
                 stepwise=stepwise,
                 in_air=held,
+                time=time,
             ),
         ]
 
@@ -196,49 +205,113 @@ def judge_record(
         rows=len(read.time),
         step=_step(read),
         layers=layers,
-        remarks=[*_too_fast(read, model.speeds), *_untold(read)],
+        remarks=[*_too_fast(read, model.speeds), *_untold(reading)],
         step_bound=_step_bound(model.mechanism, _step(read)),
     )
 
 
 def _best_reading(
-    readings: Iterable[StateReading],
+    readings: Sequence[StateReading],
     layers_of: Callable[..., list[Layer]],
     frames: Sequence[BaseFrame],
     *,
     controlled: bool,
 ) -> _Judged:
-    """Reading of a record of which layers are open least, and its layers.
+    """Reading of a record of which layers are open least, and its layers; all searches share one time.
 
     Of readings that explain the state alike, layers behind it tell the right one. Mistakes that the state does not show
-    are tried where these are open.
+    are tried where these are open, and count if they leave none of them open.
 
     Args:
         readings: by the state.
-        layers_of: layers of a reading.
+        layers_of: layers of a reading, for a time of the search.
         frames: that the record may have for its base.
         controlled: True if a controller's law tells the efforts.
     """
-    judged = [(reading, layers_of(reading)) for reading in readings]
+    time = SearchTime(SEARCH_TIME)
+    judged = _searched(readings, layers_of, time)
     plain = min(judged, key=_open)
-    record = plain[0].record
+    silent: list[_Judged] = []
 
-    def try_rivals(rivals: Iterable[StateReading], *, imported: bool = False) -> None:
+    def best() -> _Judged:
+        """Best of the readings by the state, and of the silent ones that close all layers."""
+        return min([*judged, *(item for item in silent if not _open_layers(item[1]))], key=_open)
+
+    def try_rivals(rivals: Iterable[StateReading]) -> None:
         """Adds readings that look at every layer that is open without them."""
-        trials = [(rival, layers_of(rival, imported=imported)) for rival in rivals]
-        judged.extend(item for item in trials if _open_layers(plain[1]) <= _looked_at(item[1]))
+        trials = [(rival, layers_of(rival, time)) for rival in rivals]
+        silent.extend(item for item in trials if _open_layers(plain[1]) <= _looked_at(item[1]))
 
-    if any(_open(plain)) and (degrees := reading_in_degrees(record)) is not None:
-        try_rivals([degrees])
-    if _unexplained_forces(min(judged, key=_open)[1]):
-        try_rivals(readings_by_frames(record, frames))
-    if _unexplained_forces(min(judged, key=_open)[1]) and not controlled:
-        try_rivals(readings_of_late_efforts([rival for rival, _ in judged]))
-    if min(map(_open, judged))[0]:
-        try_rivals(readings_of_early_rates(record))
-    if any(min(map(_open, judged))[::2]):
-        try_rivals([rival for rival, _ in judged], imported=True)
-    return min(judged, key=_open)
+    if any(_open(plain)):
+        in_degrees = [_beside(item, lambda record: filter(None, [reading_in_degrees(record)])) for item, _ in judged]
+        try_rivals(itertools.chain.from_iterable(in_degrees))
+    if _unexplained_forces(best()[1]):
+        try_rivals(_beside(plain[0], lambda record: readings_by_frames(record, frames)))
+    if _unexplained_forces(best()[1]) and not controlled:
+        try_rivals([*readings_of_late_efforts([rival for rival, _ in (*judged, *silent)])])
+    if _open(best())[0]:
+        try_rivals(_beside(plain[0], readings_of_early_rates))
+    if any(_open(best())[::2]):
+        candidates = sorted((rival for rival, _ in (*judged, *silent)), key=_count)
+        by_state = {id(rival) for rival, _ in judged}
+        trials = _of_importers(candidates, partial(layers_of, time=time), time)
+        silent.extend(item for item in trials if id(item[0]) not in by_state)
+        judged = [*(item for item in trials if id(item[0]) in by_state), *judged]
+    return best()
+
+
+def _of_importers(
+    readings: Sequence[StateReading], layers_of: Callable[..., list[Layer]], time: SearchTime
+) -> list[_Judged]:
+    """Readings whose forces are held against robots of importers, up to the first that one explains.
+
+    Robots by one cause are tried with every reading before those by two.
+    """
+    trials: list[_Judged] = []
+    for count in range(1, MOST + 1):
+        for reading in readings:
+            trials.append((reading, layers_of(reading, imported=count)))
+            if _told(trials[-1]):
+                return [(reading, layers_of(reading, imported=MOST))]
+            if time.over:
+                return trials
+    return trials
+
+
+def _count(reading: StateReading) -> int:
+    """Number of mistakes of columns that a reading supposes."""
+    return 0 if reading.layer is None else len(reading.layer.causes)
+
+
+def _searched(
+    readings: Sequence[StateReading], layers_of: Callable[..., list[Layer]], time: SearchTime
+) -> list[_Judged]:
+    """Readings with their layers; those of which more hold without a mistake have the time of the search first."""
+    if len(readings) == 1:
+        return [(readings[0], layers_of(readings[0], time))]
+    judged = [(reading, layers_of(reading, SearchTime(0.0))) for reading in readings]
+    if any(_open(min(judged, key=_open))):
+        for k in sorted(range(len(judged)), key=lambda k: _open(judged[k])):
+            judged[k] = (readings[k], layers_of(readings[k], time))
+    return judged
+
+
+def _beside(
+    reading: StateReading, readings_of: Callable[[ControlRecord], Iterable[StateReading]]
+) -> Iterator[StateReading]:
+    """Readings of a record by further mistakes, with the frame of its base and the mistakes that it has."""
+    for rival in readings_of(reading.reported or reading.record):
+        layer, record, frame, reported = rival.layer, rival.record, rival.frame, rival.reported
+        if reading.frame is not None:
+            record, frame, reported = reading.frame.corrected(record), reading.frame, record
+        if reading.layer is not None and layer is not None:
+            layer = replace(reading.layer, causes=(*reading.layer.causes, *layer.causes))
+        yield StateReading(record, layer, frame, reported)
+
+
+def _told(judged: _Judged) -> bool:
+    """True if forces are explained without a fitted inertia."""
+    return not (_unexplained_forces(judged[1]) or _open(judged)[2])
 
 
 def _open_layers(layers: Sequence[Layer]) -> set[str]:
@@ -298,10 +371,17 @@ def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[st
             )
 
 
-def _untold(record: ControlRecord) -> Iterator[str]:
-    """A sentence on rates that may be a row late, if there are any."""
-    if names := [*untold_lags(record)]:
+def _untold(reading: StateReading) -> Iterator[str]:
+    """A sentence on rates that may be a row late, if there are any; not on those whose rows are told."""
+    causes = () if reading.layer is None else reading.layer.causes
+    told = " ".join(cause.sentence for cause in causes if cause.id in _LAGS)
+    if names := [name for name in untold_lags(reading.record) if name not in told]:
         yield f"the digits of the record do not tell whether {' and '.join(names)} may be a row late"
+
+
+def _are_steps(record: ControlRecord, step: float) -> bool:
+    """True if the rows of a record are steps of a length [s]."""
+    return bool(np.isclose(step, _step(record), rtol=_SAME_STEP))
 
 
 def _step_of(path: Path, values: NDArray[Any]) -> float:

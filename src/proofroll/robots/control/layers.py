@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -66,6 +67,7 @@ def record_layers(
     names: Collection[str] = DIFFERENCES,
     stepwise: bool = False,
     in_air: InAir | None = None,
+    time: SearchTime | None = None,
 ) -> list[Layer]:
     """All layers of a record, with causes at those that do not hold.
 
@@ -77,10 +79,11 @@ def record_layers(
         names: of the layers before that of accelerations.
         stepwise: True if the program has no steps between the rows.
         in_air: what the accelerations are held against; by default the mechanism.
+        time: of the searches for mistakes; by default without an end.
     """
     evidence = _Evidence(record, law, mechanism, in_air or InAir(HeldRobot.of(mechanism)))
     layers: list[Layer] = []
-    time = SearchTime(SEARCH_TIME)
+    time = time or SearchTime()
     for name in names:
         layer = _layer(name, evidence)
         if not layer.holds:
@@ -94,7 +97,7 @@ def record_layers(
         layers.append(Layer("acceleration", reason="the robot touches the ground, whose forces no record has"))
         return layers
     lacking = {layer.name for layer in layers if layer.residual is None}
-    layers.append(_in_air(evidence, layers, stepwise=stepwise))
+    layers.append(_in_air(evidence, layers, time, stepwise=stepwise))
     if all(layer.holds for layer in layers) and lacking & {"target", "effort"}:
         layers.append(motion_layer(record, law, mechanism, lambda part: _fit_by_law(part, evidence), time))
     return layers
@@ -109,12 +112,14 @@ class InAir:
         imported: robots that are tried where it differs.
         reported: the record with the frame of its base, if that is not the one of the other layers.
         ranges: joint -> its limits [rad or m].
+        assumed: clause on rows that are steps if the program has its usual ones; empty: they are not, or it is known.
     """
 
     held: HeldRobot
     imported: Callable[[], Iterable[HeldRobot]] = tuple
     reported: ControlRecord | None = None
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    assumed: str = ""
 
 
 @dataclass(frozen=True)
@@ -154,9 +159,9 @@ def _layer(name: str, evidence: _Evidence) -> Layer:
     )
 
 
-def _in_air(evidence: _Evidence, layers: Sequence[Layer], *, stepwise: bool) -> Layer:
+def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, stepwise: bool) -> Layer:
     """Layer of accelerations, from recorded efforts."""
-    record, law = evidence.in_air.reported or evidence.record, evidence.law
+    record, law, assumed = evidence.in_air.reported or evidence.record, evidence.law, evidence.in_air.assumed
     efforts = record.stacked("effort", law.joints)
     if efforts is None:
         return Layer("acceleration", reason="the record has no columns effort.JOINT")
@@ -165,16 +170,19 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], *, stepwise: bool) -> 
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
     if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
-        fit = _of_another_robot(record, evidence, efforts, fit, off_stops)
+        fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
+        remark = "; ".join(part for part in (remark, ended) if part)
     fit = dataclasses.replace(fit, between=fit.between and not stepwise)
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
-    if fit.between and fit.off > _STEPS:
+    if fit.between and (fit.off > _STEPS or assumed):
         off = f"the forces are off by {error(fit.off)} of the largest, and no cause is known"
-        advice = "steps between the rows may explain it: log every step to decide"
-        return Layer("acceleration", reason=f"{off}; {advice}", undecided=True)
+        advice = f"steps between the rows may explain it: {assumed or 'log every step to decide'}"
+        return Layer("acceleration", reason="; ".join(filter(None, (off, advice, remark))), undecided=True)
     implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
     holds = (fit.off <= fit.bar and not fit.causes) or fit.between
+    if assumed and not holds and all(cause.after > fit.bar for cause in fit.causes):
+        remark = "; ".join(filter(None, (remark, assumed)))
     earlier = next((layer.name for layer in layers if not layer.holds), "")
     return Layer(
         name="acceleration",
@@ -190,21 +198,37 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], *, stepwise: bool) -> 
 
 
 def _of_another_robot(
-    record: ControlRecord, evidence: _Evidence, efforts: Array, fit: AirFit, usable: NDArray[np.bool_]
-) -> AirFit:
-    """Fit with the first robot that an importer makes of the file and that the record is of; else the fit itself."""
-    law = evidence.law
+    record: ControlRecord,
+    evidence: _Evidence,
+    efforts: Array,
+    fit: AirFit,
+    usable: NDArray[np.bool_],
+    time: SearchTime,
+) -> tuple[AirFit, str]:
+    """Fit with the robot that an importer makes of the file and that explains the record by the fewest causes.
+
+    It is the fit itself where there is none. The second item is a remark on a search that ended.
+    """
+    law, best, ended = evidence.law, (math.inf, math.inf, math.inf), ""
+    chosen = fit
     for robot in evidence.in_air.imported():
+        if (len(robot.causes), 0) > best[:2]:
+            break  # what follows has as many causes or more
+        if time.over:
+            ended = f"the search for robots as importers read it ended after {SEARCH_TIME:.0f} s of processor time"
+            break
         trial = acceleration_fit(record, law, robot, efforts, held_rows(record, law), usable)
         if isinstance(trial, str) or trial.between or any(cause.id == FITTED for cause in trial.causes):
             continue
         if trial.off > trial.bar and not trial.causes:
             continue
         left = min((cause.after for cause in trial.causes), default=trial.off)
-        proof = f"forces off by {error(fit.off)} of their size, by {error(left, 1)} with that"
-        cause = LayerCause(robot.causes[0], f"{robot.words} ({proof})", None, left)
-        return dataclasses.replace(fit, causes=(cause, *trial.causes), between=False)
-    return fit
+        further = bool(trial.causes)  # several of them are alternatives
+        if (rank := (len(robot.causes) + further, further, left)) < best:
+            proof = f"forces off by {error(fit.off)} of their size, by {error(left, 1)} with that"
+            cause = LayerCause(robot.causes[0], f"{robot.words} ({proof})", None, left)
+            best, chosen = rank, dataclasses.replace(fit, causes=(cause, *trial.causes), between=False)
+    return chosen, ended if chosen is fit else ""
 
 
 def _fit_by_law(record: ControlRecord, evidence: _Evidence) -> AirFit | str:

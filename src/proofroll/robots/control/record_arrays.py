@@ -33,7 +33,7 @@ class Layout:
         by_level: True if joints are in the order of their distance from the root, False if in that of the robot file.
         inertial: True if place, attitude and velocity of the base are those of the inertial frame of its link.
         from_refs: columns that count from the ``ref`` of an MJCF.
-        step: interval between rows that is the program's own step, where the file does not say [s]; None: unknown.
+        step: usual step of the program, which rows so far apart may be [s]; None: it has none.
     """
 
     names: Mapping[str, tuple[str, ...]]
