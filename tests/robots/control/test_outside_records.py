@@ -168,6 +168,7 @@ def test_rates_whose_rows_are_told_are_not_left_open(judged: Judged) -> None:
     assert list(judgement.remarks) == []
 
 
+@pytest.mark.drill
 def test_a_layer_that_stays_open_tells_no_column(judged: Judged) -> None:
     """A base at its centre of mass, which layers alone tell, is not claimed where an observation stays open."""
     record = dict(Loop().record(PROGRAMS["mujoco"]))
