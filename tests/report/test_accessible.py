@@ -113,7 +113,7 @@ def test_a_phone_scrolls_down_only(report_page: Path, visit: Visiting) -> None:
         assert seen.draw("figure:not([data-p='1'])") == []  # those of the second point are as wide
         assert seen.page.evaluate("reading.wide()") == [0, []]
         seen.page.evaluate("document.querySelector('h1').style.minWidth = '600px'")
-        seen.page.wait_for_function("reading.wide()[0] > 0")  # the screen that a phone emulates follows a moment later
+        seen.wait("reading.wide()[0] > 0")  # the screen that a phone emulates follows a moment later
         _, wide = seen.page.evaluate("reading.wide()")
         assert any(name.startswith("H1") for name in wide)
 

@@ -46,8 +46,9 @@ ENGINES = ["projection", *(name for name in ("exudyn", "mujoco", "pinocchio") if
 ROOMS_OF_ROBOTS: dict[str, set[str]] = {
     "files": set(),
     "importers": set(),
-    "check": {"files"},
-    "control": {"files"},
+    "hypotheses": {"files"},
+    "check": {"files", "hypotheses"},
+    "control": {"files", "hypotheses"},
 }
 AS_DATA = {"model", "states", "protocol"}
 # What a kind adds to the report stands on the harness, as a plug-in of somebody else would.

@@ -302,8 +302,8 @@ def _tolerance(text: str, unit: str, *, bare_is_part: bool = False) -> Tolerance
     """Tolerance of the option; ``bare_is_part``: a number without a unit is a part of the path.
 
     Raises:
-        InputError: it has another form or unit.
-        ProofrollError: there is none.
+        InputError: the tolerance has another form or unit.
+        ProofrollError: no tolerance is asked for.
     """
     from proofroll.core.comparison import Tolerance
 

@@ -10,10 +10,10 @@ from robot_gallery import locate, outcome, read_gallery
 from proofroll.core.plugins import parse_engine
 from proofroll.robots.check.check import check
 from proofroll.robots.check.explain import RobotCause
-from proofroll.robots.check.hypotheses import hypotheses
 from proofroll.robots.check.records import HeldLayer, ImporterRow
 from proofroll.robots.files.meaning import CheckSettings
 from proofroll.robots.files.reading import reader_names
+from proofroll.robots.hypotheses import hypotheses
 from proofroll.running.engine_questions import lent_workers
 
 

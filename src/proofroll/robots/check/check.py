@@ -15,7 +15,6 @@ from proofroll.core.errors import InputError, Missing, require_known
 from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
 from proofroll.files.toml import read_toml
 from proofroll.robots.check.body_recursion import body_recursion, poses
-from proofroll.robots.check.hypotheses import hypotheses
 from proofroll.robots.check.importer_row import importer_row, row_with_copy
 from proofroll.robots.check.layers import LAYERS, RobotTruth
 from proofroll.robots.check.lint import lint
@@ -25,6 +24,7 @@ from proofroll.robots.files.meaning import USUAL, CheckSettings, moving_robot, s
 from proofroll.robots.files.mjcf.compiler import Compiler
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.urdf import BASE_JOINT
+from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.model import RobotJoint
 from proofroll.robots.protocol import Request
 from proofroll.robots.states import RobotStates, random_states

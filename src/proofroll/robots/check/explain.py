@@ -5,9 +5,9 @@ import math
 from collections.abc import Callable
 from xml.etree.ElementTree import Element
 
-from proofroll.robots.check.hypotheses import RobotEvidence, RobotHypothesis, hypotheses
 from proofroll.robots.check.layers import LAYERS, RobotTruth, differences, first_failing
 from proofroll.robots.files.robot_file import RobotFile
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis, hypotheses
 from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading
 
@@ -60,7 +60,7 @@ class Search:
         reading: model that the engine holds.
         engine: name of the engine.
         tolerances: layer -> largest difference at which it holds.
-        recompiled, reread: see :class:`proofroll.robots.check.hypotheses.RobotEvidence`.
+        recompiled, reread: see :class:`proofroll.robots.hypotheses.RobotEvidence`.
     """
 
     file: RobotFile

@@ -63,7 +63,7 @@ class StateReading(NamedTuple):
     Attributes:
         record: with velocities that are the rates of its places.
         layer: the mistakes of the columns; None: there are none.
-        frame: that the program has for its base; None: the base's own.
+        frame: frame of the base in the program; None: the base's own.
         reported: the record with that frame.
     """
 
@@ -144,7 +144,7 @@ def readings_of_early_rates(record: ControlRecord) -> Iterator[StateReading]:
 
 
 def untold_lags(record: ControlRecord) -> Iterator[str]:
-    """Names of the rates of which the digits of a record do not tell whether they are a row late."""
+    """Names of the rates that may be a row late by the digits of a record."""
     for name, measured in (("v", _of_joints), ("w_WB", _of_spin), ("v_WB", _of_velocity)):
         if (compared := measured(record)) is not None:
             lag = compared.lag_fit()
@@ -173,33 +173,33 @@ def _sizes(record: ControlRecord, kind: str) -> dict[str, float]:
 
 
 def _silent(record: ControlRecord, name: str, words: str, off: float, column: str) -> StateReading:
-    """Reading by a mistake that is told by the layers behind it."""
+    """Reading by a mistake that only the layers behind it show."""
     cause = LayerCause(name, f"{words} (the layers behind it tell so)", None, 0.0)
     return StateReading(record, Layer("state", off, 0.0, column, causes=(cause,)))
 
 
-def _explained(reading: _Reading, name: str, measured: _Measured, known: Sequence[ColumnMistake]) -> list[_Reading]:
+def _explained(reading: _Reading, name: str, measured: _Measured, mistakes: Sequence[ColumnMistake]) -> list[_Reading]:
     """The reading with each of the known mistakes that explain best what its velocities contradict."""
     compared = measured(reading.record)
     apart = None if compared is None else compared.off()
     if apart is None or apart.off <= max(_TELLS * apart.way, _SAFETY * apart.rounding):
         return [reading]
     trials = []
-    for mistake in known:
+    for mistake in mistakes:
         trial = mistake.changed(reading.record)
         compared = measured(trial)
         left = None if compared is None else compared.off()
         if left is not None and left.off <= _HELPS * min(apart.off, left.way):
             trials.append((left.off, mistake, trial))
-    tried = reading.tried + len(known)
+    tried = reading.tried + len(mistakes)
     if not trials:
         return [replace(reading, tried=tried)]
-    most = 2 * min(after for after, _, _ in trials) + _SAFETY * apart.rounding
+    most = 2 * min(leaves for leaves, _, _ in trials) + _SAFETY * apart.rounding
     worst, column = max((reading.worst, reading.column), (apart, name))
     readings = []
-    for after, mistake, trial in (item for item in trials if item[0] <= most):
-        proof = f"places off by {error(apart.off)}, by {error(after, 1)} with that"
-        cause = LayerCause(mistake.id, f"{mistake.words} ({proof})", None, after)
+    for leaves, mistake, trial in (item for item in trials if item[0] <= most):
+        proof = f"places off by {error(apart.off)}, by {error(leaves, 1)} with that"
+        cause = LayerCause(mistake.id, f"{mistake.words} ({proof})", None, leaves)
         readings.append(
             _Reading(record=trial, causes=(*reading.causes, cause), worst=worst, column=column, tried=tried)
         )

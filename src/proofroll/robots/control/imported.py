@@ -1,4 +1,4 @@
-"""Robots that importers make of a file, by the causes of :mod:`proofroll.robots.check.hypotheses`."""
+"""Robots that importers make of a file, by the causes of :mod:`proofroll.robots.hypotheses`."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from proofroll.core.errors import InputError, Refused
-from proofroll.robots.check.hypotheses import RobotEvidence, RobotHypothesis, hypotheses
 from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.files.robot_file import RobotFile
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis, hypotheses
 from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading
 
@@ -31,24 +31,24 @@ MOST = 2  # causes that act together
 
 
 def imported_robots(
-    file: RobotFile, robot: Robot, held: Callable[[Robot], HeldRobot], most: int = MOST
+    file: RobotFile, robot: Robot, holder: Callable[[Robot], HeldRobot], most: int = MOST
 ) -> Iterator[HeldRobot]:
     """Robots by one cause, then by two, up to ``most``.
 
     Args:
         file: of the robot.
-        robot: that the file describes.
-        held: robot as a program holds it.
+        robot: robot of the file.
+        holder: robot as a program holds it.
         most: number of causes that act together.
     """
     begun: list[tuple[tuple[RobotHypothesis, ...], Robot]] = [((), robot)]
     for _ in range(most):
         changes, begun = _further(file, begun), []
-        for causes, changed in changes:
-            begun.append((causes, changed))
+        for causes, other_robot in changes:
+            begun.append((causes, other_robot))
             with suppress(InputError, Refused):
                 ids, words = tuple(item.id for item in causes), "; ".join(_told(item) for item in causes)
-                yield replace(held(changed), causes=ids, words=words)
+                yield replace(holder(other_robot), causes=ids, words=words)
 
 
 def _further(
@@ -59,8 +59,8 @@ def _further(
         for cause in hypotheses():
             if causes and cause.id <= causes[-1].id:
                 continue
-            if (changed := _changed(file, earlier, cause)) is not None:
-                yield (*causes, cause), changed
+            if (other_robot := _changed(file, earlier, cause)) is not None:
+                yield (*causes, cause), other_robot
 
 
 def _told(cause: RobotHypothesis) -> str:
@@ -71,10 +71,10 @@ def _told(cause: RobotHypothesis) -> str:
 def _changed(file: RobotFile, robot: Robot, cause: RobotHypothesis) -> Robot | None:
     """Robot with a cause that needs the file alone; None: it needs more, changes nothing, or changes the joints."""
     evidence = RobotEvidence(file=file, robot=robot, reading=_NOTHING)
-    changed = next(iter(cause.test(evidence)), None)
-    if not isinstance(changed, Robot) or changed is robot:
+    other_robot = next(iter(cause.test(evidence)), None)
+    if not isinstance(other_robot, Robot) or other_robot is robot:
         return None
-    return changed if _freedoms(changed) == _freedoms(robot) else None
+    return other_robot if _freedoms(other_robot) == _freedoms(robot) else None
 
 
 def _freedoms(robot: Robot) -> list[tuple[str, str]]:

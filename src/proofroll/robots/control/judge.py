@@ -217,7 +217,7 @@ def _best_reading(
     *,
     controlled: bool,
 ) -> _Judged:
-    """Reading of a record of which layers are open least, and its layers; all searches share one time.
+    """Reading of a record with the fewest open layers, and these layers; all searches share one time.
 
     Of readings that explain the state alike, layers behind it tell the right one. Mistakes that the state does not show
     are tried where these are open, and count if they leave none of them open.
@@ -225,7 +225,7 @@ def _best_reading(
     Args:
         readings: by the state.
         layers_of: layers of a reading, for a time of the search.
-        frames: that the record may have for its base.
+        frames: frames that the record may have for its base.
         controlled: True if a controller's law tells the efforts.
     """
     time = SearchTime(SEARCH_TIME)
@@ -286,7 +286,7 @@ def _count(reading: StateReading) -> int:
 def _searched(
     readings: Sequence[StateReading], layers_of: Callable[..., list[Layer]], time: SearchTime
 ) -> list[_Judged]:
-    """Readings with their layers; those of which more hold without a mistake have the time of the search first."""
+    """Readings with their layers; the search has time first for those that hold in more layers without a mistake."""
     if len(readings) == 1:
         return [(readings[0], layers_of(readings[0], time))]
     judged = [(reading, layers_of(reading, SearchTime(0.0))) for reading in readings]
@@ -372,7 +372,7 @@ def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[st
 
 
 def _untold(reading: StateReading) -> Iterator[str]:
-    """A sentence on rates that may be a row late, if there are any; not on those whose rows are told."""
+    """A sentence on rates that may be a row late, if there are any without a cause that says so."""
     causes = () if reading.layer is None else reading.layer.causes
     told = " ".join(cause.sentence for cause in causes if cause.id in _LAGS)
     if names := [name for name in untold_lags(reading.record) if name not in told]:

@@ -78,7 +78,7 @@ def record_layers(
         grounded: True if something else than servos and gravity acts on the robot.
         names: of the layers before that of accelerations.
         stepwise: True if the program has no steps between the rows.
-        in_air: what the accelerations are held against; by default the mechanism.
+        in_air: robot against which accelerations are held; by default the mechanism.
         time: of the searches for mistakes; by default without an end.
     """
     evidence = _Evidence(record, law, mechanism, in_air or InAir(HeldRobot.of(mechanism)))

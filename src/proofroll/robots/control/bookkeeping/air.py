@@ -66,7 +66,7 @@ class HeldRobot:
 
     Attributes:
         mechanism: the robot.
-        links: of which its bodies consist.
+        links: the parts of its bodies.
         causes: ids of what makes it another one than that of the file.
         words: sentence on them, with what to do.
     """

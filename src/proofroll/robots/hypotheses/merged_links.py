@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-from proofroll.robots.check.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, hypothesis
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from xml.etree.ElementTree import SubElement
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.robots.check.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, hypothesis
 from proofroll.robots.model import Robot
 
 

@@ -8,8 +8,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from proofroll.robots.check.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
-from proofroll.robots.check.hypotheses.inertias import bounded_from_below
+from proofroll.robots.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
+from proofroll.robots.hypotheses.inertias import bounded_from_below
 from proofroll.robots.model import Array, Robot, RobotBody, composed
 
 # Bullet's margin around the box of a body's shapes, also if it has no shape [m].

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.robots.check.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, hypothesis
 from proofroll.robots.model import NO_BODY, Robot, RobotBody, RobotJoint
 
 

@@ -7,8 +7,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from proofroll.robots.check.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
 from proofroll.robots.files.mjcf.defaults import with_classes
+from proofroll.robots.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
 from proofroll.robots.model import Robot, RobotBody
 from proofroll.robots.protocol import Reading
 

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from proofroll.robots.check.hypotheses import LEAST, WRITE_INERTIALS, RobotEvidence, hypothesis, with_weightless
+from proofroll.robots.hypotheses import LEAST, WRITE_INERTIALS, RobotEvidence, hypothesis, with_weightless
 from proofroll.robots.model import Array, Robot, RobotBody
 
 
