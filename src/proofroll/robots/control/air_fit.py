@@ -313,14 +313,14 @@ def _motion(record: ControlRecord, robot: AirRobot) -> tuple[list[tuple[Array, A
     states = states_of(record, robot)
     if isinstance(states, str):
         return states
-    own = np.array([v for _, v in states])
+    of_body = np.array([v for _, v in states])
     if robot.base is None:
-        return states, [_Moving(own)]
+        return states, [_Moving(of_body)]
     attitude = np.array([q[robot.base[0]][3:] for q, _ in states])
     R = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
-    of_world, start = own.copy(), robot.base[1].start
-    of_world[:, start : start + 3] = np.einsum("tij,tj->ti", R, own[:, start : start + 3])
-    return states, [_Moving(of_world, R), _Moving(own)]
+    of_world, start = of_body.copy(), robot.base[1].start
+    of_world[:, start : start + 3] = np.einsum("tij,tj->ti", R, of_body[:, start : start + 3])
+    return states, [_Moving(of_world, R), _Moving(of_body)]
 
 
 class _Table:

@@ -226,12 +226,12 @@ def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
     explained = rest.rest <= max(2 * rounding, _HELPS * lag.size)
     if not explained or abs(lag.intervals) <= _OF_SCHEMES + bar or abs(rest.intervals) > _OF_SCHEMES + bar:
         return reading
-    before, after = compared.off(), right.off()
+    distance, remainder = compared.off(), right.off()
     words = f"{_NAMES.get(name, name)} is one row {'late' if rows > 0 else 'early'}"
     text, interval = with_bar(abs(lag.intervals), bar, 1)
-    proof = f"places off by {error(before.off)}, by {error(after.off, 1)} with that; {text} ± {interval} rows"
-    cause = LayerCause("late" if rows > 0 else "early", f"{words} ({proof})", None, after.off)
-    worst, column = max((reading.worst, reading.column), (before, name))
+    proof = f"places off by {error(distance.off)}, by {error(remainder.off, 1)} with that; {text} ± {interval} rows"
+    cause = LayerCause("late" if rows > 0 else "early", f"{words} ({proof})", None, remainder.off)
+    worst, column = max((reading.worst, reading.column), (distance, name))
     tried = reading.tried + 1
     return _Reading(record=record, causes=(*reading.causes, cause), worst=worst, column=column, tried=tried)
 

@@ -137,11 +137,11 @@ def _held_joints(
     sizes = np.array([np.abs(record.columns[name][2:]).max() for name in names])
     digits = np.array([record.rounding[name].max() for name in names])
     varied = np.ptp(efforts, axis=0) > 2 * record.rounding_of("effort", law.joints).max(axis=0)
-    still = varied & (changes > 0) & (sizes <= _STILL * changes) & (digits <= _STILL * changes)
-    if not still.any():
+    standing = varied & (changes > 0) & (sizes <= _STILL * changes) & (digits <= _STILL * changes)
+    if not standing.any():
         return None
-    k = int(np.argmax(np.where(still, changes, 0)))
-    which = "all joints" if still.all() else ", ".join(law.joints[k] for k in np.flatnonzero(still).tolist())
+    k = int(np.argmax(np.where(standing, changes, 0)))
+    which = "all joints" if standing.all() else ", ".join(law.joints[k] for k in np.flatnonzero(standing).tolist())
     words = (
         f"{which}: velocities stay zero whatever the effort, as under motors that hold them (PyBullet's do unless "
         f"setJointMotorControl2(..., VELOCITY_CONTROL, force=0) switches them off); {names[k]} would change by "
