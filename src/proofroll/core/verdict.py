@@ -41,6 +41,9 @@ class Verdict(StrEnum):
     FAILED = "failed"  # there is no result
 
 
+SEVERITY = list(Verdict)  # from the best to the worst
+
+
 class LimitResult(StrEnum):
     """Result of a ladder of steps for the limit of small steps."""
 
@@ -90,8 +93,8 @@ class Judgement:
 
     @property
     def of_allowed(self) -> float:
-        """Error over what is allowed; infinite where nothing is."""
-        return self.error / self.tolerance if self.tolerance else math.inf
+        """Error over what is allowed; infinite for an error where none is."""
+        return self.error / self.tolerance if self.tolerance else math.inf if self.error else 0.0
 
 
 @dataclass(frozen=True)

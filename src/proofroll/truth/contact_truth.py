@@ -210,7 +210,7 @@ def _names(tree: ContactTree, bodies: ContactBodies) -> tuple[str, str]:
     """Names of both routes."""
     if not tree.dynamics.mechanism.contacts:
         return (
-            f"joint coordinates, {tree.integrators}, modes by complementarity",
+            f"joint coordinates, {tree.integrators}, modes by sweeps over the joints",
             f"maximal coordinates, {bodies.integrators}, modes by trial",
         )
     return (

@@ -8,7 +8,7 @@ from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
 from proofroll.core.element_abilities import step_bound
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
-from proofroll.core.verdict import Judgement, Verdict
+from proofroll.core.verdict import SEVERITY, Judgement, Verdict
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.records import (
     CoarserSteps,
@@ -26,7 +26,7 @@ from proofroll.report.kinds import group_of, kind_name
 from proofroll.report.labels import setting_words
 from proofroll.running.case import EngineFacts, Status, hosts
 from proofroll.running.environments import shown_name
-from proofroll.studies.comparison.outcome import SEVERITY, Outcome, Run
+from proofroll.studies.comparison.outcome import Outcome, Run
 from proofroll.studies.comparison.planning import at_point, point_name
 
 
@@ -197,13 +197,13 @@ def _remarks(runs: list[ReportedRun]) -> list[str]:
     # with other verdicts the reason names the floor
     floors = [(run, item) for run in runs for item in run.judgements if item.floor and item.verdict is Verdict.AGREES]
     if floors:
-        run, item = max(floors, key=lambda pair: pair[1].error / pair[1].tolerance)
+        run, item = max(floors, key=lambda pair: pair[1].of_allowed)
         remarks.append(f"{item.observable}{at_point(run.parameters)}: {item.floor}")
     return remarks
 
 
 def _furthest(judged: list[tuple[ReportedRun, Judgement | None]]) -> tuple[ReportedRun, Judgement | None]:
-    """ReportedRun and judgement with the worst verdict, of equal ones the one furthest beyond its tolerance."""
+    """Run and judgement with the worst verdict, of equal ones the one furthest beyond its tolerance."""
     return max(judged, key=lambda pair: _severity(pair[1]) if pair[1] else (-1, 0.0))
 
 

@@ -229,7 +229,7 @@ class Chip:
 
 @dataclass(frozen=True)
 class FirstAnswer:
-    """FirstAnswer to a question: for each column of the matrix, a kind of scenes or one scene."""
+    """Answer to a question: for each column of the matrix, a kind of scenes or one scene."""
 
     question: ReaderQuestion
     columns: list[ColumnAnswer]
@@ -259,7 +259,7 @@ class FirstAnswer:
 
 
 def answer(matrix: ChoiceMatrix, tolerance: float, forces: bool, engines: Collection[str] | None = None) -> FirstAnswer:
-    """FirstAnswer of a matrix to a question; ``engines``: of these alone."""
+    """Answer of a matrix to a question; ``engines``: of these alone."""
     asked = ReaderQuestion(tolerance, forces)
     columns = [ColumnAnswer(matrix, item, asked, engines) for item in matrix.columns]
     return FirstAnswer(asked, columns, _chips(matrix, [item for item in columns if item.column.whole]))

@@ -5,12 +5,11 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from proofroll.core.number_format import error, number
-from proofroll.core.verdict import LimitResult, Verdict
+from proofroll.core.verdict import SEVERITY, LimitResult, Verdict
 from proofroll.report.page.candidates import Candidate
 
 # States of a cell besides verdicts.
 NO_RUN, CANNOT, PARTLY = "none", "cannot", "partly"
-SEVERITY = list(map(str, Verdict))
 # States of an engine's cell from the best to the worst.
 ORDER = [
     *(Verdict.AGREES, PARTLY, Verdict.CONVERGES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE, Verdict.DIFFERS),
@@ -224,7 +223,7 @@ def of_cases(cells: Mapping[str, ChoiceCell], own: str | None, count: int) -> Ch
         own: the case with the scene's own parameters; None: it was not run.
         count: number of judged cases; the others of them were not run.
     """
-    worst = max(cells.values(), key=lambda item: (SEVERITY.index(item.state), item.cost))
+    worst = max(cells.values(), key=lambda item: (SEVERITY.index(Verdict(item.state)), item.cost))
     held = sum(cell.state == Verdict.AGREES for cell in cells.values())
     titles = zip(told_apart(list(cells)), cells.values(), strict=True)
     title = worst.title if len(cells) == 1 else "; ".join(f"{case}: {cell.title}" for case, cell in titles)

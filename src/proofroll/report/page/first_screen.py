@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 # State -> glyph, word, and what the legend says of it; several verdicts look alike.
 STATES: Mapping[str, tuple[str, str, str]] = {
     "agrees": ("✓", "holds", "The error is within the tolerance, and smaller steps do not contradict it."),
-    "partly": ("◐", "holds some scenes", "The tolerance is held in some scenes of this kind, not in all."),
+    "partly": ("◐", "holds some scenes", "The tolerance is held in some scenes of this kind, or in what is reported."),
     "converges": ("↘", "finer steps needed", "Beyond the tolerance at the steps that were run; smaller come closer."),
-    "differs": ("✗", "differs", "Small steps lead elsewhere, or nowhere that could be shown."),
+    "differs": ("✗", "differs", "Small steps lead elsewhere, or nowhere that could be shown; or there is no result."),
     "refused": ("⊘", "refused", "The engine was asked, declined the scene and says why."),
     "unjudged": ("?", "not judged", "It ran; the requested quantities are not judged there."),
     "cannot": ("—", "cannot", "The formulation lacks an element that the scene needs; nothing to run."),
     "none": ("·", "not run", "It could represent the scene, but this report did not try."),
 }  # fmt: skip
 _LOOKS = {
-    Verdict.UNCONFIRMED: "converges", Verdict.INCOMPLETE: "partly", Verdict.FAILED: "differs",
+    Verdict.INCOMPLETE: "partly", Verdict.FAILED: "differs",
     Verdict.ILL_POSED: "unjudged", Verdict.NOT_JUDGED: "unjudged", Verdict.ANOTHER_SCENE: "unjudged",
 }  # fmt: skip
 # Most engines of which every choice has an answer of its own; of more, all but one, and each alone.
@@ -56,6 +56,11 @@ _NOT_SMALL = ("force", "force-head", "axis")
 def look(state: str) -> str:
     """Key of :data:`STATES` for the state of a cell."""
     return str(_LOOKS.get(Verdict(state), state)) if state in list(Verdict) else state
+
+
+def word(state: str) -> str:
+    """Word for the state of a cell, which may differ from that of a state that looks alike."""
+    return state if state in {Verdict.INCOMPLETE, Verdict.FAILED} else STATES[look(state)][1]
 
 
 class CellView(NamedTuple):
@@ -155,7 +160,7 @@ class FirstScreen:
 
     def _view(self, row: MatrixRow, column: ChoiceColumn, cell: ChoiceCell) -> CellView:
         kind = look(cell.state)
-        glyph, word, _ = STATES[kind]
+        glyph, says_state = STATES[kind][0], word(cell.state)
         title = self.matrix.title(row.engine)
         says = cell.title.replace(f"{row.engine} ", f"{title} ")
         if cell.state in {NO_RUN, CANNOT}:
@@ -163,14 +168,14 @@ class FirstScreen:
             says = f"{title}{formulation}: {says}."
         counted = " of " in cell.text
         text = {
-            "agrees": cell.text, "unjudged": word, "cannot": word, "none": word,
+            "agrees": cell.text, **dict.fromkeys(("unjudged", "cannot", "none"), says_state),
         }.get(kind, cell.text if counted or not cell.text[:1].isdigit() else f"off {cell.text}")  # fmt: skip
         sub = cell.why.partition(", ")[2].partition(";")[0]
         if cell.holds and row.row is not None:
             sub = cell.name.removeprefix(row.row.name).strip() if cell.name else "by scene"
         place = f"{column.title}{cell.share}"
         return CellView(
-            look=kind, main=f"{glyph} {text}", sub=sub, title=f"{glyph} {word}: {place}\n{says}", href=cell.href
+            look=kind, main=f"{glyph} {text}", sub=sub, title=f"{glyph} {says_state}: {place}\n{says}", href=cell.href
         )
 
     def best(self, answered: FirstAnswer) -> list[int]:

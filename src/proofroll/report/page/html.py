@@ -22,7 +22,7 @@ from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page import model_lines, profile, verdict_strips
 from proofroll.report.page.answer import LENGTHS, speed_range, told
 from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE
-from proofroll.report.page.first_screen import STATES, FirstScreen, bar, look
+from proofroll.report.page.first_screen import STATES, FirstScreen, bar, look, word
 from proofroll.report.pages import environment, folded, packed, rendered, slug
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
@@ -141,6 +141,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "first_tolerance": FIRST_TOLERANCE,
         "states": STATES,
         "look": look,
+        "word": word,
         "bar": bar,
         "speed_range": speed_range,
         "told": told,

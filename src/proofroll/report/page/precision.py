@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from proofroll.core.verdict import Verdict
+from proofroll.core.verdict import SEVERITY, Verdict
 from proofroll.report.labels import step, symbol
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.candidates import held_tolerances, largest
@@ -13,7 +13,6 @@ from proofroll.report.page.candidates import held_tolerances, largest
 # Least number of points of a picture; fewer are no more than a table.
 _FEWEST = 2
 _UNJUDGED = {Verdict.ILL_POSED, Verdict.NOT_JUDGED}
-_SEVERITY = {str(item): number for number, item in enumerate(Verdict)}
 
 
 class PrecisionPoint(NamedTuple):
@@ -101,12 +100,12 @@ def _point(
         ]
         for sizes in (errors_of_lines, bounds)
     )
-    verdict = max((line.verdict for line in lines if line.verdict), key=lambda x: _SEVERITY.get(x, 0), default="")
+    verdicts = [Verdict(line.verdict) for line in lines if line.verdict]
     return PrecisionPoint(
         step=step(lines[0].resolution or None, lines[0].step),
         cost=_short(max(costs)),
         clean=all(line.clean for line in lines),
-        verdict=verdict,
+        verdict=max(verdicts, key=SEVERITY.index, default=""),
         errors=_shown(errors),
         held=_shown(held),
     )

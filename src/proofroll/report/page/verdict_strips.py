@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 
-from proofroll.core.verdict import Judgement, Verdict
+from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.records import ReportedComparison, ReportedRow, WorstJudgement
 from proofroll.report.comparison.verdict_matrix import notes
 
@@ -26,11 +26,6 @@ class Dot:
     y: float
 
 
-def part(judged: Judgement) -> float:
-    """Error over what is allowed; infinite for an error where none is."""
-    return judged.error / judged.tolerance if judged.tolerance else math.inf if judged.error else 0.0
-
-
 def place(value: float) -> float:
     """Place of an error over what is allowed on the axis [%], logarithmic."""
     decades = math.log10(value) if 0 < value < math.inf else math.copysign(math.inf, value - 1)
@@ -39,7 +34,7 @@ def place(value: float) -> float:
 
 def ranked(row: ReportedRow) -> list[WorstJudgement]:
     """Quantities of a row, that which takes most of its tolerance first; those by which none is judged are last."""
-    return sorted(row.observables.values(), key=lambda item: (item.verdict in _UNJUDGED, -part(item)))
+    return sorted(row.observables.values(), key=lambda item: (item.verdict in _UNJUDGED, -item.of_allowed))
 
 
 def strip(content: ReportedComparison) -> list[Dot]:
@@ -48,7 +43,7 @@ def strip(content: ReportedComparison) -> list[Dot]:
     dots = []
     for row in content.rows:
         judged = [item for item in ranked(row)[:1] if item.verdict not in _UNJUDGED]
-        for x in (place(part(item)) for item in judged):
+        for x in (place(item.of_allowed) for item in judged):
             taken[round(x / WIDTH)] += 1
             count = taken[round(x / WIDTH)]
             dots.append(Dot(row.name, x, HEIGHT / 2 + (1 if count % 2 else -1) * (count // 2) * RISE))

@@ -10,7 +10,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.number_format import counted, error, number, spaced
-from proofroll.core.verdict import LimitResult, Verdict
+from proofroll.core.verdict import SEVERITY, LimitResult, Verdict
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.records import (
     CoarserSteps,
@@ -25,7 +25,6 @@ from proofroll.report.labels import SYMBOLS, engine_title, omitted_lines, row_wo
 from proofroll.report.page.choice_cell import speed
 from proofroll.report.terminal.screen import WIDTH, numeric, plain_table, unbroken
 from proofroll.running.case import Status, host_sentences
-from proofroll.studies.comparison.outcome import SEVERITY
 
 _SETTING, _ERROR, _SPEED = 42, 27, 9  # characters of the columns behind the sign
 _INDENT = 4

@@ -4,8 +4,8 @@ from collections.abc import Collection
 
 from proofroll.core.comparison import Comparison
 from proofroll.core.number_format import number
-from proofroll.core.verdict import Judgement, Verdict
-from proofroll.studies.comparison.outcome import SEVERITY, worst
+from proofroll.core.verdict import SEVERITY, Judgement, Verdict
+from proofroll.studies.comparison.outcome import worst
 from proofroll.studies.comparison.planning import Planned, at_point
 
 # Verdicts without a judgement; they contradict no claim and may be expected of every engine.
@@ -50,7 +50,7 @@ def contradictions_of(
     if contradicts(overall, {*expected, Verdict.INCOMPLETE}) and (whole or worse):
         # The observables with the worst verdict.
         guilty = [judgement for judgement in judged if judgement.verdict == overall]
-        guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
+        guilty.sort(key=lambda item: item.of_allowed, reverse=True)
         causes = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)
         causes = f"{causes}; {guilty[0].observable}: {guilty[0].reason}" if guilty else "nothing is judged"
         sentences.append(f"{place} {overall}, expected: {' or '.join(expected)} ({causes})")

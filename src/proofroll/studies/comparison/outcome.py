@@ -10,16 +10,13 @@ from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
 from proofroll.core.number_format import number, spaced
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
-from proofroll.core.verdict import Judgement, Verdict
+from proofroll.core.verdict import SEVERITY, Judgement, Verdict
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.studies.comparison.planning import point_name
 from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging.reference import Reference
-
-SEVERITY = list(Verdict)
-
 
 # Verdict on runs that were not made for a good reason, or cannot be judged; all others that are not done failed.
 _UNJUDGED = {

@@ -214,7 +214,7 @@ def judge(
     compared += [item for item in unasked if item.judgement.verdict is Verdict.DIFFERS]
     against = dict(_against_state(user_run, reference, bounds))
     compared = [item for item in compared if item.judgement.observable not in against] + [*against.values()]
-    compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
+    compared.sort(key=lambda item: item.judgement.of_allowed, reverse=True)
     unjudged = _unjudged(user_run, reference, bounds) | _unsure(dataset, reference, bounds)
     if tolerance is None:
         unjudged |= _events_left(scene, observed, bounds)

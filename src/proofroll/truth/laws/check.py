@@ -75,7 +75,7 @@ class LawVerdict(NamedTuple):
 
 
 def verdict(checked: Mapping[str, LawResiduals]) -> LawVerdict:
-    """LawVerdict from the residuals of each route, by its name."""
+    """Verdict from the residuals of each route, by its name."""
     largest = [
         (part, law, time, name)
         for residuals in checked.values()

@@ -1,4 +1,4 @@
-"""BodyLoads on the bodies: gravity, applied forces, springs and bushings by their laws; others are added as stated."""
+"""Loads on the bodies: gravity, applied forces, springs and bushings by their laws; others are added as stated."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class Violation(NamedTuple):
 
 @dataclass
 class LawResiduals:
-    """LawResiduals of one route, in parts of their allowances.
+    """Residuals of one route, in parts of their allowances.
 
     Attributes:
         largest: law -> largest residual in parts of its allowance, its time [s] and part.

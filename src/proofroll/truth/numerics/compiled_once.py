@@ -29,7 +29,7 @@ _MOST_MODES = 128  # compiled modes that are kept
 
 
 def compiled_once(expressions: Sequence[Any], state: Sequence[Any], by_collocation: bool) -> CompiledExpressions:
-    """CompiledExpressions parts of a mode; the same for scenes that differ in numbers alone, in one thread.
+    """Compiled expressions of a mode; the same for scenes that differ in numbers alone, in one thread.
 
     They are recognised by hashes: to compare expressions takes for ever where they share parts. Optimised code takes
     two to ten times as long to compile, which no run earns back.

@@ -50,7 +50,7 @@ def test_what_nobody_is_judged_by_is_no_worst_quantity() -> None:
         "x",
     ]
     assert verdict_strips.strip(SimpleNamespace(rows=[row(ill)])) == []  # type: ignore[arg-type]
-    assert verdict_strips.part(judged("order", 0.0, tolerance=0.0)) == 0.0
+    assert judged("order", 0.0, tolerance=0.0).of_allowed == 0.0
 
 
 def test_a_reason_is_that_of_the_file_where_it_is_about_the_verdict() -> None:

@@ -1,6 +1,6 @@
-"""Modes of joints by complementarity, for route 1 of the truth; refusal of laws that switch.
+"""Modes of joints by complementarity, for states that no route follows: starts without contacts, records of robots.
 
-Engines decide modes with code of their own: sharing this code would make their agreement worthless as evidence.
+Motions that switch have their modes from :mod:`proofroll.elements.mechanism.contact.dynamics` in route 1 of the truth.
 """
 
 import itertools
@@ -93,7 +93,7 @@ def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
 
 
 class RestResponse(NamedTuple):
-    """RestResponse of some velocities to forces along them.
+    """Response of some velocities to forces along them.
 
     Attributes:
         free: their rates without these forces, (forces,).
@@ -126,7 +126,7 @@ def decided_mode(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses:
     resting = held_joints(tuple(mode))
 
     def released() -> RestResponse:
-        """RestResponse of the joints at rest, which are free for it."""
+        """Response of the joints at rest, which are free for it."""
         of_rest: Mode = tuple("free" if number in resting else kind for number, kind in enumerate(mode))
         return responses(of_rest, [joints[number].velocity for number in resting])
 

@@ -32,7 +32,7 @@ _SAME = 1e-12  # relative difference of moments of inertia, and of directions, t
 
 
 class LocalCoordinates(Protocol):
-    """LocalCoordinates of the centre of a ball on its wall, and the local frame: e1 towards the wall, e2, e3."""
+    """Coordinates of the centre of a ball on its wall, and the local frame: e1 towards the wall, e2, e3."""
 
     @property
     def coordinates(self) -> tuple[str, str]:
@@ -59,7 +59,7 @@ class LocalCoordinates(Protocol):
         """Columns e1, e2, e3."""
 
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """LocalCoordinates of the nearest centre that touches."""
+        """Coordinates of the nearest centre that touches."""
 
     def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
         """Distance of the ball from the wall [m]."""

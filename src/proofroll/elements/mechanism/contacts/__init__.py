@@ -1,1 +1,0 @@
-"""Contact between bodies: what touches, by which law, where and how."""
