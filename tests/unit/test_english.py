@@ -53,7 +53,7 @@ def hard_to_read(module: ast.Module) -> Iterator[str]:
 
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_docstrings_open_with_a_noun_or_a_verb(folder: str) -> None:
-    """No docstring opens with a clause, a phrase without its noun or a name of code, and no word hides who does what."""
+    """No docstring opens with a clause, a phrase without its noun or a name of code, and none hides who acts."""
     found = [
         f"{path.relative_to(ROOT)}:{problem}"
         for path in sorted((ROOT / folder).rglob("*.py"))

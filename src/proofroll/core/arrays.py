@@ -70,6 +70,11 @@ def longest(vectors: FloatArray) -> float:
     return float(np.max(np.linalg.norm(vectors, axis=-1), initial=0.0))
 
 
+def uneven(count: int) -> FloatArray:
+    """Sizes from 1 to 2 that differ by parts of the golden ratio, so that no few of them cancel each other."""
+    return np.asarray(1.0 + np.modf(np.arange(1, count + 1) * (np.sqrt(5.0) - 1) / 2)[0])
+
+
 _SWEEPS = 4  # of largest_distance; along a line two suffice
 # Number of the vector to which each component of a sample belongs, ascending; None: every component is on its own.
 Vectors = tuple[int, ...] | None

@@ -186,7 +186,7 @@ def _values(posed: Mechanism, equations: JointCoordinates, q: Array, second: Max
     values = []
     for joint, part in zip(posed.joints, posed.q_slices, strict=True):
         if joint.nq == 1:
-            unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
+            unit = joint.unit
             values.append(Value(f"q.{joint.name}", unit, float(q[part.start]), 0.0))
     for item, value, again in zip(named_forces(posed), solution["named"], second_solution.named[0], strict=True):
         values.append(Value(item.name, str(item.unit), float(value), float(abs(value - again))))

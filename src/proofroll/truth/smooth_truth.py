@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from proofroll.core.arrays import uneven
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
@@ -303,7 +304,7 @@ class _SmoothTruth:
         """Growth of that distance of the first route, by the poses of its bodies."""
         tree, equations, stretch = self._tree, self._equations, path.stretches[0]
         q, v, _ = tree.dynamics.parts(stretch.first)
-        ways = BESIDE * (1.0 + np.modf(np.arange(1, len(v) + 1) * 0.6180339887498949)[0])
+        ways = BESIDE * uneven(len(v))
         start = np.concatenate([equations.tree.moved(q, ways), v * (1.0 + ways)])
         for _ in range(3):  # Newton's method doubles the number of digits
             start = equations.eliminated(start)

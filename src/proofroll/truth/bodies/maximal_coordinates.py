@@ -16,6 +16,7 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.arrays import uneven
 from proofroll.core.errors import Missing
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
@@ -215,7 +216,7 @@ class NumericEquations:
     def beside(self, state: Array, by: float) -> Array:
         """State displaced by about ``by``, m and rad, with velocities changed by that fraction, as the rows allow."""
         e, state = self.equations, state.copy()  # all ways differ, by the golden ratio
-        ways = by * (1.0 + np.modf(np.arange(1, e.nu + 1) * 0.6180339887498949)[0])
+        ways = by * uneven(e.nu)
         state[: e.nx] += self.moving(state[: e.nx], ways)
         state[e.nx : e.nx + e.nu] *= 1.0 + ways
         for _ in range(3):  # Newton's method doubles the number of digits

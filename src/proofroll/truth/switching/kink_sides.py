@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from proofroll.core.arrays import uneven
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.kinks import held_sides
@@ -109,9 +110,7 @@ def noise_at_start(state: Array, sides: Array, kinks: Callable[[Array], Array], 
         size: largest distance of a body from the origin, in natural units.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (3, len(state)))
-    # sizes that differ by the golden ratio do not cancel each other
-    uneven = 1.0 + np.modf(np.arange(1, len(state) + 1) * 0.6180339887498949)[0]
-    ways = signs * uneven * np.maximum(np.abs(state), size)
+    ways = signs * uneven(len(state)) * np.maximum(np.abs(state), size)
     start = kinks(state)
     noise = np.abs([kinks(state + _DIGITS * way) - start for way in ways]).max(axis=0)
     return np.asarray(np.where(np.abs(start) <= noise, noise, 0.0) + 2 * np.maximum(-sides * start, 0.0))

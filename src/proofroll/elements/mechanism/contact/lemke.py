@@ -5,6 +5,7 @@ Source: R. W. Cottle, J.-S. Pang and R. E. Stone, The Linear Complementarity Pro
 
 import numpy as np
 
+from proofroll.core.arrays import uneven
 from proofroll.elements.mechanism.scene.rotations import Array
 
 _PIVOTS = 50  # at most, for each unknown
@@ -18,7 +19,7 @@ def lemke(M: Array, q: Array) -> Array | None:
     if q.min(initial=0.0) >= 0:
         return np.zeros(n)
     # w − M z − d z0 = q; the entries of d differ, so that no two rows leave at once where contacts are alike
-    d = 1.0 + np.modf(np.arange(1, n + 1) * 0.6180339887498949)[0]
+    d = uneven(n)
     tableau = np.column_stack([np.eye(n), -M, -d, q / scale])
     basis = list(range(n))  # w is 0 … n − 1, z is n … 2n − 1, z0 is 2n
     row, entering = int(np.argmin(tableau[:, -1] / d)), 2 * n

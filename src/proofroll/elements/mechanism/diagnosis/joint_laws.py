@@ -14,7 +14,7 @@ from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, 
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.drives import Actuator
-from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.signal import value_at
 
@@ -276,7 +276,7 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
                 count = 2  # place and rate
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
-            unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
+            unit = joint.unit
             what, change = (f"{joint.name} at its stop", unit, difference, remainder), abs(shift) / size
             yield Cause(
                 f"stop of {joint.name}",

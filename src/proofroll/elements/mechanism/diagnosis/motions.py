@@ -31,7 +31,7 @@ def of_motions(evidence: Evidence) -> Iterator[Cause]:
     placed = placed_of(mechanism, datasets[0]) if datasets is not None and is_motion(datasets[0]) else None
     start = of_start(evidence) if placed is None else None
     for joint, _, at_v in mechanism.prescribed:
-        unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
+        unit = joint.unit
         if placed is not None:
             # the sample at time 0 is given to an engine
             times, values = placed.time[1:], placed.along(joint)[0][1:, 0]

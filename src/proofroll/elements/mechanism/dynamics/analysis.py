@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from proofroll.core.arrays import uneven
 from proofroll.core.last_results import kept
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.scene.model import Mechanism
@@ -201,7 +202,7 @@ def general_place(
         moved: the state after a small displacement, shape (velocities,).
     """
     _, C = rows(start)
-    direction = 1.0 + np.modf(np.arange(1, C.shape[1] + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike
+    direction = uneven(C.shape[1])
     direction -= _inverse(C) @ (C @ direction)
     state = moved(start, NEARBY * direction / max(np.abs(direction).max(initial=0.0), 1e-300))
     for _ in range(10 if C.size else 0):  # Newton's method doubles the digits; four rounds do from so near

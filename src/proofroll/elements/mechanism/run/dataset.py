@@ -26,7 +26,7 @@ from proofroll.elements.mechanism.run.contacts.observables import (
     residuals,
 )
 from proofroll.elements.mechanism.run.sampling import MechanismSample
-from proofroll.elements.mechanism.scene.joint_kinds import TURNING, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import TURNING
 from proofroll.elements.mechanism.scene.shapes.geometry import carried_bodies, contact_sums, shared_pairs
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ def columns(
     put("positions", placed.points, "m", "tracked points, or centres of mass", "point", "xyz")
     doubts = _doubts(placed, element.turn_interval)
     for name, (q, rate) in placed.coordinates().items():
-        unit = "rad" if next(j for j in mechanism.joints if j.name == name).kind == JointKind.REVOLUTE else "m"
+        unit = mechanism.joints[mechanism.joint_index[name]].unit
         put(f"q.{name}", q, unit, f"coordinate of {name}", **doubts.get(name, {}))
         put(f"v.{name}", rate, f"{unit}/s", f"rate of {name}")
     for index, point in enumerate(mechanism.points):

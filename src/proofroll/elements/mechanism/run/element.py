@@ -296,7 +296,7 @@ class MechanismElement:
         ]
         for joint in self.mechanism.joints:
             if joint.nq == 1:
-                unit, floor = ("rad", _LEAST) if joint.kind == JointKind.REVOLUTE else ("m", a)
+                unit, floor = (joint.unit, _LEAST if joint.unit == "rad" else a)
                 table.append(
                     Observable(f"q.{joint.name}", unit, f"coordinate of {joint.name}", Role.MOTION, floor=floor)
                 )

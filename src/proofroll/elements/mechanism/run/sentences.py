@@ -87,6 +87,6 @@ def pose(mechanism: Mechanism, sample: MechanismSample) -> str:
     arrays = (sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB)
     placed = Placed(mechanism, np.zeros(1), *(np.asarray(item)[None] for item in arrays))
     coordinates = placed.coordinates()
-    units = {joint.name: "rad" if joint.kind == JointKind.REVOLUTE else "m" for joint in mechanism.joints}
+    units = {joint.name: joint.unit for joint in mechanism.joints}
     words = [f"q.{name} = {float(q[0]):.4g} {units[name]}" for name, (q, _) in list(coordinates.items())[:_JOINTS]]
     return ", ".join(words) + (", …" if len(coordinates) > _JOINTS else "")

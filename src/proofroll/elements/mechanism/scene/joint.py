@@ -232,6 +232,11 @@ class Joint:
         return FACTS[self.kind].nq
 
     @property
+    def unit(self) -> str:
+        """Unit of the coordinate of a joint that has one."""
+        return "rad" if self.kind == JointKind.REVOLUTE else "m"
+
+    @property
     def nv(self) -> int:
         """Number of velocities."""
         return FACTS[self.kind].nv
