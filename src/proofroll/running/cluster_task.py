@@ -146,12 +146,8 @@ def _workers_of(asked: Asked) -> Workers:
         here = installed()
         differing = [name for name in {**asked.installed, **here} if asked.installed.get(name) != here.get(name)]
         if differing:
-            raise unfit(
-                *(
-                    {name: is_running.get(name, "absent") for name in differing}
-                    for is_running in (asked.installed, here)
-                )
-            )
+            both = ({name: versions.get(name, "absent") for name in differing} for versions in (asked.installed, here))
+            raise unfit(*both)
     with _lock:
         workers = _workers.setdefault(asked.command, Workers(asked.memory, _ENGINES))
         _workers.move_to_end(asked.command)

@@ -96,11 +96,11 @@ def row_with_copy(as_written: reading.AsWritten, row: ImporterRow) -> str:
         return f"refused ({as_written.refused})"
     if row.held is None:
         return "read"
-    (velocities, mass), (inertias, weight) = (dataclasses.astuple(item) for item in (as_written.whole, row.held))
-    if velocities == inertias and abs(mass - weight) <= _SAME_MASS * max(abs(mass), abs(weight)):
+    (nv, mass), (nv_of_copy, mass_of_copy) = (dataclasses.astuple(item) for item in (as_written.whole, row.held))
+    if nv == nv_of_copy and abs(mass - mass_of_copy) <= _SAME_MASS * max(abs(mass), abs(mass_of_copy)):
         return "read"
-    copy = f"held with {counted(velocities, 'velocities')} and {mass:.6g} kg"
-    return f"{copy}, the copy that is compared with {inertias} and {weight:.6g} kg"
+    whole = f"held with {counted(nv, 'velocities')} and {mass:.6g} kg"
+    return f"{whole}, the copy that is compared with {nv_of_copy} and {mass_of_copy:.6g} kg"
 
 
 _Made = TypeVar("_Made")

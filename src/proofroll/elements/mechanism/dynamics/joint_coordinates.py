@@ -203,12 +203,12 @@ class JointCoordinates:
         nq = self.mechanism.nq
         return record_of(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)])
 
-    def followed(self, mode: Mode | None = None) -> Callable[[Array], Array]:
+    def followed(self) -> Callable[[Array], Array]:
         """Correction of the state after each step of one motion, by elimination of violations.
 
         It raises Diverged where a step passes a singular pose of the loops, or comes too near to one to tell.
         """
-        return self.watching(lambda y: self.eliminated(y, mode))
+        return self.watching(self.eliminated)
 
     def watching(self, eliminated: Callable[[Array], Array]) -> Callable[[Array], Array]:
         """A correction of the state that raises Diverged as :meth:`followed` does; then the step may be taken anew."""
@@ -270,10 +270,10 @@ class JointCoordinates:
             ]
         )
 
-    def rate(self, time: float, y: Array, mode: Mode | None = None) -> Array:
+    def rate(self, time: float, y: Array) -> Array:
         """Right-hand side for the state (q, v), (nq + nv)."""
         q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
-        return np.concatenate([self.tree.rate(q, v), self.solve(q, v, mode, time=time).acceleration])
+        return np.concatenate([self.tree.rate(q, v), self.solve(q, v, time=time).acceleration])
 
     def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
         """States (q, v) at the given times [s], by Runge-Kutta 4 in equal steps of at most ``step`` [s].
