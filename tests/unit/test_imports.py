@@ -165,7 +165,7 @@ SHARED_WITH_TRUTH = {
 
 def test_engines_share_no_equations_with_the_truth_nor_limits_with_the_judge() -> None:
     """What moves joints and bodies in the truth, and what a certificate allows, is imported by no engine."""
-    of_truth = {"joint_coordinates", "complementarity", "dynamics", "coulomb", "one_contact", "certificate"}
+    of_truth = {"joint_coordinates", "dynamics", "coulomb", "one_contact", "certificate"}
     shared = {
         f"{file.relative_to(ROOT)} imports {name}"
         for file in (ROOT / "engines").rglob("*.py")

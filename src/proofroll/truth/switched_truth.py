@@ -10,7 +10,7 @@ from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.dynamics.commands import has_held
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
-from proofroll.elements.mechanism.dynamics.switches import NEAR as NEAR_STOP
+from proofroll.elements.mechanism.dynamics.switches import with_stops_at_start
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import breaks
 from proofroll.truth.contact_truth import contact_truth
@@ -33,7 +33,7 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         Refused: fewer than two routes cover the mechanism; the text says why.
         NotUnique: the laws of contact leave more than one motion, or none.
     """
-    times, mechanism = np.asarray(times, dtype=float), _with_stops_at_start(mechanism)
+    times, mechanism = np.asarray(times, dtype=float), with_stops_at_start(mechanism)
     if (pole := first_pole(mechanism, float(times[-1]))) is None:
         return _truth_of(mechanism, times)
     known_times = times[times < (1 - NEAR) * pole.time]
@@ -78,19 +78,6 @@ def _reaches_none(mechanism: Mechanism, times: Array) -> bool:
         return False
     with units.errors_in_seconds():
         return scout.walk(0.0, begun.state, begun.mode, float(times[-1]) / units.time).guard is None
-
-
-def _with_stops_at_start(mechanism: Mechanism) -> Mechanism:
-    """Mechanism whose stops lie where its joints start, if these start beyond them, or before them by rounding."""
-
-    def placed(joint: Joint) -> Joint:
-        if not (joint.limits and joint.q0):
-            return joint
-        (low, high), (q,) = joint.limits, joint.q0
-        near = NEAR_STOP * (high - low)
-        return replace(joint, limits=(q if q - low <= near else low, q if high - q <= near else high))
-
-    return replace(mechanism, joints=tuple(map(placed, mechanism.joints)))
 
 
 def _inside(joint: Joint) -> bool:

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from mechanism_scenes import mechanism_named, true_motion
 
-from proofroll.core.errors import InputError, Refused
+from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
-from proofroll.elements.mechanism.dynamics.complementarity import complementary
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.drives import Coupling
 from proofroll.files.scene_file import load_scene
@@ -205,7 +204,7 @@ def test_friction_that_holds_does_not_creep() -> None:
 
 @pytest.mark.drill
 def test_two_joints_that_feel_each_other_stick_and_slip_alike_in_both_routes() -> None:
-    """A double pendulum with friction in both hinges has the same modes by complementarity and by trial."""
+    """A double pendulum with friction in both hinges has the same modes by sweeps and by trial."""
     inertia = ((1 / 12, 0, 0), (0, 1e-3, 0), (0, 0, 1 / 12))
     rods = (Body("a", 1.0, (0, -0.5, 0), inertia), Body("b", 1.0, (0, -0.5, 0), inertia))
     joints = (
@@ -249,25 +248,6 @@ def test_bad_laws_are_one_line(more: dict[str, object], said: str) -> None:
     assert said in str(raised.value)
 
 
-@pytest.mark.parametrize("round_off", [0.0, 1e-12, -1e-12])
-def test_forces_that_are_not_determinate_are_refused(round_off: float) -> None:
-    """Two rows of one velocity have no unique forces, and round-off between them gives the same reason."""
-    rows = np.array([[1.0, 1.0], [1.0, 1.0 - round_off]])
-    with pytest.raises(Refused, match="hold already"):
-        complementary(np.array([3.0, 3.0]), rows, -5 * np.ones(2), 5 * np.ones(2))
-
-
-@pytest.mark.arithmetic
-@pytest.mark.parametrize("round_off", [0.0, 1e-13, -1e-13])
-def test_joints_that_share_one_freedom_move_where_their_friction_does_not_hold_it(round_off: float) -> None:
-    """Two rows of one velocity have unique forces where both are at their bounds."""
-    rows = np.array([[1.0, -2.0], [-2.0, 4.0 - round_off]])
-    side, f, a = complementary(np.array([30.0, -60.0]), rows, -5 * np.ones(2), 5 * np.ones(2))
-    assert side.tolist() == [-1, 1]
-    assert f.tolist() == [-5.0, 5.0]
-    assert a == pytest.approx([15.0, -30.0], abs=1e-10)
-
-
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("ratio", [-0.7, 1.3])
 def test_joints_that_share_one_freedom_turn_together(ratio: float) -> None:
@@ -289,35 +269,6 @@ def test_joints_that_share_one_freedom_turn_together(ratio: float) -> None:
     height = turns - falls * 0.2**2 / 2
     assert found.record.q[1] == pytest.approx([height, ratio * height], abs=TIGHT)
     assert np.isinf(found.horizon)
-
-
-def test_complementarity_holds_on_random_problems() -> None:
-    """Every force lies between its bounds, and acceleration is zero inside, outward at a bound."""
-    random = np.random.default_rng(3)
-    for _ in range(200):
-        n = int(random.integers(1, 6))
-        root = random.normal(size=(n, n))
-        G, free = root @ root.T + 0.1 * np.eye(n), 3 * random.normal(size=n)
-        high = random.uniform(0, 2, n)
-        low = np.where(random.random(n) < 0.3, 0.0, -high)
-        state, f, a = complementary(free, G, low, high)
-        assert np.all((f >= low - 1e-12) & (f <= high + 1e-12))
-        assert np.all(np.abs(a[state == 0]) < 1e-9)
-        assert np.all(a[state < 0] >= -1e-12)
-        assert np.all(a[state > 0] <= 1e-12)
-
-
-def test_forces_exactly_at_their_bounds_are_found() -> None:
-    """Where round-off decides whether a force is within its bound or at it, both are the solution."""
-    random = np.random.default_rng(5)
-    for _ in range(200):
-        n = int(random.integers(2, 6))
-        root, high = random.normal(size=(n, n)), random.uniform(0.5, 2, n)
-        G, low = root @ root.T + 0.1 * np.eye(n), np.where(random.random(n) < 0.3, 0.0, -high)
-        expected = np.clip(random.uniform(2 * low, 2 * high), low, high)
-        _, f, a = complementary(-G @ expected, G, low, high)
-        assert f == pytest.approx(expected, abs=1e-9)
-        assert a == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.arithmetic

@@ -40,6 +40,7 @@ class ChoiceCell(NamedTuple):
         open: True if no coarser step of the setting was seen to fail, so that it may be cheaper.
         name: setting and step; for several scenes the ones that they share, or empty.
         why: short reason why the tolerance is not held; empty: it is.
+        ladder: clause of it on smaller steps; empty: there is none.
         scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
         engine, formulation: names of an engine and its best formulation, or of several; empty: not of an engine.
         by_scene: best cell of that engine in each scene.
@@ -55,6 +56,7 @@ class ChoiceCell(NamedTuple):
     open: bool = False
     name: str = ""
     why: str = ""
+    ladder: str = ""
     scenes: int = 1
     lacking: int = 0
     engine: str = ""
@@ -179,7 +181,7 @@ def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> Choic
         off = _beyond(size, tolerance)
         by = f"its error of {number(step_error)} is luck, finer steps or their limit are off by" if luck else "off by"
         title, why = f"{item.name}: {by} {_beyond(size, tolerance, 2)}; {_WHY[limit]}", f"{by} {off}, {_WHY[limit]}"
-        return ChoiceCell(state, off, title, item.href, name=item.name, why=why)
+        return ChoiceCell(state, off, title, item.href, name=item.name, why=why, ladder=_WHY[limit])
     if whole:
         lacking = "no forces" if whole[0].motion is not None else "no motion"
         title = f"{whole[0].name}: reports {lacking}"

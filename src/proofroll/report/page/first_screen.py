@@ -170,7 +170,7 @@ class FirstScreen:
         text = {
             "agrees": cell.text, **dict.fromkeys(("unjudged", "cannot", "none"), says_state),
         }.get(kind, cell.text if counted or not cell.text[:1].isdigit() else f"off {cell.text}")  # fmt: skip
-        sub = cell.why.partition(", ")[2].partition(";")[0]
+        sub = cell.ladder
         if cell.holds and row.row is not None:
             sub = cell.name.removeprefix(row.row.name).strip() if cell.name else "by scene"
         place = f"{column.title}{cell.share}"

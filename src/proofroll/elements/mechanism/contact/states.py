@@ -93,9 +93,9 @@ class ContactSolution:
         return np.asarray(np.einsum("ki,kiw->kw", normals, self.shifts))
 
     def lasts(self, mode: ContactMode) -> float:
-        """Time until an open contact closes at constant acceleration [s]; infinite: never."""
+        """Time until one of the first contacts that is open closes at constant acceleration [s]; infinite: never."""
         times = [np.inf]
-        for acting, touch, rate in zip(mode, self.state.touching, self.slide_rate, strict=True):
+        for acting, touch, rate in zip(mode, self.state.touching, self.slide_rate, strict=False):
             if acting.kind == "open":
                 opening = touch.normal @ rate + touch.normal_rate @ touch.slide
                 roots = np.roots([opening / 2, touch.normal @ touch.slide, touch.gap])

@@ -6,23 +6,16 @@ each step the violations of Φ and C v are eliminated along the locked direction
 spherical and free joints are states in the child's axes, which keeps digits when a body spins fast.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism.dynamics.analysis import BRANCHES, NO_RESPONSE, RANK, RowSign, analyse, reactions
-from proofroll.elements.mechanism.dynamics.complementarity import (
-    ROUND_OFF,
-    RestResponse,
-    decided_mode,
-    load_of,
-)
+from proofroll.elements.mechanism.dynamics.analysis import BRANCHES, RANK, RowSign, analyse, reactions
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.dynamics.light_joints import lacks_inertia
 from proofroll.elements.mechanism.dynamics.named_forces import joint_force_shares, lengths, pick_named
@@ -95,15 +88,14 @@ class JointCoordinates:
     ) -> Solution:
         """Accelerations and multipliers for coordinates (nq) and velocities (nv), with drives at ``time`` [s].
 
-        ``mode``: of switched joints and limited efforts; None: it follows from the forces, see :meth:`decided_mode`.
+        ``mode``: of switched joints and limited efforts; None: that of :meth:`sliding`.
         ``load``: additional force along the velocities, (nv).
 
         Raises:
             Diverged: a velocity moves nothing with inertia in this pose.
             Refused: joints that are held and loops lock the same direction, so that their forces are not determinate.
         """
-        if mode is None:
-            mode = self.decided(q, v, time) if self.switched else ()
+        mode = self.sliding(v) if mode is None else mode
         motion = self.tree.at(q, v)
         J, M, loads = self.inertial(motion)
         b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
@@ -111,8 +103,8 @@ class JointCoordinates:
             b[at_v] -= stiffness * (q[at_q] - rest)
         for acting in point_loads(self.mechanism, motion, time, self.functions):
             b += acting.along(motion)
-        if self.switched:
-            b += load_of(self.switched, mode, len(v))
+        for joint, kind in zip(self.switched, mode, strict=False):  # modes of efforts come last
+            b[joint.velocity] += joint.push(kind)
         if load is not None:
             b += load
         for signal, column in self._driven:
@@ -182,21 +174,10 @@ class JointCoordinates:
             for (actuator, at_q, at_v), clamped in zip(self.actuators, self._clamped, strict=True)
         ]
 
-    def decided(self, q: Array, v: Array, time: float = 0.0) -> Mode:
-        """Mode of joints, by complementarity."""
-        return decided_mode(self.switched, q, v, partial(self._responses, time, q, v))
-
-    def _responses(self, time: float, q: Array, v: Array, mode: Mode, columns: Sequence[int]) -> RestResponse:
-        """Responses of the joints in a mode to unit forces along the velocities ``columns``; see :data:`.Responses`."""
-        free = self.solve(q, v, mode, time=time)
-        M = self.weighted(self.inertial(free.motion)[1], np.zeros(len(v)), free.C, np.zeros(len(free.C)))[0]
-        loose: Array = np.asarray(np.linalg.inv(M), dtype=np.float64)
-        W = loose if free.split is None else loose - free.split[0] @ free.split[0].T
-        held, rates = free.C.T @ np.append(free.multipliers, free.holding), free.acceleration
-        # in the norm of kinetic energy, which has one unit for all velocities
-        strength, most = np.sqrt(rates @ M @ rates) + np.sqrt(held @ loose @ held), np.diag(loose)[list(columns)]
-        moved, least = np.diag(W)[list(columns)] <= NO_RESPONSE * most, ROUND_OFF * np.sqrt(most) * strength
-        return RestResponse(free=rates[list(columns)], by_force=W[np.ix_(columns, columns)], moved=moved, least=least)
+    def sliding(self, v: Array) -> Mode:
+        """Mode in which each switched joint that moves slides, and those at rest are free."""
+        rates = [(joint, v[joint.velocity]) for joint in self.switched]
+        return tuple(joint.moving(rate) if rate else "free" for joint, rate in rates)
 
     def recorded(self, times: Array, states: Iterable[Array]) -> Record:
         """Record of states (q, v) at times [s]."""
@@ -270,10 +251,10 @@ class JointCoordinates:
             ]
         )
 
-    def rate(self, time: float, y: Array) -> Array:
+    def rate(self, time: float, y: Array, mode: Mode | None = None) -> Array:
         """Right-hand side for the state (q, v), (nq + nv)."""
         q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
-        return np.concatenate([self.tree.rate(q, v), self.solve(q, v, time=time).acceleration])
+        return np.concatenate([self.tree.rate(q, v), self.solve(q, v, mode, time=time).acceleration])
 
     def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
         """States (q, v) at the given times [s], by Runge-Kutta 4 in equal steps of at most ``step`` [s].
@@ -320,8 +301,7 @@ class JointCoordinates:
         ``load``: additional forces along the velocities, (nv). ``applied``: the wrenches on bodies and world that
         ``load`` comes from, about the world's origin, (bodies + 1, 6).
         """
-        if mode is None and self.switched:
-            mode = self.decided(q, v, time)
+        mode = self.sliding(v) if mode is None else mode
         solution = self.solve(q, v, mode, load, time)
         motion, rows, mechanism = solution.motion, solution.rows, self.mechanism
         n = len(mechanism.bodies)
@@ -336,7 +316,7 @@ class JointCoordinates:
             "q": q,
             "v": v,
             "wrench": wrench,
-            "named": self._named(solution, q, v, mode or (), time),
+            "named": self._named(solution, q, v, mode, time),
             "residual": np.array(largest),
         }
 

@@ -7,12 +7,13 @@ an effort with a limit is ``least``, ``linear`` or ``greatest``.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import EventKind
+from proofroll.elements.mechanism.scene.joint import Joint
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
 
@@ -135,6 +136,19 @@ def switched_joints(mechanism: Mechanism) -> tuple[SwitchedJoint, ...]:
             )
         )
     return tuple(switched)
+
+
+def with_stops_at_start(mechanism: Mechanism) -> Mechanism:
+    """Mechanism whose stops lie where its joints start, if these start beyond them, or before them by rounding."""
+
+    def placed(joint: Joint) -> Joint:
+        if not (joint.limits and joint.q0):
+            return joint
+        (low, high), (q,) = joint.limits, joint.q0
+        near = NEAR * (high - low)
+        return replace(joint, limits=(q if q - low <= near else low, q if high - q <= near else high))
+
+    return replace(mechanism, joints=tuple(map(placed, mechanism.joints)))
 
 
 def first_change(joints: Sequence[SwitchedJoint], q: Array, v: Array, rates: Array) -> float:

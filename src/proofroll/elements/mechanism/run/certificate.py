@@ -281,7 +281,9 @@ def _compare_named(element: MechanismElement, sample: MechanismSample, compare: 
             reported = None if getattr(sample, key) is None else along(sample, key, counts[key])[numbers[mine]]
             # a servo that starts at its target has an effort of round-off; what imposes a motion is a reaction
             least = natural if key == "drive" else _FAINT * natural
-            compare(quantity, "N or N m", expected, reported, max(float(np.max(np.abs(expected))), least))
+            compare(
+                quantity, "N or N m", expected, reported, max(float(np.nanmax(np.abs(expected), initial=0.0)), least)
+            )
 
 
 def _turning(element: MechanismElement, soft: bool) -> float:

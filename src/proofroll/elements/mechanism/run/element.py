@@ -28,7 +28,7 @@ from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordin
 from proofroll.elements.mechanism.dynamics.link_forces import link_observables
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.dynamics.placed import Placed
-from proofroll.elements.mechanism.dynamics.switches import first_change
+from proofroll.elements.mechanism.dynamics.switches import first_change, with_stops_at_start
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.run.certificate import CAPS, certify
 from proofroll.elements.mechanism.run.contacts.local_frame import local_observables, local_sizes, observe_locally
@@ -189,18 +189,22 @@ class MechanismElement:
         return self._equations.solve(*self.mechanism.start())
 
     @cached_property
+    def _switches(self) -> bool:
+        return bool(self.mechanism.contacts or self._equations.switched)
+
+    @cached_property
     def _pressed(self) -> ContactSolution | None:
-        """Accelerations and forces of contact at the start; None: nothing may touch, or they are not unique."""
+        """Accelerations and forces of contacts and of laws of joints at the start; None: as of ``_touching``."""
         return None if self._touching is None else self._touching[0].solve(*self.mechanism.start(), self._touching[1])
 
     @cached_property
     def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
-        """Equations of contacts with laws of joints, and modes at the start; None: no contacts, or no unique modes."""
+        """Equations of contacts and laws of joints, and modes at the start; None: nothing switches, or not uniquely."""
         from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 
-        if self.mechanism.contacts:
+        if self._switches:
             with contextlib.suppress(Refused):
-                dynamics = ContactDynamics(self._equations.mechanism)
+                dynamics = ContactDynamics(with_stops_at_start(self._equations.mechanism))
                 mode, margin = dynamics.begin()
                 return (dynamics, mode) if margin else None
         return None
@@ -346,8 +350,8 @@ class MechanismElement:
         scale = max(longest(acceleration[:, :3]), self.speed**2 / self.length)
         lasts = first_change(self._equations.switched, *self.mechanism.start(), rates)
         if self._pressed is not None and self._touching is not None:
-            lasts = min(lasts, self._pressed.lasts(self._touching[1]))
-        elif self.mechanism.contacts:
+            lasts = min(lasts, self._pressed.lasts(self._touching[1][: len(self.mechanism.contacts)]))
+        elif self._switches:
             acceleration, lasts = np.full_like(acceleration, np.nan), 0.0
         moment = _PART * min(self.natural_time, lasts or np.inf)
         return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, moment, lasts=lasts)
@@ -375,7 +379,11 @@ class MechanismElement:
         if self._touching is not None:
             return self._touching[0].sample(*start, self._touching[1])[0]
         sample = self._equations.sample(*start)
-        return sample | {"wrench": np.full_like(sample["wrench"], np.nan)} if self.mechanism.contacts else sample
+        if not self._switches:
+            return sample
+        of_state = np.array([item.field == "effort" for item in named_forces(self.mechanism)], dtype=bool)
+        named = np.where(of_state, sample["named"], np.nan)
+        return sample | {"wrench": np.full_like(sample["wrench"], np.nan), "named": named}
 
     def variables(self, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.run.dataset`."""
