@@ -28,9 +28,14 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
     SphereShape,
 )
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
-from proofroll.engines.mujoco.contact.coefficients import NEAR_CONE, check_coefficients
 from proofroll.engines.mujoco.contact.walls import check_walls, curved_end, shapes_at_start
-from proofroll.engines.mujoco.settings import SLIDES, TURNS, UNBOUNDED_FRICTION, MujocoSettings
+from proofroll.engines.mujoco.settings import (
+    LARGEST_PYRAMIDAL_FRICTION,
+    SLIDES,
+    TURNS,
+    UNBOUNDED_FRICTION,
+    MujocoSettings,
+)
 
 # m; MuJoCo has no sphere of radius 0.
 _VERTEX = 1e-12
@@ -50,6 +55,10 @@ _BESIDE_SPIN = 50.0
 # Factor on rates of the step before, so that their errors open no contact. With twice the rate, contacts that stick
 # beside others that slide would swing with a period of two steps.
 _LEAD = 1.1
+# MuJoCo silently raises a smaller coefficient to this (mjMINMU), unless the contact has no friction at all.
+_SMALLEST_FRICTION = 1e-5
+# The correction vanishes with the slip, so it may begin a little inside the cone: then all stages of RK4 apply it.
+_NEAR_CONE = 1 - 1e-3
 
 
 def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
@@ -57,7 +66,14 @@ def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
     moving = _moving(mechanism)
     check_walls(mechanism, settings)
     for contact in mechanism.contacts:
-        check_coefficients([_coefficient(contact), contact.spinning_friction], settings, "a contact")
+        for mu in (_coefficient(contact), contact.spinning_friction):
+            if 0 < mu < _SMALLEST_FRICTION:
+                raise Refused(
+                    f"MuJoCo raises a coefficient of friction of {mu:g} to {_SMALLEST_FRICTION:g}; 0 is exact"
+                )
+            if settings.cone == "pyramidal" and mu > LARGEST_PYRAMIDAL_FRICTION:
+                limit = f"{LARGEST_PYRAMIDAL_FRICTION:g}"
+                raise Refused(f"cone=pyramidal with friction above {limit} makes a contact soft; set cone=elliptic")
         _check_turning(contact)
         sides = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
         for (body, shape), (_, partner) in (sides, sides[::-1]):
@@ -283,7 +299,7 @@ class Contacts:
             row = int(contact.efc_address)
             if row >= 0:
                 mu, friction = self._slipping(contact)
-                bound = NEAR_CONE * mu * data.efc_force[row]
+                bound = _NEAR_CONE * mu * data.efc_force[row]
                 if bound > 0:
                     on_cone = np.linalg.norm(data.efc_force[friction]) >= bound
                     (self._on_cone if on_cone else within).add(self._number(contact))
@@ -390,7 +406,7 @@ class Contacts:
             if row < 0:
                 continue
             mu, friction = self._slipping(contact)
-            if np.linalg.norm(data.efc_force[friction]) >= NEAR_CONE * mu * data.efc_force[row]:
+            if np.linalg.norm(data.efc_force[friction]) >= _NEAR_CONE * mu * data.efc_force[row]:
                 data.efc_aref[row] -= mu * np.linalg.norm(missed[friction])
 
     def read(self, data: Any, rows_of: Callable[[Any, int], Array]) -> ContactsRead:
