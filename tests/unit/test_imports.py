@@ -175,6 +175,12 @@ def test_engines_share_no_equations_with_the_truth_nor_limits_with_the_judge() -
     assert shared == SHARED_WITH_TRUTH
 
 
+def test_no_package_is_empty() -> None:
+    """Each folder of src has a module or a folder of modules besides its ``__init__.py``."""
+    packages = [file.parent for file in ROOT.rglob("__init__.py")]
+    assert [str(folder.relative_to(ROOT)) for folder in packages if len([*folder.rglob("*.py")]) == 1] == []
+
+
 def test_each_class_has_a_name_of_its_own() -> None:
     """No two public classes are called the same: a name says what it is wherever one reads it."""
     homes: dict[str, list[str]] = {}

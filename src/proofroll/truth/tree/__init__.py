@@ -1,1 +1,1 @@
-"""Route 1 of the truth: joint coordinates, all contacts at once."""
+"""Route 1 of the truth: joint coordinates, all contacts at once; equations are those of elements/mechanism/dynamics."""
