@@ -9,17 +9,17 @@ from proofroll.elements.mechanism.contact.acting import ContactMode, Features, f
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.scene.kinks import Sides
+from proofroll.truth.bodies.body_elimination import BodySystem
 from proofroll.truth.bodies.constraint_rows import ConstraintRow
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_bodies import AXES, BodyInScalars
-from proofroll.truth.bodies.maximal_equations import Drive, Switched
+from proofroll.truth.bodies.maximal_equations import Switched
+from proofroll.truth.numerics.elimination import Row
 from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
 from proofroll.truth.switching.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
 from proofroll.truth.switching.contact_symbols import (
-    Row,
     SolvedSymbols,
     Vector,
-    eliminated,
     kink_guards,
     limited,
     of_joint,
@@ -92,20 +92,8 @@ class BodySymbols:
         touching += [of_turning(friction, touch, self._relative(friction, instant)) for friction, touch in turns]
         instant = instant._replace(pressing=[touch for _, touch in turns])
         joints = [motion.rows[k] for k in self._kept]
-        joint_rows = [(row.coefficients, row.bias) for row in joints]
-        mass = self._mass(motion.drives)
-        lines = [
-            start
-            if start is None or self._touchings <= k < self._alone or mode[k].leads
-            else self._line(k, touching[k], start, instant, (mass, joint_rows), functions)
-            for k, start in enumerate(began)
-        ]
-        rows, pushes = [row for row, _ in joint_rows], [row for row, _ in joint_rows]
-        aims = [sub(0.0, bias) for _, bias in joint_rows]
-        force = list(motion.force)
-        for row, inertia in motion.drives:
-            for n, value in row.coefficients.items():
-                force[n] = sub(force[n], mul(inertia, mul(value, row.bias)))
+        lines = self._lines(began, mode, touching, instant, BodySystem(e, motion, joints), functions)
+        rows, aims, force = list[tuple[Row, Row]](), list[Scalar](), list(motion.force)
         owner: list[tuple[int, Vector]] = []
         contacts, root = self._equations.contacts, functions["sqrt"]
         turning = TurningMoments(mode, contacts, touching, lines, root)
@@ -122,29 +110,30 @@ class BodySymbols:
                 for n, value in self._row(k, touch, scaled(-bound, line), instant).items():
                     force[n] = add(force[n], value)
             for direction, push in zip(part.directions, part.along, strict=True):
-                rows.append(self._row(k, touch, direction, instant))
-                pushes.append(turning.pushed(self._row(k, touch, push, instant), len(owner), k, push, row_of))
+                row = self._row(k, touch, direction, instant)
+                pushed = row if push is direction else self._row(k, touch, push, instant)
+                rows.append((row, turning.pushed(pushed, len(owner), k, push, row_of)))
                 beyond = dot(touch.normal_rate, touch.slide) if acting.kind == "slip" else 0.0
                 aims.append(sub(sub(0.0, dot(direction, rate)), beyond))
                 owner.append((k, push))
-        (answer,), pivots = self._eliminated(mass, rows, pushes, [[*force, *aims]])
+        accelerations, multipliers, sizes, pivots = BodySystem(e, motion, joints, rows).accelerated(force, aims)
         response: Scalar = 1.0
         if any(acting.kind == "slip" and mu for acting, mu in zip(mode, self._equations.friction, strict=True)):
-            smooth = self._eliminated(mass, rows, rows, [])[1]
-            for pivot, smooth_pivot in zip(pivots[e.nu :], smooth[e.nu :], strict=True):
+            smooth = BodySystem(e, motion, joints, [(row, row) for row, _ in rows]).pivots()
+            for pivot, smooth_pivot in zip(pivots, smooth, strict=True):
                 response = mul(response, pivot / smooth_pivot)
         forces: list[Vector | None] = [None if acting.kind == "open" else [0.0, 0.0, 0.0] for acting in mode]
-        for (k, push), size in zip(owner, answer[e.nu + len(joint_rows) :], strict=True):
+        for (k, push), size in zip(owner, sizes, strict=True):
             own_force = forces[k]
             assert own_force is not None  # its owner is closed
             forces[k] = plus(own_force, scaled(size, push))
-        turning.add_to(forces, answer[e.nu + len(joint_rows) :])
+        turning.add_to(forces, sizes)
         moved = [
-            plus(self._moved(k, touch, answer, instant), self._bias(k, touch, instant))
+            plus(self._moved(k, touch, accelerations, instant), self._bias(k, touch, instant))
             for k, touch in enumerate(touching)
         ]
         return SolvedSymbols(
-            rates=[*motion.rate, *answer[: e.nu], *motion.angle_rate],
+            rates=[*motion.rate, *accelerations, *motion.angle_rate],
             touching=touching,
             lines=lines,
             forces=forces,
@@ -152,16 +141,16 @@ class BodySymbols:
             slide_rates=moved,
             within_limits=limits,
             poses=self._poses(motion.views)[:-1],
-            efforts=[efforts.get(k, self._wanted(state, k, functions)) for k in range(len(e.mechanism.actuators))],
-            drives=self._drives(motion.moved, answer),
+            efforts=motion.efforts,
+            drives=self._drives(motion.moved, multipliers),
         )
 
-    def _drives(self, moved: slice, answer: Sequence[Scalar]) -> list[Scalar] | None:
+    def _drives(self, moved: slice, multipliers: Sequence[Scalar]) -> list[Scalar] | None:
         """Forces that impose motions; None where independent rows do not determine them, or of loops and couplings."""
         e, rows = self._bodies, range(moved.start, moved.stop)
         if e.mechanism.loops or e.mechanism.couplings or not (set(rows) <= set(self._kept) and self._moved_alone):
             return None
-        return [answer[e.nu + self._kept.index(row)] for row in rows]
+        return [multipliers[self._kept.index(row)] for row in rows]
 
     def _poses(self, views: Sequence[BodyInScalars]) -> list[tuple[Vector, Sequence[Vector], Vector, Vector]]:
         """Place of its frame, rotation by rows, velocity and angular velocity of each body, and of the world."""
@@ -244,40 +233,23 @@ class BodySymbols:
         a, b = (instant.views[body] for body in self._equations.pairs[k])
         return minus(*(cross(view.w, minus(touch.place_rate, view.v)) for view in (a, b)))
 
-    def _line(
+    def _lines(
         self,
-        k: int,
-        touch: ScalarTouch,
-        start: Vector,
+        began: Sequence[Vector | None],
+        mode: ContactMode,
+        touching: Sequence[ScalarTouch],
         instant: _Now,
-        bodies: tuple[Sequence[Row], Sequence[tuple[Row, Scalar]]],
+        system: BodySystem,
         functions: Any,
-    ) -> Vector:
-        """Present direction of the only line along which a contact can slide: where a force across would move it."""
-        push, (mass, joint_rows) = self._row(k, touch, touch.across(start), instant), bodies
-        right = [push.get(column, 0.0) for column in range(self._bodies.nu)] + [0.0] * len(joint_rows)
-        joints = [row for row, _ in joint_rows]
-        (answer,), _ = self._eliminated(mass, joints, joints, [right])
-        way = touch.across(self._moved(k, touch, answer, instant))
-        return scaled(1.0 / functions["sqrt"](dot(way, way)), way)
-
-    def _mass(self, drives: Sequence[Drive]) -> list[Row]:
-        """Mass matrix with the armature of joints."""
-        mass: list[Row] = [
-            {j: float(value) for j, value in enumerate(line) if value} for line in self._bodies.mass_matrix
-        ]
-        for row, inertia in drives:
-            for i, value in row.coefficients.items():
-                for j, factor in row.coefficients.items():
-                    mass[i][j] = add(mass[i].get(j, 0.0), mul(inertia, mul(value, factor)))
-        return mass
-
-    def _eliminated(
-        self, mass: Sequence[Row], rows: Sequence[Row], pushes: Sequence[Row], rights: Sequence[Sequence[Scalar]]
-    ) -> tuple[list[list[Scalar]], list[Scalar]]:
-        """Solutions and pivots of M u̇ − pushesᵀ z = loads, rows u̇ = aims."""
-        system: list[Row] = [dict(row) for row in mass]
-        for number, push in enumerate(pushes, self._bodies.nu):
-            for place, value in push.items():
-                system[place][number] = scaled(-1.0, [value])[0]
-        return eliminated([*system, *(dict(row) for row in rows)], rights)
+    ) -> list[Vector | None]:
+        """Present direction of the only line along which each contact can slide: where a force across would move it."""
+        lines = list(began)
+        turned = {
+            k: self._row(k, touching[k], touching[k].across(line), instant)
+            for k, line in enumerate(began)
+            if line is not None and not (self._touchings <= k < self._alone or mode[k].leads)
+        }
+        for k, answer in zip(turned, system.responses(list(turned.values())) if turned else (), strict=True):
+            way = touching[k].across(self._moved(k, touching[k], answer, instant))
+            lines[k] = scaled(1.0 / functions["sqrt"](dot(way, way)), way)
+        return lines

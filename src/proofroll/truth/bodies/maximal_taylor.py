@@ -1,10 +1,10 @@
 """Equations of route 2 as symbols, integrated by Taylor series (heyoka, an extra).
 
-The multipliers are eliminated symbolically: C M⁻¹ Cᵀ = L D Lᵀ, sparse, in an order of little fill. That needs linearly
-independent rows. Of redundant rows some are chosen, and others as soon as these come near to dependence.
+Their elimination needs linearly independent rows. Of redundant rows some are chosen, and others as soon as these come
+near to dependence.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,15 +12,10 @@ import numpy as np
 from proofroll.core.errors import Diverged, Missing
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import SMOOTH
-from proofroll.truth.bodies.constraint_rows import ConstraintRow
-from proofroll.truth.bodies.maximal_equations import ConstrainedEquations, MaximalEquations
-from proofroll.truth.numerics.scalars import Scalar, add, is_zero, mul, sub
-
-try:
-    import heyoka
-except ImportError:  # no wheel for this platform
-    heyoka = None
-
+from proofroll.truth.bodies.body_elimination import BodySystem
+from proofroll.truth.bodies.maximal_equations import MaximalEquations
+from proofroll.truth.numerics.compiled_once import heyoka
+from proofroll.truth.numerics.scalars import Scalar, add, mul
 
 # Integrator, time [s] and state before each step.
 Visited = list[tuple["MaximalTaylor", Scalar, Array]]
@@ -133,7 +128,8 @@ def compiled_powers(
     moved = {number: at_state.moved.start + number for field, number, _ in forces if field == "drive"}
     if not set(moved.values()) <= set(rows):
         raise Missing("a drive whose force is not determined by independent rows")
-    multipliers = _solution(equations, at_state, [at_state.rows[k] for k in rows])[1] if moved else []
+    system = BodySystem(equations, at_state, [at_state.rows[k] for k in rows])
+    multipliers = system.accelerated(at_state.force)[1] if moved else []
     u, powers = state[equations.nx : equations.nx + equations.nu], list[Scalar]()
     made = equations.rate_rows(state, [joint for _, _, joint in forces], functions)
     for (field, number, _), row in zip(forces, made, strict=True):
@@ -148,134 +144,8 @@ def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any) -> 
     """Variables of a state, and its rates as expressions in them."""
     state = [heyoka.make_vars(f"s{index}") for index in range(len(equations.start()))]
     at_state = equations.at(state, {name: getattr(heyoka, name) for name in SMOOTH}, time=time)
-    u_rate = accelerations(equations, at_state, [at_state.rows[k] for k in rows])
+    u_rate = BodySystem(equations, at_state, [at_state.rows[k] for k in rows]).accelerated(at_state.force)[0]
     return state, [*at_state.rate, *u_rate, *at_state.angle_rate]
-
-
-def accelerations(
-    equations: MaximalEquations, constrained: ConstrainedEquations, rows: Sequence[ConstraintRow]
-) -> list[Scalar]:
-    """Accelerations u̇ = M⁻¹(force + Cᵀλ), see :func:`_solution`."""
-    return _solution(equations, constrained, rows)[0]
-
-
-def _solution(
-    equations: MaximalEquations, constrained: ConstrainedEquations, rows: Sequence[ConstraintRow]
-) -> tuple[list[Scalar], list[Scalar]]:
-    """Accelerations, and multipliers λ of the rows: (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force, solved sparsely in scalars.
-
-    A drive is an additional row with compliance 1/inertia. Accelerations u̇₀ of bodies without inertia, whose M is
-    singular, are additional unknowns: C₀ᵀλ − M₀u̇₀ = −force₀.
-    """
-    row_count, drives = len(rows), [*constrained.drives, *constrained.holders]
-    rows = [*rows, *(drive.row for drive in drives)]
-    blocks = _inverse_blocks(equations)
-    free = [add(*(mul(value, constrained.force[k]) for k, value in block)) for block in blocks]
-    weighted = [_times(row.coefficients, blocks) for row in rows]  # rows of C M⁻¹
-    m = len(rows)
-    touching = [set(weight) for weight in weighted]
-    A: dict[tuple[int, int], Scalar] = {}
-    for i in range(m):
-        for j in range(i + 1):
-            shared = touching[i] & rows[j].coefficients.keys()
-            if shared:
-                A[i, j] = add(*(mul(weighted[i][k], rows[j].coefficients[k]) for k in sorted(shared)))
-    for i, drive in enumerate(drives, row_count):
-        A[i, i] = add(A.get((i, i), 0.0), 1.0 / drive.inertia)
-    predecessors = _of_light_bodies(A, equations, rows, row_count)
-    right = [
-        sub(sub(0.0, row.bias), add(*(mul(value, free[k]) for k, value in row.coefficients.items()))) for row in rows
-    ]
-    right += [sub(0.0, constrained.force[k]) for k in equations.light]
-    unknowns = _solved(A, right, predecessors)
-    result = list(free)
-    for weight, multiplier in zip(weighted, unknowns, strict=False):
-        for k, value in weight.items():
-            result[k] = add(result[k], mul(value, multiplier))
-    for k, value in zip(equations.light, unknowns[m:], strict=True):
-        result[k] = value
-    return result, unknowns[:row_count]
-
-
-def _of_light_bodies(
-    A: dict[tuple[int, int], Scalar], equations: MaximalEquations, rows: Sequence[ConstraintRow], row_count: int
-) -> dict[int, set[int]]:
-    """Adds the columns of u̇₀ to A; returns the unknowns that must be eliminated before each unknown.
-
-    Drives come before the accelerations that they hold, these before the multipliers of the first ``row_count`` rows.
-    Then no pivot is zero, as M plus the drives is positive definite.
-    """
-    predecessors: dict[int, set[int]] = {}
-    for p, k in enumerate(equations.light, len(rows)):
-        for i, row in enumerate(rows):
-            if k in row.coefficients:
-                A[p, i] = row.coefficients[k]
-                later, earlier = (i, p) if i < row_count else (p, i)
-                predecessors.setdefault(later, set()).add(earlier)
-        for column, index in enumerate(equations.light[: p - len(rows) + 1], len(rows)):
-            A[p, column] = -float(equations.mass_matrix[k, index])
-    return predecessors
-
-
-def _inverse_blocks(equations: MaximalEquations) -> list[list[tuple[int, float]]]:
-    """Rows of M⁻¹ by their nonzero entries; empty for bodies without inertia."""
-    blocks: list[list[tuple[int, float]]] = [[] for _ in range(equations.nu)]
-    for body, part in zip(equations.bodies, equations.u_slices, strict=True):
-        if body.heavy:
-            inverse = np.linalg.inv(body.mass_matrix)
-            for i, row in enumerate(inverse):
-                blocks[part.start + i] = [(part.start + k, float(row[k])) for k in np.flatnonzero(row).tolist()]
-    return blocks
-
-
-def _times(coefficients: dict[int, Scalar], blocks: list[list[tuple[int, float]]]) -> dict[int, Scalar]:
-    product: dict[int, Scalar] = {}
-    for i, coefficient in coefficients.items():
-        for k, value in blocks[i]:
-            product[k] = add(product.get(k, 0.0), mul(value, coefficient))
-    return {k: value for k, value in product.items() if not is_zero(value)}
-
-
-def _solved(
-    A: dict[tuple[int, int], Scalar], right: list[Scalar], predecessors: Mapping[int, set[int]]
-) -> list[Scalar]:
-    """Solution x of the symmetric A x = right; A holds the lower triangle.
-
-    Pivots have the fewest neighbours; ``predecessors``: unknown -> unknowns that must be eliminated before it.
-    """
-    entries = {frozenset(pair): value for pair, value in A.items() if not is_zero(value)}
-    neighbours: dict[int, set[int]] = {i: set() for i in range(len(right))}
-    for pair in entries:
-        if len(pair) == 2:
-            i, j = pair
-            neighbours[i].add(j)
-            neighbours[j].add(i)
-    b, order, factors = list(right), [], []
-    while neighbours:
-        ready = (
-            neighbours
-            if not predecessors
-            else [i for i in neighbours if predecessors.get(i, set()).isdisjoint(neighbours)]
-        )
-        pivot = min(ready, key=lambda i: (len(neighbours[i]), i))
-        others = sorted(neighbours.pop(pivot))
-        diagonal = entries[frozenset([pivot])]
-        factor = {i: entries[frozenset([pivot, i])] / diagonal for i in others}
-        for index, i in enumerate(others):
-            neighbours[i].discard(pivot)
-            for j in others[: index + 1]:
-                key = frozenset([i, j])
-                entries[key] = sub(entries.get(key, 0.0), mul(factor[i], entries[frozenset([pivot, j])]))
-                if i != j:
-                    neighbours[i].add(j)
-                    neighbours[j].add(i)
-            b[i] = sub(b[i], mul(factor[i], b[pivot]))
-        b[pivot] = 0.0 if is_zero(b[pivot]) else b[pivot] / diagonal
-        order.append(pivot)
-        factors.append(factor)
-    for pivot, factor in zip(reversed(order), reversed(factors), strict=True):
-        b[pivot] = sub(b[pivot], add(*(mul(value, b[i]) for i, value in factor.items())))
-    return b
 
 
 def _expression(value: Scalar, number: Any) -> Any:

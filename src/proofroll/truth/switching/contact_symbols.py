@@ -24,7 +24,6 @@ from proofroll.truth.switching.contact_guards import (
 from proofroll.truth.switching.contact_scalars import ScalarTouch, floats
 
 Vector = Sequence[Scalar]
-Row = dict[int, Scalar]
 _MOST_VELOCITIES = 10  # of one tree whose modes are compiled: 8 take a quarter of a second, 12 take eight seconds
 _NONE = (0.0, 0.0, 0.0)
 
@@ -218,32 +217,3 @@ def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: Sol
 def turning_slip(acting: Acting, contact: Touchable) -> bool:
     """True for a slip in the plane with friction along its own direction, which may turn."""
     return bool(acting.kind == "slip" and acting.along is None and contact.friction and not acting.leads)
-
-
-def eliminated(rows: list[Row], rights: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """Solutions x of A x = b for each right side b, and the pivots of A, sparse, in the given order, without exchanges.
-
-    Args:
-        rows: of A, column -> value.
-        rights: right sides.
-    """
-    rows, sides, count = [dict(row) for row in rows], [list(side) for side in rights], len(rows)
-    for p in range(count):
-        pivot = rows[p][p]
-        for i in range(p + 1, count):
-            value = rows[i].pop(p, 0.0)
-            if is_zero(value):
-                continue
-            factor = value / pivot
-            for j, entry in rows[p].items():
-                if j > p:
-                    rows[i][j] = sub(rows[i].get(j, 0.0), mul(factor, entry))
-            for side in sides:
-                side[i] = sub(side[i], mul(factor, side[p]))
-    for side in sides:
-        for p in reversed(range(count)):
-            for j, entry in rows[p].items():
-                if j > p:
-                    side[p] = sub(side[p], mul(entry, side[j]))
-            side[p] = 0.0 if is_zero(side[p]) else side[p] / rows[p][p]
-    return sides, [rows[p][p] for p in range(count)]

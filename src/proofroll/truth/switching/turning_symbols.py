@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 from proofroll.elements.mechanism.contact.acting import ContactMode
 from proofroll.elements.mechanism.contact.turning import TurningFriction
+from proofroll.truth.numerics.elimination import Row
 from proofroll.truth.numerics.scalars import Scalar, add, dot, minus, plus, scaled
 from proofroll.truth.switching.contact_guards import Touchable
 from proofroll.truth.switching.contact_scalars import ScalarTouch
 
 Vector = Sequence[Scalar]
-Row = dict[int, Scalar]
 _NONE = (0.0, 0.0, 0.0)
 
 
@@ -77,14 +77,12 @@ class TurningMoments:
             direction: its direction.
             row_of: coefficients of a contact's slide in a direction.
         """
-        push = dict(push)
         for number, by, moment in self._acting:
-            if by != k:
-                continue
-            carried = scaled(dot(self._touching[k].normal, direction), moment)
-            self._found.append((place, number, carried))
-            for n, value in row_of(number, carried).items():
-                push[n] = add(push.get(n, 0.0), value)
+            if by == k:
+                carried = scaled(dot(self._touching[k].normal, direction), moment)
+                self._found.append((place, number, carried))
+                brought = row_of(number, carried)
+                push = {n: add(push.get(n, 0.0), brought.get(n, 0.0)) for n in (push | brought)}
         return push
 
     def add_to(self, forces: list[Vector | None], sizes: Sequence[Scalar]) -> None:

@@ -15,6 +15,7 @@ from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.scene.kinks import Sides
 from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.signal import value_at
+from proofroll.truth.numerics.elimination import Row, eliminated
 from proofroll.truth.numerics.scalars import (
     Scalar,
     add,
@@ -31,10 +32,8 @@ from proofroll.truth.numerics.scalars import (
 )
 from proofroll.truth.switching.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
 from proofroll.truth.switching.contact_symbols import (
-    Row,
     SolvedSymbols,
     Vector,
-    eliminated,
     kink_guards,
     limited,
     of_joint,
