@@ -27,6 +27,7 @@ from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.contact_bounces import contact_bounces
+from proofroll.truth.early_end import cut_at
 from proofroll.truth.error_bars import TwoRouteMotion, check_start, on_same_turns
 from proofroll.truth.followed_paths import (
     CLOSE,
@@ -41,7 +42,7 @@ from proofroll.truth.followed_paths import (
     times_known,
     two_route_motion,
 )
-from proofroll.truth.law_verdict import cut_at, held_to_laws, of_bodies, of_tree, work_along
+from proofroll.truth.law_verdict import held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
 from proofroll.truth.standing_ends import Face, RollingLanding, standing_ends

@@ -1,14 +1,18 @@
-"""Early end of a truth: the earliest of its routes' failures and of broken checks, with its reason."""
+"""Early end of a truth: the earliest of its routes' failures and of broken checks, with its reason; paths up to it."""
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
 from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism.contact.acting import ContactMode
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch
 
+_Path = HybridPath[Stretch[ContactMode]]
 _T = TypeVar("_T")
 _TIME = re.compile(r" (?:at|near|by|before) t = [\d.e+-]+ s\b")  # of a failure, in its message
 
@@ -52,3 +56,20 @@ class EarlyEnd:
                 if stopped.time is None or not 0.0 < stopped.time < self.time:
                     raise
                 self.at(stopped.time, str(stopped))
+
+
+def cut_at(path: _Path, end: float, text: str) -> _Path:
+    """Path up to a time, and the reason why it ends there."""
+    kept = [stretch for stretch in path.stretches if stretch.start < end]
+    last = kept[-1]
+    if last.end > end:
+        kept[-1] = replace(last, end=end, guard=None)
+    return replace(
+        path,
+        stretches=tuple(kept),
+        happenings=tuple(item for item in path.happenings if item.time < end),
+        margins=tuple(item for item in path.margins if item[0] < end),
+        known=False,
+        ended=text,
+        transitions=path.transitions[: len(kept)],
+    )

@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.law_states import stated_named
-from proofroll.truth.laws.integrals import POINTS, TO_SERIES
+from proofroll.truth.laws.integrals import POINTS, RESOLVED, TO_SERIES
 from proofroll.truth.laws.record import Modes, Passage, Pieces
 from proofroll.truth.natural_units import Units
 from proofroll.truth.numerics.hybrid import DenseStep, HybridPath, Stretch, states_inside
@@ -30,7 +30,6 @@ from proofroll.truth.switching.stopping_slip import StoppingSlip
 from proofroll.truth.tree.contact_tree import ContactTree
 
 _T = TypeVar("_T")
-_RESOLVED = 1e-13  # last coefficients of states on a piece, relative to their sizes, that are round-off
 _TURN = 1.0  # rad, by which bodies turn in a piece at most: more is not resolved by its points
 _HALVINGS = 7  # of a step into pieces at most
 _SHORTER = 20  # halvings of a step at most of which one piece is looked at
@@ -267,14 +266,23 @@ class LawRecorder:
             length = (end - start) / 2**halvings
             times = start + length * (POINTS + 1) / 2
             states = inside(times)
-            sizes = np.abs(TO_SERIES @ states.T)
-            turning, spins = self._turns(states)
-            turned = length * float(np.abs(spins).max(initial=0.0))
-            resolved = sizes[-2:] <= _RESOLVED * np.maximum(sizes.max(0), sizes.max() * _RESOLVED)
-            hidden = bool(self._mechanism.prescribed) and _unresolved(turning.reshape(-1, len(POINTS)))
-            if turned <= _TURN and resolved.all() and not hidden:
+            if not self._rough(states, length):
                 break
         return _Piece(times, np.full(len(POINTS), length / 2), states.T)
+
+    def _rough(self, states: Array, span: float, record: Array | None = None) -> bool:
+        """True if points do not resolve the states, (state, points), and turns of a piece, which takes a ``span``."""
+        if _unresolved(states):
+            return True
+        if record is not None and len(record):
+            moving = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, len(POINTS))
+            turning, spins = moving[:, 3:12], moving[:, 15:]
+        else:
+            turning, spins = self._turns(states)
+        if float(np.abs(spins).max(initial=0.0)) * span > _TURN:
+            return True
+        # no state has a prescribed motion, which may turn bodies as no polynomial of the points does
+        return bool(self._mechanism.prescribed) and _unresolved(turning.reshape(-1, len(POINTS)))
 
     def _turns(self, states: Array) -> tuple[Array, Array]:
         """Rotations and angular velocities of the bodies [rad/s] at states of a piece, (state, points).
@@ -302,19 +310,9 @@ class LawRecorder:
         """
         places = (start + end) / 2 + (end - start) / 2 * POINTS
         states = np.asarray(inside(places))
-        rough = _unresolved(states)
         time = states[-1] if paced else places
         record, pace = (np.zeros((0, 0)), np.ones(1)) if recorded is None else recorded(states)
-        if not rough and depth < _HALVINGS:
-            if len(record):
-                moving = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, len(POINTS))
-                turning, spins = moving[:, 3:12], moving[:, 15:]
-            else:
-                turning, spins = self._turns(states)
-            rough = float(np.abs(spins).max(initial=0.0)) * (time[-1] - time[0]) > _TURN
-            # no state has a prescribed motion, which may turn bodies as no polynomial of the points does
-            rough |= bool(self._mechanism.prescribed) and _unresolved(turning.reshape(-1, len(POINTS)))
-        if rough and depth < _HALVINGS:
+        if depth < _HALVINGS and self._rough(states, time[-1] - time[0], record):
             middle = (start + end) / 2
             yield from self._parts(start, middle, inside, recorded, paced=paced, depth=depth + 1)
             yield from self._parts(middle, end, inside, recorded, paced=paced, depth=depth + 1)
@@ -326,7 +324,7 @@ class LawRecorder:
 def _unresolved(values: Array) -> bool:
     """True if the points of a piece do not resolve one of the values on it, (values, points)."""
     coefficients = np.abs(TO_SERIES @ values.T)
-    return bool((coefficients[-2:].max(0) > _RESOLVED * np.maximum(1.0, coefficients.max(0))).any())
+    return bool((coefficients[-2:].max(0) > RESOLVED * np.maximum(1.0, coefficients.max(0))).any())
 
 
 def _spread(items: Sequence[_T], most: int) -> list[_T]:

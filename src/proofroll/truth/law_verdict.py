@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -181,20 +180,3 @@ class _Walk:
         if self._waiting:
             self._check.take(joined_pieces(self._waiting))
             self._waiting.clear()
-
-
-def cut_at(path: _Path, end: float, text: str) -> _Path:
-    """Path up to a time, and the reason why it ends there."""
-    kept = [stretch for stretch in path.stretches if stretch.start < end]
-    last = kept[-1]
-    if last.end > end:
-        kept[-1] = replace(last, end=end, guard=None)
-    return replace(
-        path,
-        stretches=tuple(kept),
-        happenings=tuple(item for item in path.happenings if item.time < end),
-        margins=tuple(item for item in path.margins if item[0] < end),
-        known=False,
-        ended=text,
-        transitions=path.transitions[: len(kept)],
-    )

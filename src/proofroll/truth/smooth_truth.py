@@ -45,7 +45,7 @@ from proofroll.truth.singular_poses import BRANCHING, singular_poses, singular_p
 from proofroll.truth.smooth_routes import SmoothBodies, SmoothTree, stiff
 from proofroll.truth.switching.contact_taylor import CompiledStretch
 from proofroll.truth.witnesses.closed_forms import ClosedForm, closed_form
-from proofroll.truth.work_of_steps import works_of_steps
+from proofroll.truth.work_of_drives import works_of_steps
 
 CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indistinguishable starts is chaos
 BRANCH = 1e-3  # natural lengths, 1: distance between routes that chaos causes only long after the horizon

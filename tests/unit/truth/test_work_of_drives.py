@@ -14,7 +14,7 @@ from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.studies.judging.reference import Reference
-from proofroll.truth.work_of_steps import works_of_steps
+from proofroll.truth.work_of_drives import works_of_steps
 
 LIFT, G = 0.2, 9.80665  # m/s, m/s²
 TIMES = np.linspace(0.0, 0.4, 9)

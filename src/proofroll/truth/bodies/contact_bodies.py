@@ -28,11 +28,9 @@ from proofroll.elements.mechanism.contact.turning import shut_by_pressing
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.truth.bodies.body_impacts import ImpactLaw, impulses_in_turn
-from proofroll.truth.bodies.body_slides import slides_of
-from proofroll.truth.bodies.contact_balance import SLACK, all_held
 from proofroll.truth.bodies.contact_body_symbols import BodySymbols
-from proofroll.truth.bodies.contact_equations import BodiesSolution, BodiesState, ContactEquations
-from proofroll.truth.bodies.contact_trials import consistent, follow, next_trial, provisional
+from proofroll.truth.bodies.contact_equations import BodiesSolution, BodiesState, ContactEquations, slides_of
+from proofroll.truth.bodies.contact_trials import SLACK, all_held, consistent, follow, next_trial, provisional
 from proofroll.truth.numerics.hybrid import Transition
 from proofroll.truth.switching.contact_guards import SolvedContacts, pressing, sharing
 from proofroll.truth.switching.contact_stretches import ContactStretches

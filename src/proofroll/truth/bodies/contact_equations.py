@@ -17,6 +17,7 @@ from proofroll.elements.mechanism.contact.acting import (
     held_directions,
     turned,
 )
+from proofroll.elements.mechanism.contact.free_slides import FreeSlides, free_slides
 from proofroll.elements.mechanism.contact.joint_laws import JointContact, joint_contacts, line_response, mode_of_joints
 from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.contact.turning import TurningFriction, moments_by_pressing, turning_frictions
@@ -25,7 +26,6 @@ from proofroll.elements.mechanism.scene.kinks import Sides, held_sides
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.signal import value_at
-from proofroll.truth.bodies.independent_rows import accelerated_by, independent, least_motion
 from proofroll.truth.bodies.maximal_coordinates import RANK, NumericEquations
 from proofroll.truth.bodies.maximal_equations import FUNCTIONS, Switched
 
@@ -432,3 +432,41 @@ def _answer(matrix: Array, target: Array, units: Array) -> tuple[Array, Array]:
         left = units * (target - matrix @ answer)
         answer = answer + units * (V[kept].T @ (U[:, kept].T @ left / sizes[kept]))
     return answer, np.asarray(V)
+
+
+def slides_of(bodies: BodiesState) -> FreeSlides:
+    """Slides of the contacts of bodies without forces of contacts."""
+    free = accelerated_by(bodies.mass, bodies.force, bodies.C, -bodies.of_joints)
+    loose: Array = np.asarray(np.linalg.inv(bodies.mass), dtype=np.float64)
+    root = np.linalg.cholesky(bodies.mass)
+    locked = np.linalg.qr(np.linalg.solve(root, bodies.C.T))[0]
+    ways = np.linalg.solve(root.T, np.eye(len(root)) - locked @ locked.T)
+    joint_force = bodies.mass @ free - bodies.force
+    return free_slides(bodies.touching, bodies.J, bodies.bias, free, ways @ ways.T, loose, joint_force)
+
+
+def independent(C: Array, bias: Array, most: int) -> tuple[Array, Array]:
+    """Independent rows equivalent to all, at ``most`` so many; those of a planar body in its plane are round-off."""
+    if not C.size:
+        return C, bias
+    U, values, Vt = np.linalg.svd(C, full_matrices=False)
+    rank = min(most, int((values > RANK * values[0]).sum()))
+    return Vt[:rank], (U[:, :rank].T @ bias) / values[:rank]
+
+
+def least_motion(mass: Array, C: Array, K: Array, violation: Array) -> Array:
+    """Motion of least kinetic energy that produces these violations of rows K, and none of rows C."""
+    root = np.linalg.cholesky(mass)
+    into = np.linalg.solve(root, np.concatenate([K, C]).T)
+    aims = np.concatenate([violation, np.zeros(len(C))])
+    return np.asarray(np.linalg.solve(root.T, np.linalg.lstsq(into.T, aims, rcond=RANK)[0]))
+
+
+def accelerated_by(mass: Array, load: Array, C: Array, aims: Array) -> Array:
+    """Solution x of M x − Cᵀλ = load, C x = aims, for independent rows C."""
+    root = np.linalg.cholesky(mass)
+    free = np.linalg.solve(root, load)
+    if len(C):
+        basis, R = np.linalg.qr(np.linalg.solve(root, C.T))
+        free = free + basis @ (np.linalg.solve(R.T, aims) - basis.T @ free)
+    return np.asarray(np.linalg.solve(root.T, free))

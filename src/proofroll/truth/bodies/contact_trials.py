@@ -1,15 +1,18 @@
-"""Trials of modes in route 2: all that are consistent, and the next one of a contact that violates an inequality."""
+"""Trials of modes in route 2: all contacts held, all that are consistent, and the next of one that is violated."""
 
 import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from proofroll.elements.mechanism.contact.acting import OPEN, Acting, ContactMode, first_mode
+from proofroll.elements.mechanism.contact.acting import OPEN, REST, Acting, ContactMode, first_mode
+from proofroll.elements.mechanism.contact.distributions import best_distribution, cones_of
 from proofroll.elements.mechanism.contact.joint_laws import line_response
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.truth.bodies.contact_equations import BodiesState, ContactEquations
 from proofroll.truth.switching.contact_guards import Touchable
+
+SLACK = 1e-9  # violation of an inequality, relative to the forces involved, up to which it counts as kept
 
 
 def provisional(equations: ContactEquations, bodies: BodiesState, closed_mask: Sequence[bool]) -> list[Acting]:
@@ -61,3 +64,29 @@ def consistent(contacts: Sequence[Touchable], choices: Sequence[Sequence[Acting]
         # what is opened here counts once
         if all(acting == option or option == of[0] for acting, option, of in zip(mode, options, choices, strict=True)):
             yield tuple(mode)
+
+
+def all_held(equations: ContactEquations, bodies: BodiesState, mode: ContactMode, free: float) -> bool:
+    """True if nothing moves, or contacts share loads, and some distribution of forces lets all of them hold in a mode.
+
+    ``free``: largest rate of a slide without forces of contacts.
+    """
+    solution = equations.accelerated(bodies, mode)
+    if not solution.loose and np.abs(bodies.u).max() > REST:
+        return False  # forces are determinate, and a trial among others
+    for acting, slide, parting in zip(mode, solution.slide, solution.parting, strict=True):
+        left = float(np.abs(slide).max()) if acting.kind == "stick" else abs(parting) if acting.kind == "slip" else 0.0
+        if left > SLACK * max(free, REST):
+            return False
+    cones = cones_of(
+        kinds=[acting.kind for acting in mode],
+        normals=np.array([touch.normal for touch in bodies.touching]),
+        friction=equations.static,
+        bounds=equations.bounds,
+        pressed_by=[contact.pressed_by for contact in equations.contacts],
+        force=solution.force,
+        shifts=solution.shifts,
+    )
+    best = best_distribution(cones)
+    weights = np.zeros(solution.shifts.shape[2]) if best is None else best.weights
+    return cones.hold(weights, SLACK)

@@ -7,6 +7,7 @@ from proofroll.truth.laws.record import Array
 
 COUNT = 12  # points of a piece: they resolve a turn of 1 rad to the last digit
 POINTS: Array = -np.cos(np.pi * np.arange(COUNT) / (COUNT - 1))
+RESOLVED = 1e-13  # last coefficients of a series, relative to its size, that are round-off
 TO_SERIES: Array = np.linalg.inv(np.asarray(chebyshev.chebvander(POINTS, COUNT - 1), np.float64))
 _INTEGRALS = [chebyshev.chebval(POINTS, chebyshev.chebint(series, lbnd=-1)) for series in np.eye(COUNT)]
 _TO_EACH: Array = np.array(_INTEGRALS).T @ TO_SERIES

@@ -16,7 +16,7 @@ from proofroll.elements.mechanism.dynamics import switches
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.laws import impacts
 from proofroll.truth.switched_truth import truth_of
-from proofroll.truth.switching.impact_series import GeometricSeries, Impact, ImpactSeries
+from proofroll.truth.switching.contact_stretches import GeometricSeries, Impact, ImpactSeries
 
 GRAVITY = 9.81
 
