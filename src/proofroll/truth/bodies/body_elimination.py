@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from proofroll.truth.bodies.constraint_rows import ConstraintRow
 from proofroll.truth.bodies.maximal_equations import ConstrainedEquations, MaximalEquations
@@ -22,6 +22,8 @@ class BodySystem:
         constrained: these at one state.
         joints: linearly independent rows C that imply all others.
         contacts: rows K, and loads P along u by a unit of each one's force.
+        number: of a float as a scalar in whose arithmetic inertias are eliminated: rounded apart, forces and
+            accelerations would not fit each other to the last digit of long doubles.
     """
 
     def __init__(
@@ -30,20 +32,21 @@ class BodySystem:
         constrained: ConstrainedEquations,
         joints: Sequence[ConstraintRow],
         contacts: Sequence[tuple[Row, Row]] = (),
+        number: Callable[[float], Scalar] = float,
     ) -> None:
         drives, light = [*constrained.drives, *constrained.holders], set(equations.light)
         self._held = [*joints, *(drive.row for drive in drives)]
         self._nu, self._joints, self._first = equations.nu, len(joints), equations.nu + len(self._held)
         pairs = [*((row.coefficients, row.coefficients) for row in self._held), *contacts]
         self._rows: list[Row] = [
-            *({k: float(value) for k, value in enumerate(line) if value} for line in equations.mass_matrix),
+            *({k: number(float(value)) for k, value in enumerate(line) if value} for line in equations.mass_matrix),
             *(dict(row) for row, _ in pairs),
         ]
         for place, (_, push) in enumerate(pairs, self._nu):
             for k, value in push.items():
                 self._rows[k][place] = value
         for place, drive in enumerate(drives, self._nu + self._joints):
-            self._rows[place][place] = -1.0 / drive.inertia
+            self._rows[place][place] = -1.0 / number(drive.inertia)
         self._symmetric = all(row is push for row, push in contacts)
         turns = [2 if k in light else 0 for k in range(self._nu)] + [3] * len(joints) + [1] * len(drives)
         turns += [4] * len(contacts)

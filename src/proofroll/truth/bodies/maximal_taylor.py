@@ -13,8 +13,8 @@ from proofroll.core.errors import Diverged, Missing
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.bodies.body_elimination import BodySystem
-from proofroll.truth.bodies.maximal_equations import MaximalEquations
-from proofroll.truth.numerics.compiled_once import heyoka
+from proofroll.truth.bodies.maximal_equations import ConstrainedEquations, MaximalEquations
+from proofroll.truth.numerics.compiled_once import compiled_once, heyoka
 from proofroll.truth.numerics.scalars import Scalar, add, mul
 
 # Integrator, time [s] and state before each step.
@@ -33,9 +33,7 @@ class MaximalTaylor:
     """
 
     def __init__(self, equations: MaximalEquations, rows: Sequence[int]) -> None:
-        if heyoka is None:
-            raise Missing("Taylor series need heyoka: pip install 'proofroll[fast]'")
-        state, rates = _in_symbols(equations, rows, heyoka.time)
+        state, rates = _in_symbols(equations, rows, None if heyoka is None else heyoka.time)
         self._start = equations.start().astype(np.longdouble)
         self._integrator = heyoka.taylor_adaptive(
             [(name, _expression(value, np.longdouble)) for name, value in zip(state, rates, strict=True)],
@@ -102,12 +100,8 @@ def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable
     Raises:
         Missing: heyoka is not installed.
     """
-    if heyoka is None:
-        raise Missing("compiled equations need heyoka: pip install 'proofroll[fast]'")
-    time = heyoka.make_vars("t")
-    state, rates = _in_symbols(equations, rows, time)
-    function = heyoka.cfunc([_expression(value, float) for value in rates], [*state, time], compact_mode=True)
-    return lambda states: np.asarray(function(np.ascontiguousarray(states.T)).T)
+    state, rates = _in_symbols(equations, rows)
+    return _of_states(heyoka.cfunc([_expression(value, float) for value in rates], state, compact_mode=True))
 
 
 def compiled_powers(
@@ -120,32 +114,59 @@ def compiled_powers(
     Raises:
         Missing: heyoka is not installed, or a drive is not among the independent ``rows``.
     """
-    if heyoka is None:
-        raise Missing("compiled equations need heyoka: pip install 'proofroll[fast]'")
-    functions, time = {name: getattr(heyoka, name) for name in SMOOTH}, heyoka.make_vars("t")
-    state = [heyoka.make_vars(f"s{index}") for index in range(len(equations.start()))]
-    at_state = equations.at(state, functions, time=time)
+    state, at_state, functions = _at_symbols(equations)
     moved = {number: at_state.moved.start + number for field, number, _ in forces if field == "drive"}
     if not set(moved.values()) <= set(rows):
         raise Missing("a drive whose force is not determined by independent rows")
-    system = BodySystem(equations, at_state, [at_state.rows[k] for k in rows])
-    multipliers = system.accelerated(at_state.force)[1] if moved else []
+    multipliers = _solved(equations, at_state, rows)[1] if moved else []
     u, powers = state[equations.nx : equations.nx + equations.nu], list[Scalar]()
-    made = equations.rate_rows(state, [joint for _, _, joint in forces], functions)
+    made = equations.rate_rows(state[:-1], [joint for _, _, joint in forces], functions)
     for (field, number, _), row in zip(forces, made, strict=True):
         rate = add(*(mul(value, u[k]) for k, value in row.coefficients.items()))
         force = at_state.efforts[number] if field == "effort" else multipliers[list(rows).index(moved[number])]
         powers.append(mul(force, rate))
-    function = heyoka.cfunc([_expression(value, float) for value in powers], [*state, time], compact_mode=True)
+    return _of_states(compiled_once([_expression(value, float) for value in powers], state, by_collocation=True).values)
+
+
+def _of_states(function: Any) -> Callable[[Array], Array]:
+    """Compiled function of many states at once."""
     return lambda states: np.asarray(function(np.ascontiguousarray(states.T)).T)
 
 
-def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any) -> tuple[list[Any], list[Scalar]]:
-    """Variables of a state, and its rates as expressions in them."""
+def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any = None) -> tuple[list[Any], list[Scalar]]:
+    """Variables of a state, with a time of their own unless there is one, and its rates as expressions in them."""
+    state, at_state, _ = _at_symbols(equations, time)
+    return state, [*at_state.rate, *_solved(equations, at_state, rows)[0], *at_state.angle_rate]
+
+
+def _at_symbols(
+    equations: MaximalEquations, time: Any = None
+) -> tuple[list[Any], ConstrainedEquations, dict[str, Any]]:
+    """Variables of a state, with a time of their own unless there is one, the equations there, and the functions.
+
+    Raises:
+        Missing: heyoka is not installed.
+    """
+    if heyoka is None:
+        raise Missing("compiled equations need heyoka: pip install 'proofroll[fast]'")
+    functions = {name: getattr(heyoka, name) for name in SMOOTH}
     state = [heyoka.make_vars(f"s{index}") for index in range(len(equations.start()))]
-    at_state = equations.at(state, {name: getattr(heyoka, name) for name in SMOOTH}, time=time)
-    u_rate = BodySystem(equations, at_state, [at_state.rows[k] for k in rows]).accelerated(at_state.force)[0]
-    return state, [*at_state.rate, *u_rate, *at_state.angle_rate]
+    own_time = [heyoka.make_vars("t")] if time is None else []
+    at_state = equations.at(state, functions, time=own_time[0] if own_time else time)
+    return [*state, *own_time], at_state, functions
+
+
+def _solved(
+    equations: MaximalEquations, at_state: ConstrainedEquations, rows: Sequence[int]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Accelerations, and multipliers of independent rows."""
+    system = BodySystem(equations, at_state, [at_state.rows[k] for k in rows], number=_exact)
+    return system.accelerated(at_state.force)[:2]
+
+
+def _exact(value: float) -> Any:
+    """A number in long doubles."""
+    return heyoka.expression(np.longdouble(value))
 
 
 def _expression(value: Scalar, number: Any) -> Any:

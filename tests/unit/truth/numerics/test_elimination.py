@@ -1,8 +1,12 @@
-"""Sparse elimination, in numbers."""
+"""Sparse elimination, in numbers and long doubles."""
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
+from proofroll.truth.bodies.body_elimination import BodySystem
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.bodies.maximal_equations import FUNCTIONS
 from proofroll.truth.numerics.elimination import Row, eliminated
 
 
@@ -21,3 +25,18 @@ def test_constraints_wait_for_what_they_hold(symmetric: bool) -> None:
     answers, pivots = eliminated(rows, b.tolist(), after, symmetric=symmetric)
     assert np.array(answers) == pytest.approx(np.linalg.solve(A, b.T).T, rel=1e-12)
     assert np.prod(pivots) == pytest.approx(np.linalg.det(A), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["arm_pd", "car_axis", "joint_bench"])
+def test_joints_hold_to_the_last_digit_of_long_doubles(name: str) -> None:
+    """Accelerations of bodies, with motors and without inertia, keep the rows of joints as exactly as scalars can."""
+    bodies = MaximalCoordinates(mechanism_named(name)).lean
+    equations, rng = bodies.equations, np.random.default_rng(1)
+    state = equations.start().astype(np.longdouble)
+    state[equations.nx :] += rng.normal(size=len(state) - equations.nx)
+    at_state = equations.at(list(state), {**FUNCTIONS, "sqrt": np.sqrt})
+    joints = [at_state.rows[k] for k in bodies.independent_rows()]
+    u_rate = BodySystem(equations, at_state, joints, number=np.longdouble).accelerated(at_state.force)[0]
+    for row in joints:
+        parts = [value * u_rate[k] for k, value in row.coefficients.items()]
+        assert abs(sum(parts) + row.bias) <= 1e-17 * (abs(row.bias) + sum(map(abs, parts)) + 1.0)
