@@ -19,17 +19,16 @@ def eliminated(
     Args:
         rows: of A.
         rights: right sides.
-        after: unknowns that must be eliminated before each; of the others those with the fewest neighbours are first.
-            None: the order is as given.
+        after: unknowns that must be eliminated before each. First are those that wait for none, then those with the
+            fewest neighbours. None: the order is as given.
         symmetric: A is; half of the operations suffice.
     """
     pivots: list[Scalar] = [0.0] * len(rows)
     left, sides = {k: dict(row) for k, row in enumerate(rows)}, [list(side) for side in rights]
     steps = list[tuple[int, Row]]()
-
     while left:
         ready = left if after is None else [k for k in left if after[k].isdisjoint(left)]
-        p = next(iter(left)) if after is None else min(ready, key=lambda k: (len(left[k]), k))
+        p = next(iter(left)) if after is None else min(ready, key=lambda k: (bool(after[k]), len(left[k]), k))
         row = left.pop(p)
         pivots[p] = row.pop(p)
         lost, others = -pivots[p], [i for i, entries in left.items() if p in entries]
