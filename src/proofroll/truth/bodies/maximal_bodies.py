@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
-from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, mul, plus, scaled, turned, turned_back
+from proofroll.truth.numerics.scalars import Scalar, add, clean, cross, dot, mul, plus, scaled, turned, turned_back
 
 _PARALLEL = 1e-12  # cross product of axes of a planar mechanism up to which they are parallel
 # Smallest over largest moment of inertia up to which a body is a rod or a point, given with the digits of a file.
@@ -231,8 +231,3 @@ def _plane(mechanism: Mechanism) -> Array | None:
         if joint.kind != JointKind.FIXED and abs(skewness) > _PARALLEL:
             return None
     return frame_of_axis(normal)
-
-
-def clean(vector: Any) -> list[float]:
-    """Plain floats, with round-off removed from zeros and ones so that they fold."""
-    return [float(round(x)) if abs(x - round(x)) < 1e-15 else float(x) for x in vector]

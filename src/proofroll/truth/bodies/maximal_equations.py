@@ -20,12 +20,12 @@ from proofroll.elements.mechanism.scene.kinks import KINKED
 from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import SMOOTH, value_at
-from proofroll.truth.bodies.bushing_scalars import bushing_load
 from proofroll.truth.bodies.constraint_rows import NONE, Connection, ConstraintRow, ConstraintRows, columns, speed_at
-from proofroll.truth.bodies.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
+from proofroll.truth.bodies.maximal_bodies import GROUND, BodyInScalars, made_bodies, placed_bodies
 from proofroll.truth.numerics.scalars import (
     Scalar,
     add,
+    clean,
     cross,
     dot,
     is_zero,
@@ -37,6 +37,7 @@ from proofroll.truth.numerics.scalars import (
     sub,
     turned,
 )
+from proofroll.truth.switching.bushing_scalars import bushing_load
 
 # Kinds whose coordinates are angles that may exceed a turn; the first route has a list of its own.
 _COUNTED = frozenset({JointKind.REVOLUTE, JointKind.UNIVERSAL})

@@ -11,6 +11,11 @@ Vector = Sequence[Scalar]
 _ZERO, _FOLDED = 0.0, (0.0, 1.0)
 
 
+def clean(vector: Any) -> list[float]:
+    """Plain floats, with round-off removed from zeros and ones so that they fold."""
+    return [float(round(x)) if abs(x - round(x)) < 1e-15 else float(x) for x in vector]
+
+
 def is_zero(a: Scalar) -> bool:
     """True for the plain float zero."""
     return type(a) is float and a == 0.0

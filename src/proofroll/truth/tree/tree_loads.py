@@ -8,11 +8,10 @@ from typing import Any
 
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.joint_kinds import AXES, SLIDING, WITH_QUATERNION, JointKind
-from proofroll.truth.bodies.bushing_scalars import bushing_load
-from proofroll.truth.bodies.maximal_bodies import clean
 from proofroll.truth.numerics.scalars import (
     Scalar,
     add,
+    clean,
     cross,
     dot,
     minus,
@@ -24,6 +23,7 @@ from proofroll.truth.numerics.scalars import (
     turned,
     turned_back,
 )
+from proofroll.truth.switching.bushing_scalars import bushing_load
 from proofroll.truth.switching.contact_symbols import Vector
 
 NONE = (0.0, 0.0, 0.0)

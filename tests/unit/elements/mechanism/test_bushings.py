@@ -16,9 +16,9 @@ from proofroll.elements.mechanism.dynamics.point_loads import point_loads
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.bushing import Bushing
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.truth.bodies.bushing_scalars import bushing_load
 from proofroll.truth.bodies.maximal_equations import FUNCTIONS
 from proofroll.truth.plug_in import MechanismTruth
+from proofroll.truth.switching.bushing_scalars import bushing_load
 
 ROUND = ((0.1, 0, 0), (0, 0.2, 0), (0, 0, 0.25))
 TIMES = np.linspace(0.0, 1.0, 6)

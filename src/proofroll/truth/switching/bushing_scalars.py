@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from proofroll.elements.mechanism.scene.bushing import Bushing
-from proofroll.truth.bodies.maximal_bodies import clean
 from proofroll.truth.numerics.scalars import (
     Scalar,
     Vector,
     add,
+    clean,
     cross,
     minus,
     mul,
