@@ -16,6 +16,7 @@ from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth import SAFETY
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 
 NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: the smallest difference that a scene file can express
@@ -125,6 +126,18 @@ def differences_of(values: Array, others: Array) -> Array:
     """Largest difference between values of two routes at each time, (times); inf where only the first knows one."""
     difference = np.where(np.isnan(others) & ~np.isnan(values), np.inf, others - values)
     return largest(difference)
+
+
+def bar_of(difference: Array, unseen: Array, *, alone: bool = False) -> Array:
+    """Error bar of a field at each time, (times,): never smaller than before.
+
+    Args:
+        difference: of both routes, (times,).
+        unseen: errors that the difference leaves out, (times,).
+        alone: True for forces, which one time can have to itself: then the difference of one sample does not last.
+    """
+    lasting = np.minimum(difference, [*difference[:1], *difference[:-1]]) if alone else difference
+    return np.asarray(np.maximum(SAFETY * difference + unseen, np.maximum.accumulate(SAFETY * lasting + unseen)))
 
 
 def largest(values: Array) -> Array:

@@ -19,6 +19,7 @@ from proofroll.truth.error_bars import (
     JUDGED,
     ROUND_OFF,
     TwoRouteMotion,
+    bar_of,
     differences_of,
     fields_with_bars,
     largest,
@@ -191,17 +192,14 @@ def two_route_motion(
     if sums is not None:
         fields["sums"], others["sums"] = sums
     placed = masked.placed(mechanism)
-    bars, differences, least, step = {}, {}, round_off(fields, placed), dict.fromkeys(fields, 0.0)
+    least, step = round_off(fields, placed), dict.fromkeys(fields, 0.0)
     alone = _FORCES if left is None else set()
     if left is None:
         left, step = _left_by_a_cut(mechanism, fields, cut, determinate), _of_a_step(mechanism, masked, units)
-    for field, values in fields.items():
-        difference = differences_of(values, others[field])
-        size = left[field] + least[field]
-        lasting = np.minimum(difference, [*difference[:1], *difference[:-1]]) if field in alone else difference
-        errors = np.maximum.accumulate(SAFETY * lasting + size)
-        bars[field] = np.maximum(SAFETY * difference + size, errors) + step[field]
-        differences[field] = float(difference[by_tree.time < parted].max(initial=0.0))
+    apart = {field: differences_of(values, others[field]) for field, values in fields.items()}
+    bars = {field: bar_of(apart[field], left[field] + least[field], alone=field in alone) for field in fields}
+    bars = {field: bar + step[field] for field, bar in bars.items()}
+    differences = {field: float(apart[field][by_tree.time < parted].max(initial=0.0)) for field in fields}
     bars["work"] = bars["work"] + unresolved
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)

@@ -215,7 +215,7 @@ class NumericEquations:
 
     def beside(self, state: Array, by: float) -> Array:
         """State displaced by about ``by``, m and rad, with velocities changed by that fraction, as the rows allow."""
-        e, state = self.equations, state.copy()  # all ways differ, by the golden ratio
+        e, state = self.equations, state.copy()
         ways = by * uneven(e.nu)
         state[: e.nx] += self.moving(state[: e.nx], ways)
         state[e.nx : e.nx + e.nu] *= 1.0 + ways
