@@ -10,7 +10,6 @@ from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.motion import BallMotion
 from proofroll.papers.blajer_2006.truth.polar import first_route
-from proofroll.papers.blajer_2006.truth.switching import follow
 
 # Nothing about this motion is zero or symmetric, so a lost sign or a swapped axis shows.
 GENERAL = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
@@ -34,4 +33,4 @@ def scene(request: pytest.FixtureRequest) -> Scene:
 def rolled(body: RollingBall, times: FloatArray) -> BallMotion:
     """Motion and force of a ball that rolls at rising times [s], by the route that finds first slips."""
     gripped = body.with_contact(mu_static=100.0)  # more than any test needs; routes of slips want a bound
-    return follow(gripped, first_route(gripped), float(times[-1])).stretches[0].motion(times)
+    return first_route(gripped).rolling(float(times[-1]))[1](times)

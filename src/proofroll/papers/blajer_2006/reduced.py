@@ -182,7 +182,6 @@ class Compiled(ReducedModel):
             x[None, :2] / np.array(self._body.surface.length_scales),
             velocity=x[None, 2:4],
             spin=x[4:],
-            slip=np.zeros((1, 2)),
             friction=-ball.mass * np.array([[held2, held3]]),
             press=ball.mass * np.array([N]),
             route="reduced equations, Taylor series",

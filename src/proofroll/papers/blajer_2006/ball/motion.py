@@ -31,19 +31,17 @@ def world_motion(
     *,
     velocity: FloatArray,
     spin: FloatArray,
-    slip: FloatArray,
     friction: FloatArray,
     press: FloatArray,
     route: str,
 ) -> BallMotion:
-    """Motion in the world at n times, from values in the local frame.
+    """Motion in the world of rolling at n times, from values in the local frame.
 
     Args:
         body: the scene's ball.
         u: surface coordinates, shape (n, 2).
         velocity: of the centre along e2, e3 [m/s], shape (n, 2).
         spin: ω1 [rad/s], shape (n,).
-        slip: velocity of the contact point along e2, e3 [m/s], shape (n, 2).
         friction: on the ball along e2, e3 [N], shape (n, 2).
         press: normal force N [N], shape (n,).
         route: name of the method, for a person.
@@ -55,8 +53,7 @@ def world_motion(
         return np.asarray(x[:, :1] * e2 + x[:, 1:] * e3)
 
     v_WB = along(velocity)
-    # slip = v + a ω × e1, so the tangential part of ω is e1 × (slip - v) / a
-    w_WB = spin[:, None] * e1 + cross(e1, along(slip) - v_WB) / body.ball.radius
+    w_WB = spin[:, None] * e1 - cross(e1, v_WB) / body.ball.radius
     return BallMotion(
         p_WB=body.surface.position(u), v_WB=v_WB, w_WB=w_WB, force=along(friction) - press[:, None] * e1, route=route
     )

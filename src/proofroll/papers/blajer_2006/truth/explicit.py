@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import TIGHTEST, controlled_step, solver_from
-from proofroll.papers.blajer_2006.truth.route import End
+from proofroll.papers.blajer_2006.truth.sliding import End
 
 Rates = Callable[[FloatArray], FloatArray]
 
@@ -17,7 +17,7 @@ class ExplicitRun:
     """Integration from ``start`` to its end; implements :class:`.IntegratedRun`.
 
     After each step ``ended`` gets the solver and returns time [s], state and reason of an end within that step; None:
-    the run goes on. A step is at most ``cap(state before it)`` long [s].
+    the run goes on.
     """
 
     def __init__(
@@ -29,31 +29,25 @@ class ExplicitRun:
         *,
         atol: FloatArray,
         ended: Callable[[Any], tuple[float, FloatArray, End] | None],
-        cap: Callable[[FloatArray], float] | None = None,
     ) -> None:
         self.end, self.last, self.why = until, state, End.TIME
         self._between: list[Callable[[float], FloatArray]] = []
-        ends, states = [start], [state]
+        starts = [start]
         # rates may not be finite for a run of zero length
         solver = solver_from(lambda _, y: rates(y), start, state, TIGHTEST, atol) if until > start else None
         while solver is not None and solver.t < until:
-            controlled_step(solver, None, until, math.inf if cap is None else max(cap(solver.y), 1e-300))
+            controlled_step(solver, None, until, math.inf)
             self._between.append(solver.dense_output())
-            ends.append(solver.t)
-            states.append(solver.y)
+            starts.append(solver.t)
             self.last = solver.y
             if stopped := ended(solver):
                 self.end, self.last, self.why = stopped
                 break
-        self._ends, self._states = np.array(ends), np.array(states)
-
-    def steps(self) -> tuple[FloatArray, FloatArray]:
-        """See :class:`proofroll.papers.blajer_2006.truth.sliding.IntegratedRun`."""
-        return self._ends, self._states
+        self._starts = np.array(starts[:-1])
 
     def at(self, places: FloatArray) -> FloatArray:
         """See :class:`proofroll.papers.blajer_2006.truth.sliding.IntegratedRun`."""
         if not self._between or not len(places):
-            return np.broadcast_to(self._states[0], (len(places), self._states.shape[1])).copy()
-        index = np.searchsorted(self._ends[:-1], places, side="right") - 1
+            return np.broadcast_to(self.last, (len(places), len(self.last))).copy()
+        index = np.searchsorted(self._starts, places, side="right") - 1
         return np.array([self._between[i](x) for i, x in zip(index, places, strict=True)])

@@ -79,13 +79,13 @@ def friction_curve(body: RollingBall, until: float) -> FrictionCurve:
     """Needed friction from time 0 to ``until`` [s]; independent of the scene's own μ."""
     endless = body.with_contact(mu_static=_UNREACHABLE, mu_kinetic=_UNREACHABLE)
     route = first_route(endless)
-    stretch = route.stick(0.0, route.start(), until)
+    end, motion_at = route.rolling(until)
     # One sample per radian of rolling: peaks follow the scale of the path, many radians apart.
     pace = body.ball.radius / (np.linalg.norm(body.v0) + np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
-    times = np.linspace(0.0, stretch.end, max(int(np.ceil(stretch.end / pace)), 4) + 1)
+    times = np.linspace(0.0, end, max(int(np.ceil(end / pace)), 4) + 1)
 
     def needed(times: FloatArray) -> FloatArray:
-        motion = stretch.motion(times)
+        motion = motion_at(times)
         e1 = body.surface.normal(motion.p_WB)
         N = -np.sum(motion.force * e1, axis=-1)
         return np.asarray(np.linalg.norm(motion.force + N[:, None] * e1, axis=-1) / N)
@@ -94,7 +94,7 @@ def friction_curve(body: RollingBall, until: float) -> FrictionCurve:
     peaks = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] > values[2:])) + 1
     crests = [_crest(needed, float(times[i - 1]), float(times[i + 1])) for i in peaks]
     return FrictionCurve(
-        until=stretch.end,
+        until=end,
         times=times,
         values=values,
         crest_times=np.array([time for time, _ in crests]),

@@ -20,15 +20,14 @@ from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.motion import BallMotion, world_motion
 from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates, start
 from proofroll.papers.blajer_2006.truth.explicit import ExplicitRun, Rates
-from proofroll.papers.blajer_2006.truth.route import End, Route
-from proofroll.papers.blajer_2006.truth.sliding import Sliding
+from proofroll.papers.blajer_2006.truth.sliding import End, Sliding
 from proofroll.papers.blajer_2006.truth.taylor import SlidingTaylor
 from proofroll.papers.blajer_2006.truth.taylor_model import HALT
 
 _Stop = tuple[End, Callable[[FloatArray], float]]
 
 
-def first_route(body: RollingBall) -> Route:
+def first_route(body: RollingBall) -> Sliding:
     """Route of the article's figures: Taylor series if heyoka is installed, else DOP853."""
     return SlidingTaylor(body) if library.available() else Polar(body)
 
@@ -58,8 +57,8 @@ class Polar(Sliding):
     def start(self) -> FloatArray:
         return start(self._body)
 
-    def friction(self, state: FloatArray) -> tuple[float, float]:
-        """See :class:`Route`; [N]."""
+    @override
+    def friction(self, state: FloatArray) -> tuple[float, float]:  # [N]
         b, N = self._drive(state)
         return float(np.linalg.norm(b)) / self._A, self._body.contact.mu_static * N
 
@@ -176,8 +175,9 @@ class Polar(Sliding):
         growth, around = b2 * c + b3 * s - grip, b3 * c - b2 * s - size * turning
         return np.array([*(size * rates).tolist(), growth, around, size])
 
-    def _slaved(self, states: FloatArray) -> FloatArray:
-        return np.array([self._following(y)[1] for y in states])
+    @override
+    def _slaved(self, state: FloatArray) -> float:
+        return self._following(state)[1]
 
     def _following(self, y: FloatArray) -> tuple[FloatArray, float]:
         """Rates of (u, u̇, ω1, |u|) and φ of the slaved slip, where φ - φ_b = -(|u| φ̇_b - b'·n) / (|b| + d|u|/dt).
@@ -200,18 +200,14 @@ class Polar(Sliding):
         rates = self._slipping(last)
         return np.asarray(last + rates / -rates[5])
 
-    def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
-        frame = self._body.surface.frame(y[:, :2])
-        v = np.einsum("nij,nj->ni", self._body.surface.tangents(y[:, :2]), y[:, 2:4])
-        drives = [self._drive(row) for row in y]
+    def _motion(self, states: FloatArray) -> BallMotion:
+        u, frame = states[:, :2], self._body.surface.frame(states[:, :2])
+        v = np.einsum("nij,nj->ni", self._body.surface.tangents(u), states[:, 2:4])
+        drives = [self._drive(row) for row in states]
         b, N = np.array([d[0] for d in drives]).reshape(-1, 2), np.array([d[1] for d in drives])
-        friction, u = -b / self._A, np.zeros((len(y), 2))
-        if phi is not None:
-            heading = np.stack([np.cos(phi), np.sin(phi)], axis=-1).reshape(-1, 2)
-            friction, u = -self._body.contact.mu_kinetic * N[:, None] * heading, size[:, None] * heading
         local = np.einsum("nij,ni->nj", frame[..., 1:], v)
         return world_motion(
-            self._body, y[:, :2], velocity=local, spin=y[:, 4], slip=u, friction=friction, press=N, route=self.name
+            self._body, u, velocity=local, spin=states[:, 4], friction=-b / self._A, press=N, route=self.name
         )
 
 

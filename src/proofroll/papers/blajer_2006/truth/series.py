@@ -36,7 +36,6 @@ def reduced(body: RollingBall, times: FloatArray) -> BallMotion:
         states[:, :2] / np.array(body.surface.length_scales),
         velocity=states[:, 2:4],
         spin=states[:, 4],
-        slip=np.zeros((len(states), 2)),
         friction=-body.ball.mass * np.stack([held2, held3], axis=-1),
         press=body.ball.mass * N,
         route="reduced equations, Taylor series",

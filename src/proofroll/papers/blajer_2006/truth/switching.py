@@ -1,6 +1,6 @@
 """Sequence of rolling and slipping of a ball, for any route.
 
-A :class:`Route` integrates one stretch at a time and reports why it ended; this module decides what comes next.
+A route integrates one stretch at a time and reports why it ended; this module decides what comes next.
 :func:`proofroll.truth.numerics.hybrid.follow` chains the stretches.
 """
 
@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.events import EventKind
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.truth.route import BallStretch, End, Route
+from proofroll.papers.blajer_2006.truth.sliding import BallStretch, End, Sliding
 from proofroll.truth.numerics import hybrid
 from proofroll.truth.numerics.hybrid import Transition
 
@@ -39,7 +39,7 @@ class Path:
     ended: str
 
 
-def follow(body: RollingBall, route: Route, until: float) -> Path:
+def follow(body: RollingBall, route: Sliding, until: float) -> Path:
     """Path from time 0 to ``until`` [s], or to an earlier time from which the motion is not known.
 
     Raises:
@@ -52,7 +52,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:
 class SwitchedBall:
     """Stretches of a ball by one route, True for those that stick; see :class:`.hybrid.SwitchingRoute`."""
 
-    def __init__(self, body: RollingBall, route: Route) -> None:
+    def __init__(self, body: RollingBall, route: Sliding) -> None:
         self.body, self.route = body, route
         self._reversals, self._spans = 0, (0.0, 0.0)  # durations of the last two stretches [s]
 
@@ -90,7 +90,7 @@ class SwitchedBall:
         return Transition(state, not slips, ((EventKind.SLIP if slips else EventKind.STICK, ""),))
 
 
-def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:
+def _must_slip(body: RollingBall, route: Sliding, state: FloatArray) -> bool:
     """True if the needed friction is outside the static cone, or on it and about to leave."""
     excess = route.excess(state)
     if abs(excess) > _ON_CONE:

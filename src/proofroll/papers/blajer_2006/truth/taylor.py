@@ -12,8 +12,7 @@ from proofroll.core.errors import Diverged
 from proofroll.papers.blajer_2006.ball.compiled.rolling import parameters, start
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.motion import BallMotion, world_motion
-from proofroll.papers.blajer_2006.truth.route import End
-from proofroll.papers.blajer_2006.truth.sliding import Sliding
+from proofroll.papers.blajer_2006.truth.sliding import End, Sliding
 from proofroll.papers.blajer_2006.truth.taylor_model import TaylorModel, model
 
 # Reasons for an end, in the order of the integrators' events.
@@ -41,8 +40,8 @@ class SlidingTaylor(Sliding):
     def start(self) -> FloatArray:
         return start(self._body)
 
-    def friction(self, state: FloatArray) -> tuple[float, float]:
-        """Needed and available friction, times (1 + κ)/κ over the mass [m/s²]; see :class:`Route`."""
+    @override
+    def friction(self, state: FloatArray) -> tuple[float, float]:  # times (1 + κ)/κ over the mass [m/s²]
         b2, b3, _, N = self._model.drive(state, self._pars)
         return float(np.hypot(b2, b3)), self._A * self._body.contact.mu_static * float(N)
 
@@ -65,11 +64,9 @@ class SlidingTaylor(Sliding):
     def _slide(self, start_state: FloatArray, floor: float, until: float) -> _Run:
         return _Run(self._model.slip, [*self._pars, floor, until], _SLIP_ENDS, 0.0, start_state, np.inf)
 
-    def _slaved(self, states: FloatArray) -> FloatArray:
-        return np.asarray(self._model.direction(states.T, self._pars)[0])
-
-    def _axes(self, state: FloatArray) -> FloatArray:
-        return self._body.surface.frame(state[:2] / self._scales)
+    @override
+    def _slaved(self, state: FloatArray) -> float:
+        return float(self._model.direction(state, self._pars)[0])
 
     def _stood_still(self, last: FloatArray) -> FloatArray:
         b2, b3, _, N = self._model.drive(last[:5], self._pars)
@@ -83,21 +80,15 @@ class SlidingTaylor(Sliding):
         rates[3] += -mu * N * sin + b3 / self._A
         return np.array([*(last[:5] + left * rates), -np.inf, last[6], last[7] + left])
 
-    def _motion(self, states: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
+    def _motion(self, states: FloatArray) -> BallMotion:
         ball = self._body.ball
         b2, b3, _, N = self._model.drive(states.T, self._pars)
-        if phi is None:
-            friction, u = -np.stack([b2, b3], axis=-1) / self._A, np.zeros((len(states), 2))
-        else:
-            heading = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
-            friction, u = -self._body.contact.mu_kinetic * N[:, None] * heading, size[:, None] * heading
         return world_motion(
             self._body,
             states[:, :2] / self._scales,
             velocity=states[:, 2:4],
             spin=states[:, 4],
-            slip=u,
-            friction=ball.mass * friction,
+            friction=-ball.mass / self._A * np.stack([b2, b3], axis=-1),
             press=ball.mass * N,
             route=self.name,
         )
@@ -133,19 +124,10 @@ class _Run:
         self._series = result[4]
         return int(result[0])
 
-    def steps(self) -> tuple[FloatArray, FloatArray]:
-        """See :class:`proofroll.papers.blajer_2006.truth.sliding.IntegratedRun`."""
-        knots = self._knots()
-        return knots, self.at(knots)
-
     def at(self, places: FloatArray) -> FloatArray:
         """See :class:`proofroll.papers.blajer_2006.truth.sliding.IntegratedRun`."""
-        knots = self._knots()
-        if len(knots) < 2 or not len(places):
-            return np.broadcast_to(self.last, (len(places), len(self.last))).copy()
-        return np.array(self._series(np.clip(places, knots[0], knots[-1])), dtype=np.float64)
-
-    def _knots(self) -> FloatArray:
         if self._series is None and self.end > self._inputs[2]:
             self._again(dense=True)  # dense output must be compiled separately; a second run costs nearly nothing
-        return np.asarray([self.end] if self._series is None else self._series.times)
+        if self._series is None or not len(places):
+            return np.broadcast_to(self.last, (len(places), len(self.last))).copy()
+        return np.array(self._series(np.clip(places, *self._series.times[[0, -1]])), dtype=np.float64)

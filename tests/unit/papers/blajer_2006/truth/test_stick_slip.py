@@ -18,6 +18,7 @@ from proofroll.core.truth import truth
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.truth.polar import Polar, first_route
+from proofroll.papers.blajer_2006.truth.sliding import Sliding
 from proofroll.papers.blajer_2006.truth.switching import Path, follow
 from proofroll.papers.blajer_2006.truth.taylor import SlidingTaylor
 
@@ -37,9 +38,9 @@ def paper() -> xr.Dataset:
     return truth(load_scene("sphere_in_cylinder", **PAPER), np.linspace(0.0, UNTIL, 401))
 
 
-def final_height(path: Path, until: float) -> float:
+def final_height(path: Path, route: Sliding) -> float:
     """Height at the end of a path [m]."""
-    return float(path.stretches[-1].motion(np.array([until])).p_WB[0, 2])
+    return float(route.world(path.stretches[-1].state)[0][2])
 
 
 @pytest.mark.parametrize(
@@ -48,10 +49,11 @@ def final_height(path: Path, until: float) -> float:
 def test_the_route_of_first_slips_agrees_with_the_truth(route: Any) -> None:
     """Events and final height are those of the general mechanics, which shares no equation with it, to 1e-9."""
     body, true = ball(**PAPER), paper()
-    path, events = follow(body, route(body), UNTIL), events_of(true)
+    taken = route(body)
+    path, events = follow(body, taken, UNTIL), events_of(true)
     assert [kind for kind, _ in path.events] == [event.kind for event in events] == ["slip", "stick", "slip"]
     assert [time for _, time in path.events] == pytest.approx([event.time for event in events], abs=1e-9, rel=0)
-    assert final_height(path, UNTIL) == pytest.approx(float(true["z"][-1]), abs=1e-9)
+    assert final_height(path, taken) == pytest.approx(float(true["z"][-1]), abs=1e-9)
 
 
 @needs_heyoka
@@ -72,12 +74,13 @@ def test_random_slips_agree_with_the_truth(speed: float, mu: float, ratio: float
     if "ill_posed" in true.attrs:
         return
     body = rolling_ball(scene)
-    path = follow(body, first_route(body), 1.0)
+    route = first_route(body)
+    path = follow(body, route, 1.0)
     later = [(kind, time) for kind, time in path.events if time > 0]  # the truth counts a slip at once to its start
     events = events_of(true)
     assert [kind for kind, _ in later] == [event.kind for event in events]
     assert [time for _, time in later] == pytest.approx([event.time for event in events], abs=1e-9, rel=0)
-    assert final_height(path, 1.0) == pytest.approx(float(true["z"][-1]), abs=1e-9)
+    assert final_height(path, route) == pytest.approx(float(true["z"][-1]), abs=1e-9)
 
 
 # Scene parameters, end [s], events [s], height at the end [m].
@@ -108,10 +111,10 @@ def test_known_digits(name: str) -> None:
 def test_state_at_the_first_slip_of_the_paper() -> None:
     """Where the paper's ball first slips its state has the known digits; the bounds are their last ones."""
     body = ball(**PAPER)
-    stretch = follow(body, first_route(body), 1.8).stretches[0]
-    p, v, w = (values[-1] for values in _state(stretch.motion(np.array([1.0, stretch.end]))))
+    end, motion = first_route(body).rolling(1.8)
+    p, v, w = (values[-1] for values in _state(motion(np.array([1.0, end]))))
     frame = body.surface.frame(body.surface.locate(p))
-    assert stretch.end == pytest.approx(1.720183172, abs=1e-9)
+    assert end == pytest.approx(1.720183172, abs=1e-9)
     state = [p[2], v @ frame[:, 1] / 0.2, v[2], w @ frame[:, 0]]
     assert state == pytest.approx([-0.15342234, 13.44828166, -0.39505144, -101.7254881], rel=4e-8)
 
@@ -128,9 +131,9 @@ def test_start_of_slip_does_not_matter() -> None:
     if library.available():
         routes += [SlidingTaylor(body, handover=size) for size in (1e-7, 1e-6, 1e-5, 1e-4)]
     paths = [follow(body, route, 2.5) for route in routes]
-    for path in paths[1:]:
+    for route, path in zip(routes[1:], paths[1:], strict=True):
         assert [time for _, time in path.events] == pytest.approx([time for _, time in paths[0].events], abs=1e-9)
-        assert final_height(path, 2.5) == pytest.approx(final_height(paths[0], 2.5), abs=1e-9)
+        assert final_height(path, route) == pytest.approx(final_height(paths[0], routes[0]), abs=1e-9)
 
 
 @needs_heyoka
