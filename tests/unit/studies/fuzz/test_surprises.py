@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from proofroll.core.errors import ProofrollError
 from proofroll.core.verdict import Judgement, LimitResult, Verdict
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+from proofroll.studies.fuzz import evaluation
 from proofroll.studies.fuzz import surprises as kinds
 
 _JUDGEMENT = Judgement("v", "m/s", 0.1, 0.0, 1e-3, 1.0, Verdict.DIFFERS, limit=LimitResult.NOT_SHOWN)
@@ -37,3 +42,14 @@ def test_a_sample_right_behind_an_event_shows_no_wrong_limit(
     run: Any = SimpleNamespace(facts=SimpleNamespace(step=1e-3), rungs=[SimpleNamespace(value=2e-3)])
     reference: Any = SimpleNamespace(events=[SimpleNamespace(time=0.0398)])
     assert kinds._late_alone(run, _JUDGEMENT, reference) is alone
+
+
+def test_a_broken_installation_is_no_invalid_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is wrong with the package ends a hunt, which would draw scenes without end."""
+
+    def load(_: str) -> None:
+        raise ProofrollError("the folder models/ is missing; reinstall proofroll")
+
+    monkeypatch.setattr(evaluation, "load_scene", load)
+    with pytest.raises(ProofrollError, match="reinstall"):
+        evaluation.evaluate_scene(tmp_path, "truth", Runner(Store(tmp_path / "cases")), 1.0)
