@@ -88,7 +88,7 @@ def _inside(joint: Joint) -> bool:
 
 def _unlimited(mechanism: Mechanism) -> Mechanism:
     """Mechanism without stops and effort limits."""
-    joints = tuple(replace(joint, limits=None) for joint in mechanism.joints)
+    joints = tuple(replace(joint, limits=None, restitution=0.0) for joint in mechanism.joints)
     actuators = tuple(replace(actuator, limit=None) for actuator in mechanism.actuators)
     return replace(mechanism, joints=joints, actuators=actuators)
 

@@ -54,6 +54,14 @@ def over_a_rim(shape: Geometry) -> Mechanism:
     return Mechanism((body,), (joint,), geometries=(shape, table), pairs=(Pair("touch", (shape.name, "table"), 0.0),))
 
 
+def standing_cylinder() -> Mechanism:
+    """A cylinder that stands on a plane."""
+    shapes = Geometry("can", "can", "cylinder", radius=0.1, length=0.2), Geometry("floor", "world", "plane")
+    joint = Joint("j", "free", "world", "can", q0=(0, 0, 0.1, 1, 0, 0, 0))
+    body, pair = Body("can", 1.0, inertia=(0.006, 0.006, 0.005)), Pair("touch", ("can", "floor"), 0.5)
+    return Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,))
+
+
 def falling(**law: float) -> Mechanism:
     """A ball that falls on a plane with spin and speed and hits at 0.0452 s."""
     inertia = 0.4 * 0.5 * 0.1**2
@@ -131,6 +139,7 @@ ONE_COEFFICIENT = "this formulation gives a contact one coefficient"
         (on_plane(), "mujoco[formulation=geoms,cone=pyramidal]", "friction above 1 makes a contact soft"),
         (over("box"), "exudyn[formulation=spheres]", "touch has a shape that is neither sphere nor wall"),
         (over_a_rim(RIMS["block"]), PROJECTION, "begin and end at borders of faces"),
+        (standing_cylinder(), "pinocchio[formulation=impulses]", "of which this formulation has one point"),
         (falling(static_friction=0.9), "mujoco[formulation=geoms]", ONE_COEFFICIENT),
         (falling(static_friction=0.9), "pinocchio[formulation=impulses]", ONE_COEFFICIENT),
         (falling(static_friction=0.9), "exudyn[formulation=spheres]", ONE_COEFFICIENT),

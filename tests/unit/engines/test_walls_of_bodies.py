@@ -128,6 +128,19 @@ def test_walls_are_certified(kind: str, setting: str, swapped: bool) -> None:
     assert setting == "mujoco geoms matched" or "forces of contact" in told
 
 
+@pytest.mark.parametrize(("kind", "wide", "place"), [("bowl", 0.5, 0.2), ("shaft", 0.1, 0.1 + 8 * RADIUS)])
+def test_a_ball_far_from_its_wall_is_certified_in_exudyn(kind: str, wide: float, place: float) -> None:
+    """The hollow sphere fits the wall where the ball will touch it, and its gap is the wall's at the start."""
+    shapes = Geometry("sphere", "ball", "sphere", radius=RADIUS), Geometry("wall", "world", kind, radius=wide)
+    joint = Joint("free", "free", "world", "ball", q0=(place, 0, 0, 1, 0, 0, 0))
+    body, pair = Body("ball", MASS, inertia=(MOMENT,) * 3), Pair("contact", ("sphere", "wall"), 0.3)
+    mechanism = Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,))
+    exudyn = load_engine("exudyn")
+    run = exudyn.build(mechanism, exudyn.presets["spheres"]["matched"])
+    lines = MechanismElement(mechanism).certify(run.built(), run.sample())
+    assert [str(line) for line in lines if not line.holds] == []
+
+
 @pytest.mark.parametrize("setting", ["mujoco geoms matched", "exudyn spheres matched"])
 def test_a_ball_at_the_centre_of_a_bowl_falls(setting: str) -> None:
     """Where all points of a wall are as near, no contact acts, and the ball falls freely."""

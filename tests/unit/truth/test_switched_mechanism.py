@@ -27,6 +27,14 @@ from proofroll_drill.published import true_values
 TIGHT = 1e-11  # of what two routes at 1e-14 leave after some ten switches, with room
 
 
+def test_a_stop_that_is_not_reached_may_have_a_restitution() -> None:
+    """A mass that falls and never comes to its stop falls as one without: its restitution is not asked for."""
+    joint = Joint("slide", "prismatic", "world", "b", axis=(0, 0, 1), limits=(-9.0, 9.0), restitution=0.5)
+    found = truth_of(Mechanism((Body("b", 1.0),), (joint,), gravity=(0, 0, -10.0)), np.array([0.0, 1.0]))
+    assert found.record.q[-1] == pytest.approx([-5.0], abs=TIGHT)
+    assert found.events == ()
+
+
 @pytest.mark.drill
 def test_a_spring_that_rubs_loses_four_parts_of_friction_a_swing() -> None:
     """Half swings last pi sqrt(m/k), end at (-1)^n (1 - 0.06 n), and the mass rests where the spring is too weak."""

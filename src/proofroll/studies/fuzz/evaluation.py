@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 from proofroll.core.comparison import Band, Comparison, Row
 from proofroll.core.drawing import Relation
-from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
@@ -102,7 +102,7 @@ def outcome_of(folder: Path, engine: str, runner: Runner, limit: float, *, diagn
     """
     try:
         scene, file = load_scene(str(folder)), read_scene_file(str(folder))
-    except ProofrollError as error:
+    except (InputError, Refused) as error:
         raise _Invalid(str(error)) from None
     rows = _rows(engine, scene, file, runner)
     if not rows and engine != TRUTH:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -294,5 +295,5 @@ def _numbers(value: Any) -> Iterator[float]:
 
 
 def _significant(number: float) -> str:
-    """Significant digits of a number."""
-    return repr(abs(number)).partition("e")[0].replace(".", "").strip("0")
+    """Significant digits of a number; an infinite one has none."""
+    return "" if math.isinf(number) else repr(abs(number)).partition("e")[0].replace(".", "").strip("0")

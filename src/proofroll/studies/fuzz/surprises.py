@@ -6,10 +6,11 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.core.arrays import magnitudes
+from proofroll.core.arrays import FloatArray, magnitudes
 from proofroll.core.errors import ProofrollError
 from proofroll.core.observable import Observable, Role
 from proofroll.core.verdict import Judgement, LimitResult, Verdict
@@ -27,6 +28,7 @@ _EVENTFUL = 100.0  # by which the limit of small steps of a run with events may 
 _FALLEN = 0.8  # largest ratio of the errors at the shortest and the longest step that counts as falling
 _OF_MOTION = frozenset({"m", "rad", "m/s", "rad/s", "1"})  # units of quantities of motion
 _EVENTS, _OF_EVENTS = "events", 1.0  # quantity, and size where their number is not the true one [decades]
+_SETTLING = 5.0  # longest steps behind an event in which a run may still follow it
 _SAME = 0.01  # relative difference of errors that are alike at all steps
 _FEW = 2  # samples that count as the start of a run
 # Status of a run -> kind of surprise and its size [decades]: the worst first in a table of kinds.
@@ -118,6 +120,7 @@ def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
         return
     judged = [item for item in run.judgements if item.verdict not in {Verdict.NOT_JUDGED, Verdict.ILL_POSED}]
     wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _errors(run, item))]
+    wrong = [item for item in wrong if not _late_alone(run, item, reference)]
     if wrong:
         worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item, events=False)))
         quantity = _quantity(reference.scene.observables[worst.observable], worst.observable)
@@ -149,7 +152,7 @@ def _is_wrong(judgement: Judgement, eventful: bool, errors: list[float]) -> bool
     An event that falls between two steps leaves errors whose order three steps do not show, so that more is allowed;
     but not where all three have the same error.
     """
-    steady = len(errors) > 1 and max(errors) - min(errors) <= _SAME * max(errors)
+    steady = len(errors) > 1 and math.isfinite(max(errors)) and max(errors) - min(errors) <= _SAME * max(errors)
     if judgement.limit is LimitResult.ANOTHER and judgement.limit_error is not None:
         allowed = judgement.tolerance * (_EVENTFUL if eventful and not steady else 1.0)
         return not judgement.limit_error - (judgement.limit_doubt or 0.0) <= allowed
@@ -176,7 +179,7 @@ def _failed(formulation: str, result: Result) -> Surprise:
 
 def _words(message: str) -> str:
     """Beginning of a message without numbers and names of parts, so that it is alike in scenes alike."""
-    words = _NUMBER.sub("#", re.sub(r"\b[a-z]{2,3}\d+\b", "…", message))
+    words = _NUMBER.sub("#", re.sub(r"\b[a-z]{2,3}\d+(\.\d+)?\b", "…", message))
     words = re.sub(r"#(, #)+", "#", words).replace("angular acceleration", "acceleration")  # of which is furthest off
     return " ".join(words.split()[:12])
 
@@ -187,23 +190,49 @@ def formulation_of(run: Run) -> str:
     return engine if run.facts is None else f"{engine} {run.facts.settings.get('formulation', '')}".strip()
 
 
+def _late_alone(run: Run, judgement: Judgement, reference: Reference) -> bool:
+    """True if a run is off at samples right behind events alone, which its steps do not resolve."""
+    if run.facts is None or run.facts.step is None or not (apart := _apart(run, judgement.observable, reference)):
+        return False
+    longest = max([run.facts.step, *(rung.value for rung in run.rungs)])
+    happened = np.array([event.time for event in reference.events])
+    behind = apart.times[:, None] - happened
+    settled = ~((behind > -longest) & (behind <= _SETTLING * longest)).any(axis=1)
+    return bool(happened.size and apart.sizes[settled].max(initial=0.0) <= _EVENTFUL * judgement.tolerance)
+
+
 def _phase(run: Run, observable: str, reference: Reference) -> str:
     """Phase in which a run parts from the truth: the start, behind a kind of event, or underway."""
-    if run.trajectory is None:
+    apart = _apart(run, observable, reference)
+    if apart is None:
         return ""
+    index = int(np.argmax(apart.sizes > _PARTED * apart.sizes.max()))
+    events = [event for event in reference.events if event.time <= apart.times[index]]
+    if events:
+        return f"after {events[-1].kind.replace('_', '-')}"
+    return "start" if index < _FEW else "underway"
+
+
+class _Apart(NamedTuple):
+    """Differences of a run from the truth, the largest of all vectors at each sample, and their times [s]."""
+
+    times: FloatArray
+    sizes: FloatArray
+
+
+def _apart(run: Run, observable: str, reference: Reference) -> _Apart | None:
+    """Differences of an observable from the truth; None where it is no function of the sample times."""
+    if run.trajectory is None:
+        return None
     try:
         reference, cut = reference.common_span({0: run.trajectory.dataset})
         values = run_values.observables_of(reference, cut[0])[observable]
         true = reference.true(observable, values).values
     except (KeyError, ProofrollError):
-        return ""
+        return None
     times = reference.dataset["time"].to_numpy()
     if values.shape != true.shape or not 0 < len(values) <= len(times):
-        return ""
-    apart = magnitudes(np.nan_to_num(values - true, nan=np.inf), reference.vectors(observable)).max(axis=1, initial=0.0)
-    index = int(np.argmax(apart > _PARTED * apart.max()))
-    parted = times[len(times) - len(values) :][index]
-    events = [event for event in reference.events if event.time <= parted]
-    if events:
-        return f"after {events[-1].kind.replace('_', '-')}"
-    return "start" if index < _FEW else "underway"
+        return None
+    apart = np.nan_to_num(values - true, nan=np.inf)
+    sizes = magnitudes(apart, reference.vectors(observable)).max(axis=1, initial=0.0)
+    return _Apart(times[len(times) - len(values) :], sizes)

@@ -100,3 +100,8 @@ def test_without_time_the_scene_stays(tmp_path: Path) -> None:
     assert smallest.kept == 0
     assert smallest.nearest == ""
     assert _fails(tables) == (_STOPS,)
+
+
+def test_an_infinite_friction_has_no_digits() -> None:
+    """Digits of a smallest scene are those of its numbers, not the letters of an infinite one."""
+    assert shrinking._most_digits({"pairs": [{"name": "touch", "friction": float("inf"), "restitution": 0.25}]}) == 2

@@ -78,6 +78,9 @@ class Touching(NamedTuple):
         return self.tilt <= FLAT
 
 
+ONE_POINT = "stands on its whole edge, of which this formulation has one point, so that it tips; give it three spheres"
+
+
 def lying(contact: BodyContact, time: float) -> NotUnique:
     """Error of a disc that lies flat, of parallel capsules, or of a ball in the tip of a cone, from a time on [s]."""
     if contact.has_tip:

@@ -8,7 +8,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference, longest
 from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.samples import run_and_truth
-from proofroll.core.errors import ProofrollError
+from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS
@@ -110,7 +110,10 @@ def _other_starts(mechanism: Mechanism) -> Iterator[tuple[str, Mechanism]]:
         yield says, replace(mechanism, joints=resting)
     if mechanism.loops or mechanism.couplings or not any(map(_away, mechanism.joints)):
         return
-    home = tuple(replace(joint, q0=_home(joint)) for joint in mechanism.joints)
+    try:
+        home = tuple(replace(joint, q0=_home(joint)) for joint in mechanism.joints)
+    except InputError:  # zero lies beyond a stop
+        return
     yield "the start was not taken: all coordinates begin at zero", replace(mechanism, joints=home)
     both = tuple(replace(joint, q0=_home(joint)) for joint in resting)
     yield "the start was not taken: it begins at rest with all coordinates at zero", replace(mechanism, joints=both)

@@ -29,7 +29,7 @@ _NUMBER = re.compile(r"\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+")
 def smaller(tables: Mapping[str, Any]) -> Iterator[Change]:
     """Changes of a scene file that each make the scene simpler."""
     bodies = [row["name"] for row in tables["bodies"]]
-    yield from (_shorter, _shorter)
+    yield from (_shorter, _shorter, _plain)
     for body in reversed(bodies):
         yield partial(remove, names={body})
         yield partial(_splice, body=body)
@@ -39,8 +39,7 @@ def smaller(tables: Mapping[str, Any]) -> Iterator[Change]:
     yield lambda content: content.pop("control") and None
     yield _upright
     yield _make_round
-    for digits in (1, 2):
-        yield partial(_round_rows, digits=digits)
+    yield from _roundings(tables)
     rows = [(table, row) for table, content in tables.items() if isinstance(content, list) for row in content]
     for key in dict.fromkeys(key for _, row in rows for key in row if key not in STRUCTURE):
         yield partial(_drop, key=key)
@@ -56,6 +55,14 @@ def smaller(tables: Mapping[str, Any]) -> Iterator[Change]:
     for digits in (1, 2):
         for _, row in rows:
             yield partial(_round_rows, digits=digits, name=row["name"])
+
+
+def _roundings(tables: Mapping[str, Any]) -> Iterator[Change]:
+    """Changes that round all numbers, or those of one table."""
+    for digits in (1, 2):
+        yield partial(_round_rows, digits=digits)
+        for table in (name for name, content in tables.items() if isinstance(content, list)):
+            yield partial(_round_rows, digits=digits, table=table)
 
 
 def remove(tables: dict[str, Any], names: Collection[str]) -> None:
@@ -151,6 +158,13 @@ def _attitude_zero(joint: dict[str, Any]) -> None:
         joint["v0"] = [x for part in np.array(joint["v0"]).reshape(-1, 3) for x in floats(attitude @ part)]
 
 
+def _plain(tables: dict[str, Any]) -> None:
+    """Turns the world upright, makes all bodies round, and leaves two digits: most surprises need none of these."""
+    _upright(tables)
+    _make_round(tables)
+    _round_rows(tables, digits=2)
+
+
 def _make_round(tables: dict[str, Any]) -> None:
     """Gives each body equal moments, of one digit, about its centre of mass in the origin of its frame."""
     for row in tables["bodies"]:
@@ -180,9 +194,9 @@ def _make_simple(tables: dict[str, Any], name: str, kind: str) -> None:
     joint |= {"kind": str(kind), "v0": 1.0}
 
 
-def _round_rows(tables: dict[str, Any], digits: int, name: str = "") -> None:
-    """Rounds the numbers of all rows, or of a named one, to a number of digits; unit quaternions stay."""
-    rows = [named(tables, name)] if name else [*rows_of(tables), tables["gravity"]]
+def _round_rows(tables: dict[str, Any], digits: int, name: str = "", table: str = "") -> None:
+    """Rounds the numbers of all rows, or of a table, or a named row, to some digits; unit quaternions stay."""
+    rows = [named(tables, name)] if name else tables[table] if table else [*rows_of(tables), tables["gravity"]]
     for row in rows:
         for key, value in row.items():
             kept = 4 if key == "q0" and row.get("kind") in WITH_QUATERNION else 0

@@ -16,6 +16,8 @@ from proofroll.engines.exudyn.native import Output, exu
 # Radius of the hollow sphere in radii of the ball where the wall is not curved. The larger it is, the less its normal
 # turns between two residuals, and the more the stiffness magnifies the round-off of the distance.
 ON_A_PLANE = 10.0
+# Largest part of the distance of both centres that a gap may have: without a distance they have no normal.
+_REACH = 0.9
 
 
 class MovingPlane(NamedTuple):
@@ -86,17 +88,23 @@ class HollowSphere(NamedTuple):
 def hollow_centre(wall: CurvedWall, sphere: Array, of_sphere: float, radius: float) -> Array:
     """Centre of a hollow sphere that touches a wall where a sphere is nearest, in the frame of the wall's body [m].
 
-    Beyond a gap of half the distance of the two centres it follows the sphere and not the wall. Where several points of
-    the wall are as near, it lies along the axis.
+    Beyond a gap of nearly the distance of the two centres it follows the sphere and not the wall. Where several points
+    of the wall are as near, it lies along the axis.
     """
     near, distance = wall.near(wall.frame.T @ (sphere - wall.point)), radius - of_sphere
     normal = wall.frame @ near.normal if near.normal.any() else wall.axis
-    return np.asarray(sphere + (distance - min(near.distance - of_sphere, 0.5 * distance)) * normal)
+    return np.asarray(sphere + (distance - min(near.distance - of_sphere, _REACH * distance)) * normal)
 
 
 def hollow_radius(wall: CurvedWall, sphere: Array, of_sphere: float) -> float:
-    """Radius that fits a wall's largest curvature where a sphere is nearest, or :data:`ON_A_PLANE` radii [m]."""
-    near = wall.near(wall.frame.T @ (sphere - wall.point))
-    most = float(np.linalg.eigvalsh(-near.bend)[-1])  # of the surface on which the centre moves
-    flat = of_sphere * ON_A_PLANE
+    """Radius that fits a wall's largest curvature where a sphere will touch it [m].
+
+    Of a wall that is not curved there it is :data:`ON_A_PLANE` radii, or more for a sphere that starts far from it.
+    """
+    place = wall.frame.T @ (sphere - wall.point)
+    near = wall.near(place)
+    gap = max(near.distance - of_sphere, 0.0)
+    touching = wall.near(place - gap * near.normal)
+    most = float(np.linalg.eigvalsh(-touching.bend)[-1])  # of the surface on which the centre moves
+    flat = max(of_sphere * ON_A_PLANE, of_sphere + 2 * gap)
     return flat if most * flat <= 1 else of_sphere + 1 / most

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.start import natural_scale
-from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.contact.touching import ONE_POINT, Moving, Touching, touch
 from proofroll.elements.mechanism.contact.turning import rolling_levers
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
@@ -134,7 +134,7 @@ class ImpulseSteps:
         """Starts at time 0.
 
         Raises:
-            Refused: Pinocchio's solver returns wrong impulses for such contacts.
+            Refused: Pinocchio's solver returns wrong impulses for such contacts, or one point does not hold a body.
         """
         self._tree, self._model, self._data = tree, tree.model, tree.model.createData()
         self._ahead = tree.model.createData()  # later in a step
@@ -143,12 +143,10 @@ class ImpulseSteps:
         mechanism = tree.mechanism
         self.contacts = mechanism.contacts
         self.events = step_events.StepEvents(self.contacts, self._dt)
-        self.q, self.v, self.t = tree.q0, tree.v0, 0.0
-        self._gravity = float(np.linalg.norm(mechanism.gravity))
+        self.q, self.v, self.t, self._gravity = tree.q0, tree.v0, 0.0, float(np.linalg.norm(mechanism.gravity))
         held = step_events.least_slip(mechanism.gravity, self._dt)
         self._held = np.array([held if contact.friction else -1.0 for contact in self.contacts])
-        self._touching = natural_scale(mechanism).gap
-        self._index = mechanism.body_index
+        self._touching, self._index = natural_scale(mechanism).gap, mechanism.body_index
         self.restitution = np.array([contact.restitution for contact in self.contacts])
         self.joints = JointRows(tree)
         stops = [item.joint.restitution for item in self.joints.stops]
@@ -162,6 +160,8 @@ class ImpulseSteps:
             terms = self.terms(self.q, self.v, self._dt)
             for k in range(len(self.contacts)):
                 self._check(k, terms.J[k] @ terms.inverse @ terms.J[k].T)
+                if terms.touching[k].flat and terms.touching[k].gap <= self._touching:
+                    raise Refused(f"{self.contacts[k].name} {ONE_POINT}")
         except Diverged as error:
             raise Refused(str(error)) from None
 

@@ -136,3 +136,14 @@ def test_exact_accelerations_and_a_known_mistake_are_stronger_than_what_is_read_
         line("angular acceleration", true.angular_acceleration, moved.angular_acceleration, False),
     ]
     assert [item.cause.id for item in diagnose_scene(scene, lines)] == said
+
+
+def test_a_start_beyond_a_stop_is_not_tried() -> None:
+    """With all coordinates at zero a hinge would stand beyond its stop: the run is wrong, and no traceback says so."""
+    limited = arm((0.7, 0.4), (0.0, 0.0)).elements[0].mechanism  # type: ignore[attr-defined]  # as arm makes it
+    joints = (replace(limited.joints[0], limits=(0.2, 0.9)), limited.joints[1])
+    scene = Scene("arm", "", (MechanismElement(replace(limited, joints=joints)),))
+    true = truth(scene, TIMES)
+    run = true.copy(deep=True)
+    run["p_WB"] = 1.1 * run["p_WB"]
+    assert "start" not in {item.cause.id for item in diagnose_scene(scene, [], run, true, 1e-3)}

@@ -35,6 +35,8 @@ _States = NDArray[np.bool_]
 _CREEPS = 1e-3
 # Parts of the bound of friction: what is at the cone, and what may be at a pyramid within it.
 _ON_CONE, _ON_PYRAMID = 0.99, 0.7
+# Rate of a gap that is none, relative to the mechanism's speed: round-off of a body that slides has a sign.
+_ROUND_OFF = 1e-10
 # Gap at the start that counts as closed, relative to the mechanism's size.
 _CLOSED = 1e-6
 # Room of a time in which a gap closes, relative: digits of its samples.
@@ -145,6 +147,7 @@ class ContactWatch:
         presses[0] |= presses[1] & (followed.gap[0] <= _CLOSED * self._element.length)
         forces, presses = presses, _without_lone(presses)
         u_n = np.sum(followed.normal * followed.slide, axis=-1)
+        u_n[np.abs(u_n) <= _ROUND_OFF * self._element.speed] = 0.0
         for c in range(presses.shape[1]):
             room, moves = _CLOSED * self._element.length, _CREEPS * self._element.speed
             presses[:, c] |= _stays_closed(presses[:, c], followed.gap[:, c], u_n[:, c], room, moves)

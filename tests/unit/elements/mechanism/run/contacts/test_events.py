@@ -127,6 +127,13 @@ def test_what_swings_past_the_floor_does_not_strike_it(gap: float) -> None:
     assert seen([gap] * 4, trembles, [0.0] * 4, ball()) == []
 
 
+def test_what_leaves_at_the_start_has_not_struck() -> None:
+    """A speed into the floor that is round-off at the start of a flight, as of a ball on a crest, is no impact."""
+    t = EVERY * np.arange(4.0)
+    speeds = [[0.3, 0.0, float(u)] for u in [-1e-17, *(0.4 * t[1:])]]
+    assert seen((0.2 * t**2).tolist(), speeds, [0.0] * 4, ball()) == []
+
+
 @pytest.mark.parametrize("phase", [0.1, 0.5, 0.9])
 @pytest.mark.parametrize("speed", [0.15, 1.0])
 def test_what_rebounds_between_samples_has_struck(phase: float, speed: float) -> None:
