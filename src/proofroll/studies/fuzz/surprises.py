@@ -120,7 +120,7 @@ def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
         return
     judged = [item for item in run.judgements if item.verdict not in {Verdict.NOT_JUDGED, Verdict.ILL_POSED}]
     wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _errors(run, item))]
-    wrong = [item for item in wrong if not _late_alone(run, item, reference)]
+    wrong = [item for item in wrong if not (_fall(_errors(run, item)) and _late_alone(run, item, reference))]
     if wrong:
         worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item, events=False)))
         quantity = _quantity(reference.scene.observables[worst.observable], worst.observable)
@@ -158,9 +158,13 @@ def _is_wrong(judgement: Judgement, eventful: bool, errors: list[float]) -> bool
         return not judgement.limit_error - (judgement.limit_doubt or 0.0) <= allowed
     if judgement.limit is not LimitResult.NOT_SHOWN:
         return False
-    falls = len(errors) > 1 and errors[0] < _FALLEN * errors[-1]
     large = not judgement.error <= max(_LARGE * judgement.scale, judgement.tolerance)
-    return (large and not falls) or (steady and judgement.error > judgement.tolerance)
+    return (large and not _fall(errors)) or (steady and judgement.error > judgement.tolerance)
+
+
+def _fall(errors: list[float]) -> bool:
+    """True if the error at the shortest step is clearly smaller than at the longest."""
+    return len(errors) > 1 and errors[0] < _FALLEN * errors[-1]
 
 
 def _size(judgement: Judgement, events: bool) -> float:
