@@ -120,7 +120,7 @@ def _of_run(run: Run, reference: Reference) -> Iterator[Surprise]:
         return
     judged = [item for item in run.judgements if item.verdict not in {Verdict.NOT_JUDGED, Verdict.ILL_POSED}]
     wrong = [item for item in judged if _is_wrong(item, bool(reference.events), _errors(run, item))]
-    wrong = [item for item in wrong if not (_fall(_errors(run, item)) and _late_alone(run, item, reference))]
+    wrong = [item for item in wrong if not _late_alone(run, item, reference)]
     if wrong:
         worst = max(wrong, key=lambda item: (item.limit is LimitResult.ANOTHER, _size(item, events=False)))
         quantity = _quantity(reference.scene.observables[worst.observable], worst.observable)
@@ -195,13 +195,17 @@ def formulation_of(run: Run) -> str:
 
 
 def _late_alone(run: Run, judgement: Judgement, reference: Reference) -> bool:
-    """True if a run is off at samples right behind events alone, which its steps do not resolve."""
+    """True if a run is off at samples right behind events alone, which its steps do not resolve.
+
+    Where errors do not fall, even the shortest step must have had no time to follow the event.
+    """
     if run.facts is None or run.facts.step is None or not (apart := _apart(run, judgement.observable, reference)):
         return False
-    longest = max([run.facts.step, *(rung.value for rung in run.rungs)])
+    steps = [run.facts.step, *(rung.value for rung in run.rungs)]
+    step = (max if _fall(_errors(run, judgement)) else min)(steps)
     happened = np.array([event.time for event in reference.events])
     behind = apart.times[:, None] - happened
-    settled = ~((behind > -longest) & (behind <= _SETTLING * longest)).any(axis=1)
+    settled = ~((behind > -step) & (behind <= _SETTLING * step)).any(axis=1)
     return bool(happened.size and apart.sizes[settled].max(initial=0.0) <= _EVENTFUL * judgement.tolerance)
 
 

@@ -31,16 +31,25 @@ def test_messages_about_parts_of_a_pair_are_one_kind() -> None:
     assert kinds._words("pai1 has no contact") == kinds._words("pai12.3 has no contact")
 
 
-@pytest.mark.parametrize(("late", "alone"), [(1, True), (2, False)])
+@pytest.mark.parametrize(
+    ("late", "event", "errors", "alone"),
+    [
+        (1, 0.0398, [0.1, 0.1], True),
+        (2, 0.0398, [0.1, 0.1], False),
+        (1, 0.032, [0.1, 0.1], False),
+        (1, 0.032, [0.01, 0.1], True),
+    ],
+)
 def test_a_sample_right_behind_an_event_shows_no_wrong_limit(
-    late: int, alone: bool, monkeypatch: pytest.MonkeyPatch
+    late: int, event: float, errors: list[float], alone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What is off at the first sample behind an impact alone may not have followed it yet; what stays off is wrong."""
+    monkeypatch.setattr(kinds, "_errors", lambda *_: errors)
     times, sizes = np.array([0.0, 0.02, 0.04, 0.06]), np.zeros(4)
     sizes[2 : 2 + late] = 5.0
     monkeypatch.setattr(kinds, "_apart", lambda *_: kinds._Apart(times, sizes))
     run: Any = SimpleNamespace(facts=SimpleNamespace(step=1e-3), rungs=[SimpleNamespace(value=2e-3)])
-    reference: Any = SimpleNamespace(events=[SimpleNamespace(time=0.0398)])
+    reference: Any = SimpleNamespace(events=[SimpleNamespace(time=event)])
     assert kinds._late_alone(run, _JUDGEMENT, reference) is alone
 
 
