@@ -7,7 +7,7 @@ import pytest
 from mechanism_scenes import mechanism_named
 
 from proofroll.files.scene_file import read_scene_file
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 # m, s, N and the like: what two routes may leave of a scene; 1e-11 is seen.
 KNOWN = 1e-9

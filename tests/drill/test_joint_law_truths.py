@@ -11,7 +11,7 @@ import pytest
 from mechanism_scenes import mechanism_named
 from scipy.integrate import solve_ivp
 
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 from test_contact_truths import KNOWN, held_out
 
 OWN = 1e-11  # m, rad, 1/s of both: what plain DOP853 at 3e-14 leaves, with room; 4e-12 is seen

@@ -14,12 +14,12 @@ from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
-from proofroll.elements.mechanism.run.assembly import check_start
+from proofroll.elements.mechanism.reading.assembly import check_start
 from proofroll.elements.mechanism.scene.joint_kinds import FACTS
 from proofroll.truth.bodies import maximal_taylor
 from proofroll.truth.bodies.maximal_bodies import Planar, made_bodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.referee import holding
 from proofroll_drill.referee.balls import BallReferee
 from proofroll_drill.referee.holding import as_body, errors, hold, hold_ball, hold_contacts

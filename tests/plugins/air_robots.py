@@ -9,7 +9,7 @@ from servo_robots import servo_tables
 
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.run.reader import made_mechanism
+from proofroll.elements.mechanism.reading.reader import made_mechanism
 from proofroll.elements.mechanism.scene.policy import Observation, PolicySource
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 

@@ -15,7 +15,7 @@ import pytest
 
 from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism import Mechanism
-from proofroll.truth import switched_truth
+from proofroll.truth import truth_of_mechanism as switched_truth
 
 # Largest number of truths that are kept, some hundred kB each.
 _MOST = 300

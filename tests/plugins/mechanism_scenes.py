@@ -9,7 +9,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.error_bars import TwoRouteMotion
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 
 def mechanism_named(name: str, **parameters: float) -> Mechanism:

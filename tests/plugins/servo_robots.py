@@ -9,7 +9,7 @@ from robot_gallery import locate
 
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.run.reader import made_mechanism
+from proofroll.elements.mechanism.reading.reader import made_mechanism
 from proofroll.robots.scene import RobotScenes
 
 # Part of a joint's name -> kp, kd and target; the first that fits counts.

@@ -16,7 +16,7 @@ from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.elements.mechanism.scene.rotations import from_rpy
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.referee.random_contacts import random_contacts
 
 NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)

@@ -156,7 +156,7 @@ def test_each_way_of_importing_is_seen(tmp_path: Path, place: str, text: str, li
 
 # Engines that share a part with the truth, and for what.
 SHARED_WITH_TRUTH = {
-    "engines/exudyn/contact/spheres.py imports proofroll.elements.mechanism.contact.dynamics",  # the start's load
+    "engines/exudyn/contact/spheres.py imports proofroll.elements.mechanism.contact.tree_contacts",  # the start's load
     # It refuses with a reason and a remedy what the certificate would call a wrong model.
     "engines/mujoco/smooth/mechanism_model.py imports proofroll.elements.mechanism.run.certificate",
     "engines/projection/contact/contact_modes.py imports proofroll.elements.mechanism.contact.coulomb",  # its law alone
@@ -165,7 +165,7 @@ SHARED_WITH_TRUTH = {
 
 def test_engines_share_no_equations_with_the_truth_nor_limits_with_the_judge() -> None:
     """What moves joints and bodies in the truth, and what a certificate allows, is imported by no engine."""
-    of_truth = {"joint_coordinates", "dynamics", "coulomb", "one_contact", "certificate"}
+    of_truth = {"joint_coordinates", "tree_contacts", "coulomb", "one_contact", "certificate"}
     shared = {
         f"{file.relative_to(ROOT)} imports {name}"
         for file in (ROOT / "engines").rglob("*.py")

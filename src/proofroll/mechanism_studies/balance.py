@@ -13,10 +13,10 @@ from proofroll.core.errors import InputError, ProofrollError, Refused, require_k
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Joint, Mechanism, Tree
 from proofroll.elements.mechanism.dynamics.analysis import analyse
-from proofroll.elements.mechanism.dynamics.commands import at_start
+from proofroll.elements.mechanism.dynamics.held_signals import at_start
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.named_forces import lengths, named_forces, pick_named
-from proofroll.elements.mechanism.run.assembly import started
+from proofroll.elements.mechanism.reading.assembly import started
 from proofroll.elements.mechanism.run.dataset import along, reactions
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind

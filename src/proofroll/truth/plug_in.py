@@ -49,10 +49,10 @@ class MechanismTruth:
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
-        """See :func:`proofroll.truth.switched_truth.truth_of`; of motions that are not unique, laws alone."""
+        """See :func:`proofroll.truth.truth_of_mechanism.truth_of`; of motions that are not unique, laws alone."""
         # imports of a third of a second, which what has another truth does not need
-        from proofroll.truth.singular_poses import branching
-        from proofroll.truth.switched_truth import truth_of
+        from proofroll.truth.smooth.singular_poses import branching
+        from proofroll.truth.truth_of_mechanism import truth_of
 
         assert isinstance(element, MechanismElement)  # by ``covers``
         try:

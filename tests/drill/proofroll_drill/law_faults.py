@@ -25,7 +25,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.error_bars import TwoRouteMotion
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 _WIDER = 10.0  # bars by which a motion with a fault may be off
 

@@ -12,7 +12,7 @@ import pytest
 from proofroll.core.errors import Refused
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll.truth.smooth_truth import find_truth
+from proofroll.truth.smooth.smooth_truth import find_truth
 
 TIMES = np.array([0.0, 0.1, 0.2])
 BAR = (

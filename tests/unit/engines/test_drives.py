@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
 # Engine, formulation and preset -> allowed error of velocities after 0.2 s [rad/s], ten times what is seen; of

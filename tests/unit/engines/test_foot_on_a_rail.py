@@ -15,7 +15,7 @@ from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.signal import Formula
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 PROJECTION = load_engine("projection")
 SLOWED = 0.2 * 1.5 * 9.81 / 2  # m/s²

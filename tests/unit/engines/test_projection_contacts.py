@@ -25,7 +25,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.engines.projection.contact.contact_modes import ContactMotion
 from proofroll.engines.projection.contact.slip_directions import SlipDirections
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.published import true_values
 
 PROJECTION = load_engine("projection")

@@ -10,7 +10,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.signal import Formula, Table
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.published import true_values
 
 CUBE = Body("mass", 1.0, inertia=(0.1, 0.1, 0.1))

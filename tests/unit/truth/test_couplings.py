@@ -7,8 +7,8 @@ import pytest
 from pulleys import MASSES, accelerations, massless_pulley, one_rope
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.run.assembly import check_start
-from proofroll.truth.smooth_truth import find_truth
+from proofroll.elements.mechanism.reading.assembly import check_start
+from proofroll.truth.smooth.smooth_truth import find_truth
 
 
 @pytest.mark.parametrize("mechanism", [one_rope(), massless_pulley()], ids=["one rope", "massless pulley"])

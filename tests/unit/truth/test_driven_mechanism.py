@@ -9,11 +9,11 @@ from scipy.integrate import solve_ivp
 
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.run.assembly import assemble
+from proofroll.elements.mechanism.reading.assembly import assemble
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 TIGHT = 1e-12  # of what two routes at 1e-14 leave, with room
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))

@@ -14,9 +14,9 @@ from proofroll.elements.mechanism.scene.kinks import held_sides
 from proofroll.elements.mechanism.scene.parts import Force, Spring
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.elements.mechanism.scene.spring_law import SpringLaw
-from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.switching import contact_taylor
 from proofroll.truth.switching.kink_sides import sides_ahead
+from proofroll.truth.truth_of_mechanism import truth_of
 
 
 def slider(law="", at=0.0, v0=1.0, mass=1.0, **more):

@@ -13,12 +13,12 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.quantity import powers_of
 from proofroll.core.validation import units_of_kind
 from proofroll.elements.mechanism import Body, Force, Joint, Loop, Mechanism, Point, Spring
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.record import record_of
-from proofroll.elements.mechanism.run.assembly import assemble, check_start
+from proofroll.elements.mechanism.reading.assembly import assemble, check_start
+from proofroll.elements.mechanism.reading.reader import KINDS
 from proofroll.elements.mechanism.run.element import MechanismElement
-from proofroll.elements.mechanism.run.reader import KINDS
 from proofroll.elements.mechanism.scene.bushing import Bushing
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
@@ -27,8 +27,8 @@ from proofroll.elements.mechanism.scene.spring_law import SpringLaw
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.natural_units import Units, natural_units
-from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.tree.contact_tree import ContactTree
+from proofroll.truth.truth_of_mechanism import truth_of
 
 SAME = 1e-12  # of the size of the scene; 1e-14 is seen
 SMALL, LARGE = (1e-5, 1.0, 1e-5**0.5), (1e4, 1.0, 1e2)

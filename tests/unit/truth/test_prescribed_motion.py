@@ -16,7 +16,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula, Signal, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 
 def shaken(motion: Signal) -> Mechanism:

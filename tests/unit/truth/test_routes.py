@@ -16,7 +16,7 @@ from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.record import record_of
-from proofroll.elements.mechanism.run.assembly import check_start
+from proofroll.elements.mechanism.reading.assembly import check_start
 from proofroll.elements.mechanism.scene.joint_kinds import FACTS, WITH_AXIS
 from proofroll.elements.mechanism.scene.rotations import to_rpy
 from proofroll.truth.bodies.maximal_bodies import Planar, made_bodies

@@ -6,7 +6,7 @@ import pytest
 from proofroll.core.events import EventKind
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 DOWN = np.array([-0.37208365159161944, -0.3438637275758072, -0.8621551444351054])
 

@@ -7,7 +7,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.truth.signal_poles import first_pole
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 
 def pushed(text: str) -> Mechanism:

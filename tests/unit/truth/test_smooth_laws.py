@@ -8,7 +8,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.truth.bodies import maximal_taylor
-from proofroll.truth.smooth_truth import find_truth
+from proofroll.truth.smooth.smooth_truth import find_truth
 from proofroll.truth.switching import contact_taylor
 
 TIMES = np.array([0.0, 0.1, 0.2])

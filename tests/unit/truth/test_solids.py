@@ -15,7 +15,7 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.scene.rotations import to_rpy
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.error_bars import TwoRouteMotion
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 MASS, GRAVITY = 2.0, 9.81
 RADIUS, SPEED = 0.1, 0.3  # of the ball

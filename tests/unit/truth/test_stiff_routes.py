@@ -6,8 +6,8 @@ import pytest
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.smooth_routes import stiff
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.smooth.smooth_routes import stiff
+from proofroll.truth.truth_of_mechanism import truth_of
 
 
 @pytest.mark.drill

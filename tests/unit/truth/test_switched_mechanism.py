@@ -9,7 +9,7 @@ from mechanism_scenes import mechanism_named, true_motion
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.drives import Coupling
 from proofroll.files.scene_file import load_scene
@@ -20,8 +20,8 @@ from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.followed_paths import CLOSE, TOLERANCES
 from proofroll.truth.natural_units import natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, first_close, follow
-from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.tree.contact_tree import ContactTree
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.published import true_values
 
 TIGHT = 1e-11  # of what two routes at 1e-14 leave after some ten switches, with room

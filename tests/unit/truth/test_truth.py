@@ -16,14 +16,14 @@ from proofroll.elements.mechanism.scene.spring_law import SpringLaw
 from proofroll.truth.bodies import maximal_taylor
 from proofroll.truth.bodies.maximal_bodies import GeneralBody, Planar, made_bodies
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
-from proofroll.truth.contact_truth import contact_truth
 from proofroll.truth.error_bars import NUDGE
 from proofroll.truth.numerics import compiled_once
 from proofroll.truth.plug_in import MechanismTruth
-from proofroll.truth.singular_poses import BRANCHING
-from proofroll.truth.smooth_truth import CHAOS, _SmoothTruth, find_truth
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.smooth.singular_poses import BRANCHING
+from proofroll.truth.smooth.smooth_truth import CHAOS, _SmoothTruth, find_truth
+from proofroll.truth.switched.switched_truth import switched_truth
 from proofroll.truth.switching import contact_taylor
+from proofroll.truth.truth_of_mechanism import truth_of
 
 MODELS = Path(__file__).parents[3] / "models"
 
@@ -458,7 +458,7 @@ def test_routes_of_a_spinning_body_agree(scene):
     assert max(found.differences["q_WB"], found.differences["points"]) < 2e-10
 
 
-@pytest.mark.parametrize("route", [find_truth, contact_truth], ids=["smooth", "switching"])
+@pytest.mark.parametrize("route", [find_truth, switched_truth], ids=["smooth", "switching"])
 @pytest.mark.parametrize("compiled", [True, False])
 def test_a_failure_of_the_rates_ends_the_truth_at_its_time(monkeypatch, route, compiled):
     """A bushing turned at 10 rad/s has a truth to 3 rad, to a part in a million of the time, wherever samples lie."""

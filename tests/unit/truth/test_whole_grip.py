@@ -10,13 +10,13 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.truth.numerics.hybrid import follow
-from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.tree.contact_tree import ContactTree
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.referee.random_contacts import random_contacts
 
 _MU, _M, _G, _PULL = 0.3, 1.5, 9.81, 9.0

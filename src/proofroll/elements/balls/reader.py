@@ -19,9 +19,9 @@ from proofroll.core.parameters import Parameters
 from proofroll.core.validation import strict, units_of, validated
 from proofroll.elements.balls.surfaces import Cylinder, surface_kinds
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
+from proofroll.elements.mechanism.reading.reader import started
 from proofroll.elements.mechanism.run.contacts.on_wall import LocalStart
 from proofroll.elements.mechanism.run.element import MechanismElement
-from proofroll.elements.mechanism.run.reader import started
 from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 from proofroll.elements.mechanism.scene.checks import Vector
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from proofroll.elements.mechanism.run.plausibility import LARGE, doubtful_body
+from proofroll.elements.mechanism.reading.plausibility import LARGE, doubtful_body
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots.files.mjcf.defaults import with_classes
 from proofroll.robots.files.robot_file import LintRemark, RobotFile, floats, numbers

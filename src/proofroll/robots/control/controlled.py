@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError, error_location
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.run.reader import made_mechanism
+from proofroll.elements.mechanism.reading.reader import made_mechanism
 from proofroll.elements.mechanism.scene.control import TARGET, Control
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.policy import PolicySource

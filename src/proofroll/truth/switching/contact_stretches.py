@@ -36,7 +36,6 @@ from proofroll.elements.mechanism.contact.turning import opened, shut_by_pressin
 from proofroll.elements.mechanism.dynamics.switches import Settling
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import Stretch, Transition
-from proofroll.truth.standing_ends import Face, check_faces, check_spin
 from proofroll.truth.switching.box_passing import beside_border, passed_boxes
 from proofroll.truth.switching.contact_guards import (
     features_beyond,
@@ -50,6 +49,7 @@ from proofroll.truth.switching.contact_guards import (
 )
 from proofroll.truth.switching.contact_walks import AHEAD, ContactWalks, SwitchedEquations
 from proofroll.truth.switching.planar_slip import BegunSlip, leaving_slips
+from proofroll.truth.switching.standing_ends import Face, check_faces, check_spin
 from proofroll.truth.switching.stopping_slip import StoppingSlip
 
 # Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.

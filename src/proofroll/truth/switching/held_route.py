@@ -12,7 +12,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Sample
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.dynamics.commands import (
+from proofroll.elements.mechanism.dynamics.held_signals import (
     Commands,
     celled,
     count_of,

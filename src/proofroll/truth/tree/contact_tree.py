@@ -6,10 +6,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.contact.acting import REST, ContactMode, Features, closed_in, features_of
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.free_slides import FreeSlides
 from proofroll.elements.mechanism.contact.states import ContactSolution
 from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import StretchLaw, Transition
 from proofroll.truth.switching.contact_guards import SolvedContacts

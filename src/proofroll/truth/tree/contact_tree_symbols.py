@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from proofroll.elements.mechanism.contact.acting import ContactMode, Features, features_of
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.scene.kinks import Sides
 from proofroll.elements.mechanism.scene.prescribed import moved

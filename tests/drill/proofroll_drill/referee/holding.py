@@ -16,12 +16,12 @@ from proofroll.elements.balls.reader import PlacedBall
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.dynamics.record import Record
-from proofroll.elements.mechanism.run.assembly import check_start
+from proofroll.elements.mechanism.reading.assembly import check_start
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.papers.blajer_2006.ball.kind import ball_element
 from proofroll.truth.error_bars import TwoRouteMotion
-from proofroll.truth.smooth_truth import find_truth
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.smooth.smooth_truth import find_truth
+from proofroll.truth.truth_of_mechanism import truth_of
 
 from .balls import BallReferee
 from .contacts import ContactReferee, Told

@@ -6,7 +6,7 @@ import pytest
 
 from proofroll.elements.mechanism import Tree
 from proofroll.elements.mechanism.dynamics.analysis import analyse
-from proofroll.elements.mechanism.run.reader import KINDS
+from proofroll.elements.mechanism.reading.reader import KINDS
 
 MODELS = Path(__file__).parents[4] / "models"
 

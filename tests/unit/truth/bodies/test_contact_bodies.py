@@ -7,7 +7,7 @@ import pytest
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 G, NARROW = 9.81, 1e-11  # m: bars of 1e-13 are seen
 INERTIA = (1 / 600,) * 3

@@ -11,7 +11,7 @@ from mechanism_scenes import mechanism_named
 
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import Force, Mechanism, Spring
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.elements.mechanism.scene.spring_law import SpringLaw
@@ -20,12 +20,12 @@ from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.natural_units import natural_units
 from proofroll.truth.numerics import compiled_once
-from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.switching import contact_taylor
 from proofroll.truth.switching.contact_guards import guards_of
 from proofroll.truth.switching.contact_stretches import ContactStretches
 from proofroll.truth.switching.planar_slip import leading, led_by, with_heading
 from proofroll.truth.tree.contact_tree import ContactTree
+from proofroll.truth.truth_of_mechanism import truth_of
 
 SCENES = ("sled", "eccentric_sphere", "falling_rod", "rattleback", "tilted_disc", "free_turntable", "ladder",
           "two_spheres", "rocking_block", "sled_on_slope")  # fmt: skip

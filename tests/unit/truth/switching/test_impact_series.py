@@ -15,8 +15,8 @@ from proofroll.elements.mechanism.contact.sequences import Outcomes, refuse_spre
 from proofroll.elements.mechanism.dynamics import switches
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.laws import impacts
-from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.switching.contact_stretches import GeometricSeries, Impact, ImpactSeries
+from proofroll.truth.truth_of_mechanism import truth_of
 
 GRAVITY = 9.81
 

@@ -19,9 +19,9 @@ from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.truth.numerics.picard import PicardSteps
-from proofroll.truth.switched_truth import truth_of
 from proofroll.truth.switching import contact_taylor, stopping_slip
 from proofroll.truth.switching.planar_slip import LedValues, begun_slip
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.referee.random_contacts import random_contacts
 
 # s: of a ball that starts with 3 m/s in a cylinder, by its own truth

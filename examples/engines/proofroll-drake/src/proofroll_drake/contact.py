@@ -21,7 +21,7 @@ from pydrake.multibody.plant import CoulombFriction, DiscreteContactApproximatio
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt
 from proofroll_drake.settings import DrakeSettings

@@ -20,7 +20,7 @@ from proofroll.core.diagnosis.fitting import (
     least_squares_parameters,
 )
 from proofroll.core.errors import InputError, NotUnique
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS, contact_cause, touch_of
 from proofroll.elements.mechanism.diagnosis.equations import is_one_motion, placed_of
 from proofroll.elements.mechanism.dynamics.placed import Placed

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.dynamics.commands import at_start
+from proofroll.elements.mechanism.dynamics.held_signals import at_start
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array

@@ -12,8 +12,8 @@ from proofroll.core.arrays import FloatArray, longest
 from proofroll.core.certificate import ROUNDINGS, Line, require_shapes, tolerated
 from proofroll.core.engine import EPSILON, Regularised
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.start import TOUCHING, touches
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.matrices import matrices_of
 from proofroll.elements.mechanism.dynamics.named_forces import lengths, named_forces
 from proofroll.elements.mechanism.run.dataset import along, reactions

@@ -23,12 +23,13 @@ from proofroll.core.time_grid import EVERY
 from proofroll.core.whole_turns import PART
 from proofroll.elements.mechanism.contact.start import extent, followed_moves, natural_length
 from proofroll.elements.mechanism.dynamics.analysis import Analysis, analyse
-from proofroll.elements.mechanism.dynamics.commands import Commands, along, at_start, has_held, placed_start
+from proofroll.elements.mechanism.dynamics.held_signals import Commands, along, at_start, has_held, placed_start
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.dynamics.link_forces import link_observables
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.switches import first_change, with_stops_at_start
+from proofroll.elements.mechanism.reading.plausibility import implausible
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.run.certificate import CAPS, certify
 from proofroll.elements.mechanism.run.contacts.local_frame import local_observables, local_sizes, observe_locally
@@ -38,7 +39,6 @@ from proofroll.elements.mechanism.run.contacts.stretches import held_in_flight
 from proofroll.elements.mechanism.run.dataset import from_samples
 from proofroll.elements.mechanism.run.failure_program import program
 from proofroll.elements.mechanism.run.optional_terms import optional_terms
-from proofroll.elements.mechanism.run.plausibility import implausible
 from proofroll.elements.mechanism.run.sampling import MechanismSample
 from proofroll.elements.mechanism.run.scales import scales
 from proofroll.elements.mechanism.run.sentences import start_facts
@@ -52,8 +52,8 @@ if TYPE_CHECKING:
     from proofroll.core.certificate import Line
     from proofroll.core.scene import Scene
     from proofroll.elements.mechanism.contact.acting import ContactMode
-    from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
     from proofroll.elements.mechanism.contact.states import ContactSolution
+    from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 
 # Least scale of an observable, relative to its natural size, as for balls: smaller changes count as stillness.
 _LEAST = 1e-2
@@ -200,7 +200,7 @@ class MechanismElement:
     @cached_property
     def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
         """Equations of contacts and laws of joints, and modes at the start; None: nothing switches, or not uniquely."""
-        from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+        from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 
         if self._switches:
             with contextlib.suppress(Refused):

@@ -11,8 +11,8 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.core.validation import all_units_of
+from proofroll.elements.mechanism.reading.reader import KINDS, made_mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
-from proofroll.elements.mechanism.run.reader import KINDS, made_mechanism
 from proofroll.elements.mechanism.scene.control import Control
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.published import read_published

@@ -9,7 +9,7 @@ import numpy as np
 from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.dynamics.analysis import Start, general_place
-from proofroll.elements.mechanism.dynamics.commands import begun
+from proofroll.elements.mechanism.dynamics.held_signals import begun
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
 

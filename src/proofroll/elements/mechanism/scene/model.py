@@ -60,7 +60,7 @@ class Mechanism:
         actuators: in the order of the scene; each drives a joint.
         couplings: pairs of joints that move together.
         control: sets targets of actuators at instants; None: nothing does.
-        cells: its held signals while it runs, see :mod:`proofroll.elements.mechanism.dynamics.commands`.
+        cells: its held signals while it runs, see :mod:`proofroll.elements.mechanism.dynamics.held_signals`.
         impacts: law of impacts of several contacts at once. "any order": one after the other in any order, whose
             outcomes must be the same; "together": Moreau's law for all of them.
         unmodelled: features of its source that no model here has, in a few words each; with any of them every route and

@@ -19,8 +19,8 @@ from proofroll.core.errors import NotUnique, Refused
 from proofroll.core.events import Event
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contact.acting import OPEN
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.contact.turning import TurningFriction, rolling_levers
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact

@@ -12,7 +12,7 @@ import numpy as np
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
-from proofroll.elements.mechanism.dynamics.commands import drive
+from proofroll.elements.mechanism.dynamics.held_signals import drive
 from proofroll.elements.mechanism.dynamics.loop_points import normal_of_plane
 from proofroll.elements.mechanism.run.capabilities import (
     ALL_JOINTS,

@@ -11,7 +11,7 @@ import numpy as np
 
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD, Joint
-from proofroll.elements.mechanism.dynamics.commands import drive
+from proofroll.elements.mechanism.dynamics.held_signals import drive
 from proofroll.elements.mechanism.run.capabilities import (
     ALL_JOINTS,
     ALL_LOOPS,

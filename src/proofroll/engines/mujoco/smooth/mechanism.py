@@ -11,7 +11,7 @@ from proofroll.core.arrays import cross, longest
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
-from proofroll.elements.mechanism.dynamics.commands import drive
+from proofroll.elements.mechanism.dynamics.held_signals import drive
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import (

@@ -9,7 +9,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.dynamics.commands import drive
+from proofroll.elements.mechanism.dynamics.held_signals import drive
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, of_drives, row_rank, unsaid
 from proofroll.elements.mechanism.run.sentences import pose
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind

@@ -2,7 +2,7 @@
 
 A held joint is locked: one more constraint row, whose multiplier is the holding force. Which of the joints at rest are
 held follows from a quadratic program with bounds. Decisions and impacts are implemented here independently of
-:mod:`proofroll.elements.mechanism.contact.dynamics`, which the truth uses: neither can hide an error of the
+:mod:`proofroll.elements.mechanism.contact.tree_contacts`, which the truth uses: neither can hide an error of the
 other.
 """
 

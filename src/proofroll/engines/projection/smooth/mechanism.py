@@ -11,7 +11,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.stalling import Stalled
-from proofroll.elements.mechanism.dynamics.commands import drive
+from proofroll.elements.mechanism.dynamics.held_signals import drive
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
 from proofroll.elements.mechanism.run.capabilities import (
     ALL_JOINTS,

@@ -7,8 +7,8 @@ import pytest
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.start import check_contacts
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 
 

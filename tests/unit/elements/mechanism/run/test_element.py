@@ -15,7 +15,7 @@ from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.elements.mechanism.run.certificate import CAPS
 from proofroll.elements.mechanism.run.dataset import UNDETERMINED, UNSAID
@@ -28,7 +28,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of
 from proofroll.report.pen import Disc, Lettering
 from proofroll.running.simulation import simulate
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 SCENES = ("pendulum", "slider_crank", "bricard", "heavy_top", "andrews_squeezer", "free_body", "gyroscope_cart")
 

@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.run.capabilities import MechanismCapability, r
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.signal import Formula, value_at
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
 PLAIN = """

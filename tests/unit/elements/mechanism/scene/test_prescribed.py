@@ -11,7 +11,7 @@ import pytest
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.dynamics.analysis import analyse
-from proofroll.elements.mechanism.run.assembly import check_start
+from proofroll.elements.mechanism.reading.assembly import check_start
 from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.signal import FUNCTIONS, Formula, Table, delayed
 from proofroll.files.scene_file import load_scene

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.elements.mechanism.dynamics.commands import placed_start
+from proofroll.elements.mechanism.dynamics.held_signals import placed_start
 from proofroll.elements.mechanism.scene.balls import Ball, Contact
 from proofroll.elements.mechanism.scene.checks import WORLD, ZERO
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind

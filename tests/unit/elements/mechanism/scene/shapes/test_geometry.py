@@ -8,8 +8,8 @@ from mechanism_scenes import mechanism_named
 
 from proofroll.core.errors import InputError
 from proofroll.core.parameters import Parameters
+from proofroll.elements.mechanism.reading.reader import made_mechanism
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, required
-from proofroll.elements.mechanism.run.reader import made_mechanism
 
 PLANE = {"name": "floor", "body": "world", "kind": "plane"}
 BALL = {"name": "ball", "body": "b", "kind": "sphere", "radius": 0.1}

@@ -171,10 +171,10 @@ def check_faces(faces: Sequence[Face], old_mode: ContactMode, new_mode: ContactM
         NotUnique: the cylinder begins to tip.
         RollingLanding: the cylinder lands on its rim.
     """
-    was_closed, closed = closed_in(old_mode), closed_in(new_mode)
+    was_closed, closed_mask = closed_in(old_mode), closed_in(new_mode)
     for face in faces:
-        held = [closed[k] for k in face.contacts]
-        if not any(held) or all(held):
+        shut = [closed_mask[k] for k in face.contacts]
+        if not any(shut) or all(shut):
             continue
         if not any(was_closed[k] for k in face.contacts):
             raise RollingLanding(f"a cylinder of {face.pair} lands on its rim at t = {time:.6g} s")
@@ -185,13 +185,17 @@ def check_faces(faces: Sequence[Face], old_mode: ContactMode, new_mode: ContactM
 
 
 def check_spin(
-    faces: Sequence[Face], closed: Sequence[bool], touching: Sequence[Touching], friction: Sequence[float], time: float
+    faces: Sequence[Face],
+    closed_mask: Sequence[bool],
+    touching: Sequence[Touching],
+    friction: Sequence[float],
+    time: float,
 ) -> None:
     """Refuses an end that spins on its plane with friction, whose moment depends on where along it the load acts.
 
     Args:
         faces: ends of cylinders.
-        closed: True for each contact that is closed, or hit.
+        closed_mask: True for each contact that is closed, or hit.
         touching: contacts at that instant.
         friction: coefficients of all contacts.
         time: for messages [s].
@@ -202,7 +206,7 @@ def check_spin(
     for face in faces:
         contact = face.contacts[0]
         slips = np.array([slip_velocity(touching[k]) for k in face.contacts])
-        if closed[contact] and friction[contact] and np.ptp(slips, axis=0).max() > TOUCHING:
+        if closed_mask[contact] and friction[contact] and np.ptp(slips, axis=0).max() > TOUCHING:
             raise NotUnique(
                 f"a cylinder of {face.pair} spins on its end at t = {time:.6g} s: the moment of its friction depends "
                 "on where along the end the load acts, which is not determinate; end before"

@@ -6,18 +6,18 @@ import numpy as np
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Joint, Mechanism
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
-from proofroll.elements.mechanism.dynamics.commands import has_held
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
+from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.dynamics.switches import with_stops_at_start
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import breaks
-from proofroll.truth.contact_truth import contact_truth
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.natural_units import natural_units
 from proofroll.truth.signal_poles import NEAR, first_pole
-from proofroll.truth.smooth_truth import find_truth
+from proofroll.truth.smooth.smooth_truth import find_truth
+from proofroll.truth.switched.switched_truth import switched_truth
 from proofroll.truth.tree.contact_tree import ContactTree
 
 # rad, natural lengths, or part of a limit: distance from a stop or a limit beyond which it surely does not act; more
@@ -46,7 +46,7 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
 def _truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     """Truth at times at which all formulas have finite values; for errors see :func:`truth_of`."""
     try:
-        return contact_truth(mechanism, times) if mechanism.contacts else _without_contacts(mechanism, times)
+        return switched_truth(mechanism, times) if mechanism.contacts else _without_contacts(mechanism, times)
     except Diverged as stopped:
         raise Refused(f"no truth to the end: {stopped}; end before it") from None
 
@@ -62,7 +62,7 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     if not bent and not rubs and _reaches_none(mechanism, times):
         unlimited = _unlimited(mechanism)
         return _with_idle_stops(find_truth(unlimited, times), unlimited, mechanism)
-    return contact_truth(mechanism, times)
+    return switched_truth(mechanism, times)
 
 
 def _reaches_none(mechanism: Mechanism, times: Array) -> bool:

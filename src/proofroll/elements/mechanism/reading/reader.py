@@ -14,8 +14,8 @@ from proofroll.core.errors import InputError, no_such_key, require_known
 from proofroll.core.parameters import Parameters
 from proofroll.core.validation import strict, units_of_kind, validated
 from proofroll.elements.mechanism.contact.start import check_contacts
-from proofroll.elements.mechanism.dynamics.commands import check_commands
-from proofroll.elements.mechanism.run.assembly import assemble, check_start
+from proofroll.elements.mechanism.dynamics.held_signals import check_commands
+from proofroll.elements.mechanism.reading.assembly import assemble, check_start
 from proofroll.elements.mechanism.scene import checks
 from proofroll.elements.mechanism.scene.bushing import Bushing
 from proofroll.elements.mechanism.scene.composed import COMPOSED, Cable, Gimbal, Screw, SprungJoint, reader_of

@@ -15,7 +15,7 @@ import numpy as np
 
 from proofroll.core.errors import Diverged, Missing
 from proofroll.elements.mechanism.contact.acting import ContactMode
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies

@@ -14,10 +14,10 @@ from proofroll.core.errors import Refused
 from proofroll.core.events import JUMPS, EventKind
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.acting import REST, Acting, ContactMode
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.analysis import RANK
-from proofroll.elements.mechanism.dynamics.commands import has_held
+from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.dynamics.record import record_of
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -26,8 +26,6 @@ from proofroll.elements.mechanism.scene.signal import breaks
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.contact_bounces import contact_bounces
-from proofroll.truth.early_end import cut_at
 from proofroll.truth.error_bars import TwoRouteMotion, check_start, on_same_turns
 from proofroll.truth.followed_paths import (
     CLOSE,
@@ -42,11 +40,13 @@ from proofroll.truth.followed_paths import (
     times_known,
     two_route_motion,
 )
-from proofroll.truth.law_verdict import held_to_laws, of_bodies, of_tree, work_along
+from proofroll.truth.law_check.law_verdict import held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
-from proofroll.truth.standing_ends import Face, RollingLanding, standing_ends
+from proofroll.truth.smooth.early_end import cut_at
+from proofroll.truth.switched.contact_bounces import contact_bounces
 from proofroll.truth.switching.held_route import HeldPath, HeldRoute
+from proofroll.truth.switching.standing_ends import Face, RollingLanding, standing_ends
 from proofroll.truth.tree.contact_tree import ContactTree
 
 # Impacts whose intervals become shorter and shorter, and the last of these, in natural units, where they crowd.
@@ -55,7 +55,7 @@ _CROWD, _CROWDED = 5, 1e-3
 _Path = HybridPath[Stretch[ContactMode]]
 
 
-def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
+def switched_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     """Truth at rising times [s].
 
     Raises:
@@ -83,8 +83,8 @@ def _of(mechanism: Mechanism, times: Array, faces: Sequence[Face] = ()) -> TwoRo
 def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[Face]) -> TwoRouteMotion:
     """Truth at times in natural units, by routes in these units."""
     scaled = units.mechanism(mechanism)
-    held = tuple(HeldPath(mechanism, units, scaled) for _ in range(2)) if has_held(mechanism) else ()
-    plain = [values.own for values in held] or [scaled, scaled]
+    held_paths = tuple(HeldPath(mechanism, units, scaled) for _ in range(2)) if has_held(mechanism) else ()
+    plain = [values.own for values in held_paths] or [scaled, scaled]
     dynamics, second = ContactDynamics(plain[0]), MaximalCoordinates(plain[1])
     check_start(dynamics.equations, second, units.length)
     size = _size(dynamics)
@@ -92,31 +92,31 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     bodies = ContactBodies(equations, TOLERANCES[1], size)
     tree.faces = bodies.faces = faces
     until, breaking, kinds = float(times[-1]), breaks(scaled.signals), partial(_kinds, dynamics)
-    paths, routes = _followed(tree, bodies, held, until, breaking)
+    paths, routes = _followed(tree, bodies, held_paths, until, breaking)
     recorded = [
-        of_tree(mechanism, units, tree, paths[0], held[0] if held else None),
-        of_bodies(mechanism, units, bodies, second, paths[1], held[1] if held else None),
+        of_tree(mechanism, units, tree, paths[0], held_paths[0] if held_paths else None),
+        of_bodies(mechanism, units, bodies, second, paths[1], held_paths[1] if held_paths else None),
     ]
     (broken, text), laws, work_paths = held_to_laws(mechanism, units, recorded)
     if np.isfinite(broken):
         paths = cut_at(paths[0], broken, text), cut_at(paths[1], broken, text)
     reason = _reason(dynamics, paths)
     asked = times_known(paths, times, reason)
-    times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
+    times = held_paths[1].on_instants(held_paths[0].on_instants(asked)) if held_paths else asked
     stretches = stretches_at(paths, times)
     others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
     states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
-    for values in held:
+    for values in held_paths:
         values.finish()
     seconds = times * units.time
     known_until = _works_known(tree, paths[0])
-    unknown, along = times[:, None] > known_until, list(zip(work_paths, (stretches, others), strict=True))
-    work_of_tree, work_of_bodies = (work.at(seconds, numbers) for work, numbers in along)
+    unknown, at_samples = times[:, None] > known_until, list(zip(work_paths, (stretches, others), strict=True))
+    work_of_tree, work_of_bodies = (work.at(seconds, numbers) for work, numbers in at_samples)
     works = np.where(unknown, np.nan, work_of_tree), work_of_bodies
-    unresolved = [work.unresolved(seconds, numbers)[:, np.isinf(known_until)] for work, numbers in along]
+    unresolved = [work.unresolved(seconds, numbers)[:, np.isinf(known_until)] for work, numbers in at_samples]
     tree_states = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
     by_tree = tree_states.record
-    cut = None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
+    cut = None if held_paths else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
     modes = [bodies.acting(paths[1].stretches[number], state) for number, state in zip(others, states[1], strict=True)]
     applied = [bodies.forces(state, mode) for state, mode in zip(states[1], modes, strict=True)]
     switched = [equations.switched(state, mode) for state, mode in zip(states[1], modes, strict=True)]
@@ -162,16 +162,16 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
 
 
 def _followed(
-    tree: ContactTree, bodies: ContactBodies, held: Sequence[HeldPath], until: float, breaking: Sequence[float]
+    tree: ContactTree, bodies: ContactBodies, held_paths: Sequence[HeldPath], until: float, breaking: Sequence[float]
 ) -> tuple[tuple[_Path, _Path], tuple[HybridRoute[ContactMode], HybridRoute[ContactMode]]]:
     """Paths of both routes to a time in natural units, and the routes, which hold values if the mechanism does.
 
     ``breaking``: times at which the rates are not smooth.
     """
-    if not held:
+    if not held_paths:
         return followed(tree, bodies, until, breaking), (tree, bodies)
-    tree_route, body_route = HeldRoute(tree, held[0]), HeldRoute(bodies, held[1])
-    tree_path, body_path = followed(tree_route, body_route, until, sorted({*breaking, *held[0].breaks(until)}))
+    tree_route, body_route = HeldRoute(tree, held_paths[0]), HeldRoute(bodies, held_paths[1])
+    tree_path, body_path = followed(tree_route, body_route, until, sorted({*breaking, *held_paths[0].breaks(until)}))
     if any(item.kind == EventKind.SETTLE for item in tree_path.happenings):
         raise Refused("no route of the truth follows rebounds to their end under held targets yet")
     return (tree_route.completed(tree_path), body_route.completed(body_path)), (tree_route, body_route)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from proofroll.core.arrays import uneven
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.start import natural_scale
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.analysis import analyse, singular_values
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.link_forces import powers, working
@@ -27,7 +27,6 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
-from proofroll.truth.early_end import EarlyEnd
 from proofroll.truth.error_bars import (
     NUDGE,
     TwoRouteMotion,
@@ -38,11 +37,12 @@ from proofroll.truth.error_bars import (
     on_same_turns,
 )
 from proofroll.truth.followed_paths import FollowedPath, before_first, end_of, followed, time_accuracy, two_route_motion
-from proofroll.truth.law_verdict import Recorded, held_to_laws, of_bodies, of_tree
+from proofroll.truth.law_check.law_verdict import Recorded, held_to_laws, of_bodies, of_tree
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, states_inside
-from proofroll.truth.singular_poses import BRANCHING, singular_poses, singular_poses_of
-from proofroll.truth.smooth_routes import SmoothBodies, SmoothTree, stiff
+from proofroll.truth.smooth.early_end import EarlyEnd
+from proofroll.truth.smooth.singular_poses import BRANCHING, singular_poses, singular_poses_of
+from proofroll.truth.smooth.smooth_routes import SmoothBodies, SmoothTree, stiff
 from proofroll.truth.switching.contact_taylor import CompiledStretch
 from proofroll.truth.witnesses.closed_forms import ClosedForm, closed_form
 from proofroll.truth.work_of_drives import works_of_steps

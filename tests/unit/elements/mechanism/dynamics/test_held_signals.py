@@ -18,7 +18,7 @@ from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.dynamics.commands import begun
+from proofroll.elements.mechanism.dynamics.held_signals import begun
 from proofroll.elements.mechanism.dynamics.matrices import matrices_of
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.control import Control

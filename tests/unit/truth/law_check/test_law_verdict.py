@@ -12,12 +12,12 @@ from proofroll.core.columns import Columns
 from proofroll.core.dataset import LAWS, truth_message
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.dynamics.commands import Commands
+from proofroll.elements.mechanism.dynamics.held_signals import Commands
 from proofroll.elements.mechanism.scene.control import Control
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.signal import Formula
-from proofroll.truth import smooth_truth
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.smooth import smooth_truth
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.law_faults import FAULTS, SCENES, planted
 
 _BY_WORDS = {fault.words: fault for fault in FAULTS}

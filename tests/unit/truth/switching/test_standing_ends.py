@@ -12,8 +12,8 @@ import pytest
 from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
-from proofroll.truth.standing_ends import standing_ends
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.switching.standing_ends import standing_ends
+from proofroll.truth.truth_of_mechanism import truth_of
 
 MASS, RADIUS, LENGTH, GRAVITY = 1.357, 0.06, 0.12, 9.81
 DIGITS = 1e-11  # 1e-13 is seen

@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies
-from proofroll.truth.law_states import stated_named
+from proofroll.truth.law_check.law_states import stated_named
 from proofroll.truth.laws.integrals import POINTS, RESOLVED, TO_SERIES
 from proofroll.truth.laws.record import Modes, Passage, Pieces
 from proofroll.truth.natural_units import Units
@@ -78,7 +78,7 @@ class LawRecorder:
 
         ``most``: number of pieces whose forces are found in numbers, the first and last among them; None: all.
         """
-        cut, found = list(self._cut(stretch, most)), []
+        cut, stated = list(self._cut(stretch, most)), []
         numeric = [piece for piece in cut if piece.record is None]
         if most is not None and len(numeric) > most:
             kept = set(map(id, _spread(numeric, most)))
@@ -93,8 +93,8 @@ class LawRecorder:
                     for piece in pieces
                 ]
                 time, pace = (np.array([getattr(piece, name) for piece in pieces]) for name in ("time", "pace"))
-                found.append(self._stated(time, pace, np.array(records), stretch.mode, coarse=coarse))
-        return found
+                stated.append(self._stated(time, pace, np.array(records), stretch.mode, coarse=coarse))
+        return stated
 
     def start(self, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Pieces:
         """First point of a stretch with these pieces, as exact as its steps."""
@@ -197,15 +197,15 @@ class LawRecorder:
         count, joints = len(m.contacts), len(m.joints)
         friction, stops = ["open"] * joints, [["open", "open"] for _ in range(joints)]
         turning = {spins: ["open"] * count for spins in (False, True)}
-        for contact, own in zip(contacts[count:], mode[count:], strict=True):
+        for contact, acting in zip(contacts[count:], mode[count:], strict=True):
             if isinstance(contact, TurningFriction):
-                turning[contact.spins][contact.pressed_by] = own.kind
+                turning[contact.spins][contact.pressed_by] = acting.kind
             elif isinstance(contact, JointContact) and contact.side:
-                stops[contact.joint.number][0 if contact.side > 0 else 1] = own.kind
+                stops[contact.joint.number][0 if contact.side > 0 else 1] = acting.kind
             elif isinstance(contact, JointContact):
-                friction[contact.joint.number] = own.kind
+                friction[contact.joint.number] = acting.kind
         return Modes(
-            contacts=tuple(own.kind for own in mode[:count]),
+            contacts=tuple(acting.kind for acting in mode[:count]),
             rolling=tuple(turning[False]),
             spinning=tuple(turning[True]),
             friction=tuple(friction),
@@ -233,7 +233,7 @@ class LawRecorder:
             whole = [[step] for step in stretch.dense if min(step[1], stretch.end) > step[0]]
             yield from (self._window(step) for (step,) in self._looked_at(whole, most))
         elif stretch.dense:
-            groups = [stretch.dense[first : first + _TOGETHER] for first in range(0, len(stretch.dense), _TOGETHER)]
+            groups = [stretch.dense[begin : begin + _TOGETHER] for begin in range(0, len(stretch.dense), _TOGETHER)]
             for steps in self._looked_at(groups, most):
                 start, last = steps[0][0], min(steps[-1][1], stretch.end)
                 inside = steps[0][2] if len(steps) == 1 else partial(states_inside, steps)

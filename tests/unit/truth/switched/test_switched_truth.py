@@ -38,7 +38,7 @@ from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.laws import impacts
 from proofroll.truth.plug_in import MechanismTruth
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.published import true_values
 
 DIGITS = 1e-10  # s, m: of the laboratory's numbers, which have twelve

@@ -9,16 +9,16 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Body, Force, Joint, Loop, Mechanism
-from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.analysis import RowSign, analyse
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.numerics.hybrid import follow
 from proofroll.truth.plug_in import MechanismTruth
-from proofroll.truth.singular_poses import BRANCHING, singular_poses
-from proofroll.truth.smooth_truth import find_truth
-from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.smooth.singular_poses import BRANCHING, singular_poses
+from proofroll.truth.smooth.smooth_truth import find_truth
 from proofroll.truth.tree.contact_tree import ContactTree
+from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll.truth.witnesses.closed_forms import closed_form
 
 

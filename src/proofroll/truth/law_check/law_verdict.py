@@ -16,8 +16,8 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.followed_paths import CLOSE
-from proofroll.truth.law_records import LawRecorder
-from proofroll.truth.law_states import by_the_bodies, by_the_tree
+from proofroll.truth.law_check.law_records import LawRecorder
+from proofroll.truth.law_check.law_states import by_the_bodies, by_the_tree
 from proofroll.truth.laws.check import LawCheck, LawVerdict, sentence, verdict
 from proofroll.truth.laws.record import Pieces, joined_pieces
 from proofroll.truth.laws.residuals import LawResiduals
@@ -55,12 +55,12 @@ def of_tree(
     units: Units,
     tree: ContactTree,
     path: _Path,
-    held: HeldPath | None = None,
+    held_path: HeldPath | None = None,
     turns_at: Callable[[Array], Array] | None = None,
     name: str = "joint coordinates",
 ) -> Recorded:
     """A path of the first route; ``mechanism`` in SI units, ``turns_at``: see :class:`LawRecorder`."""
-    return Recorded(name, LawRecorder(mechanism, units, tree, partial(by_the_tree, tree), turns_at), path, held)
+    return Recorded(name, LawRecorder(mechanism, units, tree, partial(by_the_tree, tree), turns_at), path, held_path)
 
 
 def of_bodies(
@@ -69,12 +69,12 @@ def of_bodies(
     bodies: ContactBodies,
     second: MaximalCoordinates,
     path: _Path,
-    held: HeldPath | None = None,
+    held_path: HeldPath | None = None,
     turns_at: Callable[[Array], Array] | None = None,
 ) -> Recorded:
     """A path of the second route; ``second``: its equations of all joints."""
     recorder = LawRecorder(mechanism, units, bodies, partial(by_the_bodies, bodies, second), turns_at)
-    return Recorded("bodies", recorder, path, held)
+    return Recorded("bodies", recorder, path, held_path)
 
 
 def held_to_laws(

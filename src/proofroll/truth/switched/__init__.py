@@ -1,0 +1,1 @@
+"""Truths of motions that contacts, friction, stops, limits or kinks switch."""
