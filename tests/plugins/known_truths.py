@@ -15,7 +15,7 @@ import pytest
 
 from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism import Mechanism
-from proofroll.truth import truth_of_mechanism as switched_truth
+from proofroll.truth import truth_of_mechanism
 
 # Largest number of truths that are kept, some hundred kB each.
 _MOST = 300
@@ -43,12 +43,12 @@ class KnownTruths:
     @contextmanager
     def lent(self) -> Iterator[None]:
         """Context in which the truth's plug-in finds each truth once."""
-        find = switched_truth.truth_of
+        find = truth_of_mechanism.truth_of
 
         def known(mechanism: Mechanism, times: Any) -> Any:
             key = _content(mechanism), np.asarray(times, dtype=float).tobytes()
             return self._motions.of(key, lambda: find(mechanism, times))
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(switched_truth, "truth_of", known)
+            patch.setattr(truth_of_mechanism, "truth_of", known)
             yield

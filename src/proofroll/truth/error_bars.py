@@ -129,7 +129,7 @@ def differences_of(values: Array, others: Array) -> Array:
 
 
 def bar_of(difference: Array, unseen: Array, *, alone: bool = False) -> Array:
-    """Error bar of a field at each time, (times,): never smaller than before.
+    """Error bar of a field at each time, (times,): never smaller than before, but for one sample of ``alone``.
 
     Args:
         difference: of both routes, (times,).

@@ -128,7 +128,9 @@ def test_walls_are_certified(kind: str, setting: str, swapped: bool) -> None:
     assert setting == "mujoco geoms matched" or "forces of contact" in told
 
 
-@pytest.mark.parametrize(("kind", "wide", "place"), [("bowl", 0.5, 0.2), ("shaft", 0.1, 0.1 + 8 * RADIUS)])
+@pytest.mark.parametrize(
+    ("kind", "wide", "place"), [("bowl", 0.5, 0.2), ("bowl", 0.5, 0.02), ("shaft", 0.1, 0.1 + 8 * RADIUS)]
+)
 def test_a_ball_far_from_its_wall_is_certified_in_exudyn(kind: str, wide: float, place: float) -> None:
     """The hollow sphere fits the wall where the ball will touch it, and its gap is the wall's at the start."""
     shapes = Geometry("sphere", "ball", "sphere", radius=RADIUS), Geometry("wall", "world", kind, radius=wide)

@@ -42,7 +42,7 @@ STATES: Mapping[str, tuple[str, str, str]] = {
     "none": ("·", "not run", "It could represent the scene, but this report did not try."),
 }  # fmt: skip
 _LOOKS = {
-    Verdict.INCOMPLETE: "partly", Verdict.FAILED: "differs",
+    Verdict.UNCONFIRMED: "converges", Verdict.INCOMPLETE: "partly", Verdict.FAILED: "differs",
     Verdict.ILL_POSED: "unjudged", Verdict.NOT_JUDGED: "unjudged", Verdict.ANOTHER_SCENE: "unjudged",
 }  # fmt: skip
 # Most engines of which every choice has an answer of its own; of more, all but one, and each alone.

@@ -206,7 +206,9 @@ def _late_alone(run: Run, judgement: Judgement, reference: Reference) -> bool:
     happened = np.array([event.time for event in reference.events])
     behind = apart.times[:, None] - happened
     settled = ~((behind > -step) & (behind <= _SETTLING * step)).any(axis=1)
-    return bool(happened.size and apart.sizes[settled].max(initial=0.0) <= _EVENTFUL * judgement.tolerance)
+    if not happened.size or not (settled & (apart.times > happened.max())).any():
+        return False
+    return bool(apart.sizes[settled].max() <= _EVENTFUL * judgement.tolerance)
 
 
 def _phase(run: Run, observable: str, reference: Reference) -> str:

@@ -34,7 +34,7 @@ def compiled_once(expressions: Sequence[Any], state: Sequence[Any], by_collocati
     They are recognised by hashes: to compare expressions takes for ever where they share parts. Optimised code takes
     two to ten times as long to compile, which no run earns back.
     """
-    key = (get_ident(), by_collocation, *map(hash, expressions))
+    key = (get_ident(), by_collocation, len(state), *map(hash, expressions))
     if key not in _MODES:
         values = heyoka.cfunc(expressions, state, compact_mode=True, opt_level=0)
         integrator = None

@@ -27,7 +27,7 @@ def eliminated(
     left, sides = {k: dict(row) for k, row in enumerate(rows)}, [list(side) for side in rights]
     steps = list[tuple[int, Row]]()
     while left:
-        ready = left if after is None else [k for k in left if after[k].isdisjoint(left)]
+        ready = left if after is None else [k for k in left if left.keys().isdisjoint(after[k])]
         p = next(iter(left)) if after is None else min(ready, key=lambda k: (bool(after[k]), len(left[k]), k))
         row = left.pop(p)
         pivots[p] = row.pop(p)

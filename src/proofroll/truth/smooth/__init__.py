@@ -1,1 +1,1 @@
-"""Truths of motions that nothing switches: routes, closed forms, works, singular poses, early ends."""
+"""Truths of motions that nothing switches: routes, closed forms, works, singular poses."""

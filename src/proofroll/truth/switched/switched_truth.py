@@ -26,6 +26,7 @@ from proofroll.elements.mechanism.scene.signal import breaks
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.early_end import cut_at
 from proofroll.truth.error_bars import TwoRouteMotion, check_start, on_same_turns
 from proofroll.truth.followed_paths import (
     CLOSE,
@@ -43,7 +44,6 @@ from proofroll.truth.followed_paths import (
 from proofroll.truth.law_check.law_verdict import held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
-from proofroll.truth.smooth.early_end import cut_at
 from proofroll.truth.switched.contact_bounces import contact_bounces
 from proofroll.truth.switching.held_route import HeldPath, HeldRoute
 from proofroll.truth.switching.standing_ends import Face, RollingLanding, standing_ends

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -75,3 +76,21 @@ def test_sizes_come_back() -> None:
     found = _found("mujoco", 2e-3, kp=0.37 * 5.0)
     assert found.explanations[0].mistake.id == "kp"
     assert found.explanations[0].size == pytest.approx(0.37, rel=1e-4)
+
+
+def test_dry_friction_holds_a_joint_at_rest_against_small_efforts_alone() -> None:
+    """What holds stays at rest, and what efforts overcome moves with friction against it, as beside a rate of 1e-9."""
+    mechanism, law = _robot()
+    friction = [0.0 if joint.nq != 1 else 0.3 for joint in mechanism.joints]
+    joints = tuple(replace(joint, friction=size) for joint, size in zip(mechanism.joints, friction, strict=True))
+    robot, (q, _) = AirRobot(replace(mechanism, joints=joints, gravity=(0.0, 0.0, 0.0)), law), mechanism.start()
+    still, efforts = np.zeros(mechanism.nv), np.zeros(len(law.joints))
+    columns = robot.driven[:, 1]
+    efforts[0] = 0.2
+    assert not robot.solved(q, still, efforts).acceleration[columns].any()
+    efforts[0] = 2.0
+    drawn = robot.solved(q, still, efforts).acceleration
+    rates = np.sign(drawn) * (np.abs(drawn) > 0)
+    moving = robot.solved(q, 1e-9 * rates, efforts).acceleration
+    assert drawn[columns[0]] > 0
+    assert drawn == pytest.approx(moving, abs=1e-6 * np.abs(drawn).max())

@@ -38,6 +38,7 @@ def test_messages_about_parts_of_a_pair_are_one_kind() -> None:
         (2, 0.0398, [0.1, 0.1], False),
         (1, 0.032, [0.1, 0.1], False),
         (1, 0.032, [0.01, 0.1], True),
+        (1, 0.0598, [0.1, 0.1], False),
     ],
 )
 def test_a_sample_right_behind_an_event_shows_no_wrong_limit(

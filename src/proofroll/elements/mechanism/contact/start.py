@@ -97,7 +97,7 @@ def natural_length(mechanism: Mechanism, solution: Solution) -> float:
 def natural_scale(mechanism: Mechanism) -> Scale:
     """Natural length, and the faster of the rates of gravity and of the first motion.
 
-    Both are powers of two, so that a change of units causes no round-off.
+    Both are powers of two, so that a change of units causes no round-off. Joints at rest count as free.
     """
     solution = JointCoordinates(mechanism).solve(*mechanism.start())
     motion, rates, length = solution.motion, _rates(solution), natural_length(mechanism, solution) or 1.0

@@ -164,7 +164,7 @@ class MechanismElement:
 
     @cached_property
     def _equations(self) -> JointCoordinates:
-        return JointCoordinates(at_start(self.mechanism))
+        return JointCoordinates(with_stops_at_start(at_start(self.mechanism)))
 
     @cached_property
     def law_rates(self) -> tuple[FloatArray, FloatArray]:
@@ -204,7 +204,7 @@ class MechanismElement:
 
         if self._switches:
             with contextlib.suppress(Refused):
-                dynamics = ContactDynamics(with_stops_at_start(self._equations.mechanism))
+                dynamics = ContactDynamics(self._equations.mechanism)
                 mode, margin = dynamics.begin()
                 return (dynamics, mode) if margin else None
         return None
@@ -377,7 +377,8 @@ class MechanismElement:
     def _first(self) -> dict[str, FloatArray]:
         start = self.mechanism.start()
         if self._touching is not None:
-            return self._touching[0].sample(*start, self._touching[1])[0]
+            with contextlib.suppress(Refused):  # what holds a joint twice has no determinate forces
+                return self._touching[0].sample(*start, self._touching[1])[0]
         sample = self._equations.sample(*start)
         if not self._switches:
             return sample

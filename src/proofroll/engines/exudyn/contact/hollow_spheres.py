@@ -17,7 +17,7 @@ from proofroll.engines.exudyn.native import Output, exu
 # turns between two residuals, and the more the stiffness magnifies the round-off of the distance.
 ON_A_PLANE = 10.0
 # Largest part of the distance of both centres that a gap may have: without a distance they have no normal.
-_REACH = 0.9
+_REACH = 1 - 1e-6
 
 
 class MovingPlane(NamedTuple):

@@ -15,7 +15,8 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import classical_step
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates, Solution
+from proofroll.elements.mechanism.dynamics.switches import held_joints
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.policy import Observation
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -121,6 +122,25 @@ class AirRobot:
     @cached_property
     def _weightless(self) -> JointCoordinates:
         return JointCoordinates(replace(self.mechanism, gravity=(0.0, 0.0, 0.0)), self.equations.rank)
+
+    def solved(self, q: Array, v: Array, efforts: Array) -> Solution:
+        """Accelerations under efforts of the joints [N m], where friction and stops hold joints at rest if they can."""
+        joints, load = self.equations.switched, self.load(efforts)
+        mode = [
+            joint.moving(rate) if (rate := v[joint.velocity]) else joint.resting(q[joint.coordinate])
+            for joint in joints
+        ]
+        while True:
+            solution = self.equations.solve(q, v, tuple(mode), load)
+            wanting = list(zip(held_joints(tuple(mode)), solution.holding, strict=True))
+            bounds = {number: joints[number].bounds(mode[number]) for number, _ in wanting}
+            beyond = [(k, force) for k, force in wanting if not bounds[k][0] <= force <= bounds[k][1]]
+            if not beyond:
+                acceleration = solution.acceleration.copy()
+                acceleration[[joints[number].velocity for number in bounds]] = 0.0  # to the last digit, or it would rub
+                return replace(solution, acceleration=acceleration)
+            for number, force in beyond:
+                mode[number] = joints[number].moving(-force)
 
     def forces(self, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         """Mass matrix, forces of inertia, weight (nv), and directions that loops and couplings allow (nv, freedoms)."""
@@ -232,7 +252,7 @@ def _stepped(
     efforts, target = acting
     if scheme == "rk4":
         return _rk4(robot, law, state, (efforts, target), h)
-    acceleration = robot.equations.solve(q, v, load=robot.load(efforts)).acceleration
+    acceleration = robot.solved(q, v, efforts).acceleration
     if scheme.startswith("implicit"):
         # What is clamped or held does not follow the velocity.
         free = (np.abs(efforts) < law.limit) & (not law.hold_effort)
@@ -278,7 +298,7 @@ def _rk4(
         q, v = y[:nq], y[nq:]
         moving = law.effort(target, q[robot.driven[:, 0]], v[robot.driven[:, 1]])
         efforts = start_efforts if law.hold_effort else moving
-        solution = robot.equations.solve(q, v, load=robot.load(efforts))
+        solution = robot.solved(q, v, efforts)
         return np.concatenate([robot.equations.tree.rate(q, v), solution.acceleration])
 
     y = classical_step(rates, np.concatenate(state), h)

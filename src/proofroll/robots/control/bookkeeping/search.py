@@ -301,7 +301,7 @@ def explained_start(
     def off(trial: ControlLaw) -> Array:
         robot = AirRobot(mechanism, trial)
         step = next(steps_in_air(robot, trial, (q, v), 1 / trial.rate, "explicit"))
-        return robot.equations.solve(q, v, load=robot.load(step.efforts)).acceleration - acceleration
+        return robot.solved(q, v, step.efforts).acceleration - acceleration
 
     distance = float(np.abs(off(law)).max())
 
