@@ -54,10 +54,10 @@ def over_a_rim(shape: Geometry) -> Mechanism:
     return Mechanism((body,), (joint,), geometries=(shape, table), pairs=(Pair("touch", (shape.name, "table"), 0.0),))
 
 
-def standing_cylinder() -> Mechanism:
-    """A cylinder that stands on a plane."""
+def standing_cylinder(gap: float = 0.0) -> Mechanism:
+    """A cylinder that stands on a plane, or above it."""
     shapes = Geometry("can", "can", "cylinder", radius=0.1, length=0.2), Geometry("floor", "world", "plane")
-    joint = Joint("j", "free", "world", "can", q0=(0, 0, 0.1, 1, 0, 0, 0))
+    joint = Joint("j", "free", "world", "can", q0=(0, 0, 0.1 + gap, 1, 0, 0, 0))
     body, pair = Body("can", 1.0, inertia=(0.006, 0.006, 0.005)), Pair("touch", ("can", "floor"), 0.5)
     return Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,))
 
@@ -152,6 +152,14 @@ def test_who_lacks_a_shape_or_a_law_says_so(mechanism: Mechanism, engine: str, w
     """Refused, with the reason."""
     with pytest.raises(Refused, match=why):
         proofroll.simulate(scene_of("refused", mechanism), engine, until=0.01)
+
+
+def test_a_cylinder_that_lands_on_its_end_ends_a_run_with_one_point() -> None:
+    """Impulses have one point of the edge on which it stands, and say so where it lands."""
+    falling_can = scene_of("landing", standing_cylinder(0.01))
+    run = proofroll.simulate(falling_can, "pinocchio[formulation=impulses]", until=0.2, every=0.02)
+    assert (run.attrs["status"], float(run["time"][-1])) == ("diverged", 0.04)
+    assert "has one point" in run.attrs["message"]
 
 
 @pytest.mark.parametrize("e", [0.0, 1.0])

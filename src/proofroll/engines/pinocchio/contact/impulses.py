@@ -158,19 +158,19 @@ class ImpulseSteps:
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
         try:
             terms = self.terms(self.q, self.v, self._dt)
-            for k in range(len(self.contacts)):
-                self._check(k, terms.J[k] @ terms.inverse @ terms.J[k].T)
-                if terms.touching[k].flat and terms.touching[k].gap <= self._touching:
-                    raise Refused(f"{self.contacts[k].name} {ONE_POINT}")
+            for k, point in enumerate(terms.touching):
+                self._check(k, terms.J[k] @ terms.inverse @ terms.J[k].T, point.flat and point.gap <= self._touching)
         except Diverged as error:
             raise Refused(str(error)) from None
 
-    def _check(self, k: int, G: Array) -> None:
-        """Checks that PGS returns right impulses for contact ``k`` with the mobility ``G``, shape (3, 3).
+    def _check(self, k: int, G: Array, flat: bool) -> None:
+        """Checks that a point holds contact ``k``, with the mobility ``G``, shape (3, 3), and that PGS is right there.
 
         Raises:
-            Diverged: PGS returns wrong ones.
+            Diverged: a body stands on an edge, or PGS returns a wrong impulse.
         """
+        if flat:
+            raise Diverged(f"{self.contacts[k].name} {ONE_POINT}")
         G_1, G_2 = float(G[0, 0]), float(G[1, 1])
         if self._settings.solver == "pgs" and self.contacts[k].friction and max(G_1, G_2) > _UNEQUAL * min(G_1, G_2):
             raise Diverged(
@@ -467,7 +467,7 @@ class ImpulseSteps:
         points = []
         for row, (end, k) in enumerate(zip(ends, which, strict=True)):
             if k < count:
-                self._check(k, G[end - 3 : end, end - 3 : end])
+                self._check(k, G[end - 3 : end, end - 3 : end], touching[k].flat)
                 self._posed(solver, row, touching[k])
                 points.append((solver.points[row], int(end), self._friction(k)))
                 solver.points[row].setFriction(min(self._friction(k), _NARROW))
