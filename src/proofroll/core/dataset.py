@@ -63,13 +63,18 @@ def ended_early(dataset: xr.Dataset | Columns) -> tuple[float, str] | None:
     return (float(dataset.attrs[ENDS]), str(dataset.attrs[ENDED])) if ENDS in dataset.attrs else None
 
 
+def end_of_truth(end: float) -> str:
+    """Clause on the time [s] from which a truth has no value."""
+    return f"the truth ends at t = {end:.6g} s"
+
+
 def truth_message(dataset: xr.Dataset | Columns) -> str:
     """Sentence about a truth: when and why it ends early, why it is ill-posed; else its routes and the law check."""
     notes, end = [str(dataset.attrs.get("ill_posed", ""))], ended_early(dataset)
     if end is not None:
         times = dataset["time"].values
         notes = [note for note in notes if note != end[1]]
-        notes.append(f"the truth ends at t = {end[0]:.6g} s, behind its {len(times)} samples: {end[1]}")
+        notes.append(f"{end_of_truth(end[0])}, behind its {len(times)} samples: {end[1]}")
     if any(notes):
         return "; ".join(filter(None, notes))
     routes = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"

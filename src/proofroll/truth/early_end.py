@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from proofroll.core.errors import Diverged
-from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch
 

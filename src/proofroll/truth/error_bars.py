@@ -1,7 +1,10 @@
 """Motion by two routes with its error bars, which all truths of a mechanism give; records made comparable."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,14 +13,16 @@ from proofroll.core.bounces import Bounce
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.link_forces import link_values
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
-from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+    from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 
 NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: the smallest difference that a scene file can express
 SAME_START = 1e-9  # m, 1: round-off of positions is 1e-15 of them, the error of a wrong formula far larger

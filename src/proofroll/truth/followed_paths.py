@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from proofroll.core.dataset import end_of_truth
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event, EventKind
 from proofroll.elements.mechanism import Mechanism
@@ -139,7 +140,7 @@ def times_known(paths: tuple[FollowedPath, FollowedPath], times: Array, reason: 
 
 def before_first(end: float, reason: str) -> Refused:
     """Error that a truth ends before all times that were asked for; ``end``: in natural units."""
-    return Refused(f"the truth ends at t = {end:.6g} s, before the first time that was asked for: {reason}")
+    return Refused(f"{end_of_truth(end)}, before the first time that was asked for: {reason}")
 
 
 def two_route_motion(

@@ -17,7 +17,7 @@ from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.natural_units import natural_units
 from proofroll.truth.signal_poles import NEAR, first_pole
 from proofroll.truth.smooth.smooth_truth import find_truth
-from proofroll.truth.switched.switched_truth import switched_truth
+from proofroll.truth.switched_truth import switched_truth
 from proofroll.truth.tree.contact_tree import ContactTree
 
 # rad, natural lengths, or part of a limit: distance from a stop or a limit beyond which it surely does not act; more

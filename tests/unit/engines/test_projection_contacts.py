@@ -15,7 +15,7 @@ from proofroll.core.first_steps import first_steps
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contact.acting import Acting
+from proofroll.elements.mechanism.contact.modes import Acting
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.run.sampling import mechanism_of

@@ -1,4 +1,4 @@
-"""Console of the terminal, and closing lines and tables of a report."""
+"""Console of the terminal, and lines and tables of a report."""
 
 from __future__ import annotations
 

@@ -21,6 +21,7 @@ from proofroll.core.dataset import (
     Key,
     before_end,
     common_span,
+    end_of_truth,
     ended_early,
     observe,
     part,
@@ -90,7 +91,7 @@ class Reference:
     def ended(self) -> str:
         """Clause on the time and reason of an early end of the truth, behind which nothing is judged; or empty."""
         end = ended_early(self.dataset)
-        return f"the truth ends at t = {end[0]:.6g} s: {end[1]}" if end else ""
+        return f"{end_of_truth(end[0])}: {end[1]}" if end else ""
 
     @property
     def untouched(self) -> bool:

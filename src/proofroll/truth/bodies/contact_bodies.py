@@ -5,7 +5,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contact.acting import (
+from proofroll.elements.mechanism.contact.free_slides import FreeSlides, acting_ones
+from proofroll.elements.mechanism.contact.joint_laws import off_stops
+from proofroll.elements.mechanism.contact.modes import (
     OPEN,
     REST,
     Acting,
@@ -19,12 +21,10 @@ from proofroll.elements.mechanism.contact.acting import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.free_slides import FreeSlides, acting_ones
-from proofroll.elements.mechanism.contact.joint_laws import off_stops
+from proofroll.elements.mechanism.contact.rolling_and_spin import shut_by_pressing
 from proofroll.elements.mechanism.contact.sequences import groups_of
 from proofroll.elements.mechanism.contact.start import closed_and_still, start_digits
 from proofroll.elements.mechanism.contact.touching import Touching
-from proofroll.elements.mechanism.contact.turning import shut_by_pressing
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.truth.bodies.body_impacts import ImpactLaw, impulses_in_turn

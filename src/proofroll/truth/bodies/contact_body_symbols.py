@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from proofroll.elements.mechanism.contact.acting import ContactMode, Features, features_of
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
-from proofroll.elements.mechanism.contact.turning import TurningFriction
+from proofroll.elements.mechanism.contact.modes import ContactMode, Features, features_of
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.elements.mechanism.scene.kinks import Sides
 from proofroll.truth.bodies.body_elimination import BodySystem
 from proofroll.truth.bodies.constraint_rows import ConstraintRow

@@ -7,7 +7,9 @@ import numpy as np
 
 from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import (
+from proofroll.elements.mechanism.contact.free_slides import FreeSlides, free_slides
+from proofroll.elements.mechanism.contact.joint_laws import JointContact, joint_contacts, line_response, mode_of_joints
+from proofroll.elements.mechanism.contact.modes import (
     EXACT,
     ContactMode,
     Features,
@@ -17,10 +19,12 @@ from proofroll.elements.mechanism.contact.acting import (
     held_directions,
     turned,
 )
-from proofroll.elements.mechanism.contact.free_slides import FreeSlides, free_slides
-from proofroll.elements.mechanism.contact.joint_laws import JointContact, joint_contacts, line_response, mode_of_joints
+from proofroll.elements.mechanism.contact.rolling_and_spin import (
+    TurningFriction,
+    moments_by_pressing,
+    turning_frictions,
+)
 from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
-from proofroll.elements.mechanism.contact.turning import TurningFriction, moments_by_pressing, turning_frictions
 from proofroll.elements.mechanism.dynamics.switches import HOLDING, STOPPED, switched_joints
 from proofroll.elements.mechanism.scene.kinks import Sides, held_sides
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from proofroll.elements.mechanism.contact.acting import OPEN, REST, Acting, ContactMode, first_mode
 from proofroll.elements.mechanism.contact.distributions import best_distribution, cones_of
 from proofroll.elements.mechanism.contact.joint_laws import line_response
+from proofroll.elements.mechanism.contact.modes import OPEN, REST, Acting, ContactMode, first_mode
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.truth.bodies.contact_equations import BodiesState, ContactEquations
 from proofroll.truth.switching.contact_guards import Touchable

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.events import EventKind
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import ContactMode, features_of
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
-from proofroll.elements.mechanism.contact.turning import TurningFriction
+from proofroll.elements.mechanism.contact.modes import ContactMode, features_of
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array

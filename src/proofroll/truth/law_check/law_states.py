@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import ContactMode, features_of
 from proofroll.elements.mechanism.contact.joint_laws import JointContact, mode_of_joints
+from proofroll.elements.mechanism.contact.modes import ContactMode, features_of
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.elements.mechanism.contact.touching import Touching
-from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.rotations import Array, from_quaternion
 from proofroll.truth.bodies.contact_bodies import ContactBodies

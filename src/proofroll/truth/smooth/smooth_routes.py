@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from proofroll.core.errors import Diverged, Missing
-from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.rotations import Array

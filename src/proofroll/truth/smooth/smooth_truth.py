@@ -38,7 +38,7 @@ from proofroll.truth.error_bars import (
     on_same_turns,
 )
 from proofroll.truth.followed_paths import FollowedPath, before_first, end_of, followed, time_accuracy, two_route_motion
-from proofroll.truth.law_check.law_verdict import Recorded, held_to_laws, of_bodies, of_tree
+from proofroll.truth.law_check.held_to_laws import Recorded, held_to_laws, of_bodies, of_tree
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, states_inside
 from proofroll.truth.smooth.singular_poses import BRANCHING, singular_poses, singular_poses_of

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from proofroll.core.errors import NotUnique
-from proofroll.elements.mechanism.contact.acting import REST, ContactMode, Features, closed_in, features_of
+from proofroll.elements.mechanism.contact.modes import REST, ContactMode, Features, closed_in, features_of
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.box_features import BoxSlot

@@ -7,7 +7,9 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.mechanism.contact.acting import (
+from proofroll.elements.mechanism.contact.distributions import ContactCones, Distribution, best_distribution, cones_of
+from proofroll.elements.mechanism.contact.joint_laws import JointContact, off_stops
+from proofroll.elements.mechanism.contact.modes import (
     FAINT,
     REST,
     Acting,
@@ -17,10 +19,8 @@ from proofroll.elements.mechanism.contact.acting import (
     heading_of,
     slip_velocity,
 )
-from proofroll.elements.mechanism.contact.distributions import ContactCones, Distribution, best_distribution, cones_of
-from proofroll.elements.mechanism.contact.joint_laws import JointContact, off_stops
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.elements.mechanism.contact.touching import FLAT, Touching
-from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact

@@ -14,7 +14,9 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import EventKind
-from proofroll.elements.mechanism.contact.acting import (
+from proofroll.elements.mechanism.contact.free_slides import FreeSlides, passing
+from proofroll.elements.mechanism.contact.joint_laws import rebounding
+from proofroll.elements.mechanism.contact.modes import (
     FAINT,
     OPEN,
     REST,
@@ -29,10 +31,8 @@ from proofroll.elements.mechanism.contact.acting import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.free_slides import FreeSlides, passing
-from proofroll.elements.mechanism.contact.joint_laws import rebounding
+from proofroll.elements.mechanism.contact.rolling_and_spin import opened, shut_by_pressing
 from proofroll.elements.mechanism.contact.touching import Touching, lying, torn
-from proofroll.elements.mechanism.contact.turning import opened, shut_by_pressing
 from proofroll.elements.mechanism.dynamics.switches import Settling
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import Stretch, Transition

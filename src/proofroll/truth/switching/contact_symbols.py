@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.contact.acting import FAINT, REST, Acting, ContactMode
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.contact.modes import FAINT, REST, Acting, ContactMode
 from proofroll.elements.mechanism.contact.touching import FLAT
 from proofroll.elements.mechanism.scene.kinks import Sides
 from proofroll.truth.numerics.scalars import Scalar, add, dot, is_zero, minus, mul, scaled, sub

@@ -19,7 +19,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.event_location import locate_rise_within, points_within
 from proofroll.core.stalling import StepCount, StepWatch
-from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.signal import SMOOTH

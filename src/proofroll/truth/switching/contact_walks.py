@@ -16,7 +16,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.event_location import locate_rise_within
 from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import (
+from proofroll.elements.mechanism.contact.modes import (
     FAINT,
     ROUND_OFF,
     ContactMode,

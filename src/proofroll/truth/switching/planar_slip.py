@@ -18,7 +18,7 @@ from numpy.polynomial import chebyshev
 
 from proofroll.core.arrays import cross as cross_of_rows
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contact.acting import Acting, ContactMode, direction_of
+from proofroll.elements.mechanism.contact.modes import Acting, ContactMode, direction_of
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import Stretch
 from proofroll.truth.switching.contact_guards import SolvedContacts

@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism import Mechanism, Tree
-from proofroll.elements.mechanism.contact.acting import ContactMode, closed_in, slip_velocity
+from proofroll.elements.mechanism.contact.modes import ContactMode, closed_in, slip_velocity
 from proofroll.elements.mechanism.contact.start import TOUCHING, natural_scale, touches
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, cross, to_rpy

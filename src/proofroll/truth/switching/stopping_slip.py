@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.contact.acting import ROUND_OFF, ContactMode
+from proofroll.elements.mechanism.contact.modes import ROUND_OFF, ContactMode
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.numerics.hybrid import Stretch
 from proofroll.truth.numerics.picard import PicardSteps, StatesInside

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from proofroll.elements.mechanism.contact.acting import ContactMode
-from proofroll.elements.mechanism.contact.turning import TurningFriction
+from proofroll.elements.mechanism.contact.modes import ContactMode
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.truth.numerics.elimination import Row
 from proofroll.truth.numerics.scalars import Scalar, add, dot, minus, plus, scaled
 from proofroll.truth.switching.contact_guards import Touchable

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.mechanism.contact.acting import REST, ContactMode, Features, closed_in, features_of
 from proofroll.elements.mechanism.contact.free_slides import FreeSlides
+from proofroll.elements.mechanism.contact.modes import REST, ContactMode, Features, closed_in, features_of
 from proofroll.elements.mechanism.contact.states import ContactSolution
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics

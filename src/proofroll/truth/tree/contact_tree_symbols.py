@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from proofroll.elements.mechanism.contact.acting import ContactMode, Features, features_of
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.contact.modes import ContactMode, Features, features_of
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
-from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.scene.kinks import Sides
 from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.signal import value_at

@@ -13,7 +13,7 @@ import numpy as np
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import Acting, heading_of
+from proofroll.elements.mechanism.contact.modes import Acting, heading_of
 from proofroll.elements.mechanism.contact.start import touches
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contact.acting import Acting
+from proofroll.elements.mechanism.contact.modes import Acting
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.bodies.contact_equations import ContactEquations

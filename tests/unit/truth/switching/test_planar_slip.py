@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
-from proofroll.elements.mechanism.contact.acting import Acting
+from proofroll.elements.mechanism.contact.modes import Acting
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.elements.mechanism.contact.acting import ContactMode, direction_of
+from proofroll.elements.mechanism.contact.modes import ContactMode, direction_of
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.dynamics.analysis import NO_RESPONSE
 from proofroll.elements.mechanism.scene.rotations import Array

@@ -11,9 +11,9 @@ from typing import ClassVar
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contact.acting import Acting, ContactMode, direction_of
+from proofroll.elements.mechanism.contact.modes import Acting, ContactMode, direction_of
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.elements.mechanism.contact.touching import Touching
-from proofroll.elements.mechanism.contact.turning import TurningFriction
 from proofroll.elements.mechanism.dynamics.switches import STOPPED, Mode, SwitchedJoint
 from proofroll.elements.mechanism.scene.rotations import Array
 

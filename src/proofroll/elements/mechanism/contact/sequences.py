@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique
 from proofroll.core.number_format import number
-from proofroll.elements.mechanism.contact.acting import REST
+from proofroll.elements.mechanism.contact.modes import REST
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.scene.rotations import Array
 

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.core.last_results import kept
-from proofroll.elements.mechanism.contact.acting import ContactMode, modes_of
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.contact.modes import ContactMode, modes_of
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction, shut_by_pressing
 from proofroll.elements.mechanism.contact.touching import PARALLEL, Moving, Touching, touch
-from proofroll.elements.mechanism.contact.turning import TurningFriction, shut_by_pressing
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.dynamics.switches import NEAR

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.elements.mechanism.contact.acting import ContactMode
 from proofroll.elements.mechanism.contact.free_slides import FreeSlides, free_slides
+from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.dynamics.joint_coordinates import Solution

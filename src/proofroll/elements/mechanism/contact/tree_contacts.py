@@ -9,20 +9,6 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.last_results import LastResults
-from proofroll.elements.mechanism.contact.acting import (
-    EXACT,
-    OPEN,
-    Acting,
-    ContactMode,
-    Features,
-    features_of,
-    first_mode,
-    forbidding_rows,
-    heading_of,
-    held_directions,
-    turned,
-    with_features,
-)
 from proofroll.elements.mechanism.contact.coulomb import (
     NULL,
     contact_forces,
@@ -40,17 +26,31 @@ from proofroll.elements.mechanism.contact.joint_laws import (
     off_stops,
     on_stops,
 )
-from proofroll.elements.mechanism.contact.sequences import groups_of, left_by, ordered, refuse_spread, sequences
-from proofroll.elements.mechanism.contact.slide_rows import slide_row, turning_row
-from proofroll.elements.mechanism.contact.start import TOUCHING, at_start, touches
-from proofroll.elements.mechanism.contact.states import ContactsNow, ContactSolution
-from proofroll.elements.mechanism.contact.touching import Touching, lying
-from proofroll.elements.mechanism.contact.turning import (
+from proofroll.elements.mechanism.contact.modes import (
+    EXACT,
+    OPEN,
+    Acting,
+    ContactMode,
+    Features,
+    features_of,
+    first_mode,
+    forbidding_rows,
+    heading_of,
+    held_directions,
+    turned,
+    with_features,
+)
+from proofroll.elements.mechanism.contact.rolling_and_spin import (
     TurningFriction,
     moments_by_pressing,
     pressed_by,
     turning_frictions,
 )
+from proofroll.elements.mechanism.contact.sequences import groups_of, left_by, ordered, refuse_spread, sequences
+from proofroll.elements.mechanism.contact.slide_rows import slide_row, turning_row
+from proofroll.elements.mechanism.contact.start import TOUCHING, at_start, touches
+from proofroll.elements.mechanism.contact.states import ContactsNow, ContactSolution
+from proofroll.elements.mechanism.contact.touching import Touching, lying
 from proofroll.elements.mechanism.dynamics.analysis import NO_RESPONSE, RANK
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.point_loads import kink_arguments

@@ -11,7 +11,7 @@ import numpy as np
 
 from proofroll.core.drawing import Change
 from proofroll.elements.mechanism.drawn.smaller import named, rows_of
-from proofroll.elements.mechanism.drawn.turning import Turn
+from proofroll.elements.mechanism.drawn.turned_world import Turn
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, LOOP_FACTS, ONE_COORDINATE, JointKind
 from proofroll.elements.mechanism.scene.rotations import from_rpy
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.drawing import Relation
 from proofroll.elements.mechanism.drawn.smaller import STRUCTURE, rows_of
-from proofroll.elements.mechanism.drawn.turning import Turn
+from proofroll.elements.mechanism.drawn.turned_world import Turn
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.elements.mechanism.scene.rotations import from_rpy
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.drawing import Change
 from proofroll.elements.mechanism.drawn.poses import WORLD, floats
-from proofroll.elements.mechanism.drawn.turning import Turn
+from proofroll.elements.mechanism.drawn.turned_world import Turn
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.rotations import frame_of_axis, from_quaternion, from_rpy
 

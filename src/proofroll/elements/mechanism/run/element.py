@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
     from proofroll.core.certificate import Line
     from proofroll.core.scene import Scene
-    from proofroll.elements.mechanism.contact.acting import ContactMode
+    from proofroll.elements.mechanism.contact.modes import ContactMode
     from proofroll.elements.mechanism.contact.states import ContactSolution
     from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 

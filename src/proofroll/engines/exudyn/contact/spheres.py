@@ -18,10 +18,10 @@ from proofroll.core.engine import Regularised
 from proofroll.core.errors import NotUnique, Refused
 from proofroll.core.events import Event
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.contact.acting import OPEN
+from proofroll.elements.mechanism.contact.modes import OPEN
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction, rolling_levers
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
-from proofroll.elements.mechanism.contact.turning import TurningFriction, rolling_levers
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import StepEvents, state_of

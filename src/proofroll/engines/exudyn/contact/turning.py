@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from proofroll.elements.mechanism.contact.turning import TurningFriction
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.engines.exudyn.native import Output, exu, items
 
 

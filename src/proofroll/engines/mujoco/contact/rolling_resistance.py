@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.turning import rolling_levers, turning_frictions
+from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers, turning_frictions
 from proofroll.elements.mechanism.run.contacts.step_events import SLIP
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.mujoco.contact.contact_states import ContactStates

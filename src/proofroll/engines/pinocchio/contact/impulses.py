@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import ONE_POINT, Moving, Touching, touch
-from proofroll.elements.mechanism.contact.turning import rolling_levers
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact

@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism.contact.rolling_and_spin import turning_frictions
 from proofroll.elements.mechanism.contact.touching import Touching
-from proofroll.elements.mechanism.contact.turning import turning_frictions
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 

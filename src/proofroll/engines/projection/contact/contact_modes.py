@@ -18,7 +18,14 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import EventKind
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import (
+from proofroll.elements.mechanism.contact.coulomb import contact_forces
+from proofroll.elements.mechanism.contact.joint_laws import (
+    JointContact,
+    joint_contacts,
+    line_response,
+    refuse_rubbing_stops,
+)
+from proofroll.elements.mechanism.contact.modes import (
     FAINT,
     OPEN,
     ContactMode,
@@ -27,22 +34,15 @@ from proofroll.elements.mechanism.contact.acting import (
     held_directions,
     slip_velocity,
 )
-from proofroll.elements.mechanism.contact.coulomb import contact_forces
-from proofroll.elements.mechanism.contact.joint_laws import (
-    JointContact,
-    joint_contacts,
-    line_response,
-    refuse_rubbing_stops,
-)
-from proofroll.elements.mechanism.contact.start import closed_and_still, natural_scale, start_digits
-from proofroll.elements.mechanism.contact.touching import Moving, Touching, torn, touch
-from proofroll.elements.mechanism.contact.turning import (
+from proofroll.elements.mechanism.contact.rolling_and_spin import (
     TurningFriction,
     moments_by_pressing,
     pressed_by,
     shut_by_pressing,
     turning_frictions,
 )
+from proofroll.elements.mechanism.contact.start import closed_and_still, natural_scale, start_digits
+from proofroll.elements.mechanism.contact.touching import Moving, Touching, torn, touch
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array

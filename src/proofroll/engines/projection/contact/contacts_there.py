@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contact.acting import REST, Acting, ContactMode, slip_velocity
+from proofroll.elements.mechanism.contact.modes import REST, Acting, ContactMode, slip_velocity
 from proofroll.elements.mechanism.contact.touching import Touching, lying
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from proofroll.core.arrays import cross
-from proofroll.elements.mechanism.contact.acting import Acting, slip_velocity
+from proofroll.elements.mechanism.contact.modes import Acting, slip_velocity
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array
 

@@ -22,7 +22,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.contact import coulomb
-from proofroll.elements.mechanism.contact.acting import modes_of
+from proofroll.elements.mechanism.contact.modes import modes_of
 from proofroll.elements.mechanism.dynamics import switches
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.run.dataset import UNDETERMINED

@@ -7,7 +7,7 @@ import numpy as np
 from proofroll.core.bounces import Bounce, Course, exact_bounces, with_bars
 from proofroll.core.events import IMPACTS, Event
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.bounces import bouncing_bodies, course_of
 from proofroll.elements.mechanism.scene.rotations import Array

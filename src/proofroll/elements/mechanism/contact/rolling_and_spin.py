@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from proofroll.elements.mechanism.contact.acting import OPEN, ROUND_OFF, ContactMode
+from proofroll.elements.mechanism.contact.modes import OPEN, ROUND_OFF, ContactMode
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact

@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.dynamics.link_forces import working
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies

@@ -13,8 +13,8 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.core.events import JUMPS, EventKind
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import REST, Acting, ContactMode
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.contact.modes import REST, Acting, ContactMode
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.dynamics.held_signals import has_held
@@ -26,6 +26,7 @@ from proofroll.elements.mechanism.scene.signal import breaks
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.contact_bounces import contact_bounces
 from proofroll.truth.early_end import cut_at
 from proofroll.truth.error_bars import TwoRouteMotion, check_start, on_same_turns
 from proofroll.truth.followed_paths import (
@@ -41,10 +42,9 @@ from proofroll.truth.followed_paths import (
     times_known,
     two_route_motion,
 )
-from proofroll.truth.law_check.law_verdict import held_to_laws, of_bodies, of_tree, work_along
+from proofroll.truth.law_check.held_to_laws import held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
-from proofroll.truth.switched.contact_bounces import contact_bounces
 from proofroll.truth.switching.held_route import HeldPath, HeldRoute
 from proofroll.truth.switching.standing_ends import Face, RollingLanding, standing_ends
 from proofroll.truth.tree.contact_tree import ContactTree

@@ -1,1 +1,0 @@
-"""Truths of motions that contacts, friction, stops, limits or kinks switch."""
