@@ -149,7 +149,7 @@ def test_bounded_friction(motion: dict[str, float], size: float, mu: float) -> N
 
 
 @pytest.mark.drill
-@pytest.mark.parametrize("mu", [math.inf, 0.3])
+@pytest.mark.parametrize("mu", [math.inf, pytest.param(0.3, marks=pytest.mark.nightly)])
 @settings(max_examples=2)
 @given(motion=CYLINDERS, power=st.sampled_from([-20, 20, 7, -1]), heavier=st.sampled_from([-20, 13, 0]))
 def test_scale(mu: float, motion: dict[str, float], power: int, heavier: int) -> None:

@@ -100,7 +100,7 @@ def _point(
         ]
         for sizes in (errors_of_lines, bounds)
     )
-    verdicts = [Verdict(line.verdict) for line in lines if line.verdict]
+    verdicts = [Verdict(line.verdict) for line in lines if line.verdict in SEVERITY]
     return PrecisionPoint(
         step=step(lines[0].resolution or None, lines[0].step),
         cost=_short(max(costs)),

@@ -57,7 +57,7 @@ def test_the_route_of_first_slips_agrees_with_the_truth(route: Any) -> None:
 
 
 @needs_heyoka
-@pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=5, deadline=None)
 @given(
     speed=st.floats(2.0, 5.0),
