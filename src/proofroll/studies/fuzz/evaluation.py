@@ -24,7 +24,7 @@ from proofroll.studies.comparison.default_comparison import able, bounds
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import Plan, plan, point_name
 from proofroll.studies.fuzz.relations import breaches
-from proofroll.studies.fuzz.surprises import TRUTH, Surprise, surprises
+from proofroll.studies.fuzz.surprises import TRUTH, Surprise, failure_of_ours, surprises
 
 _TIGHT = 1e-4  # part of its scale by which the limit of small steps of an observable may be off
 _OF_STEPS, _OF_TOLERANCES = [2.0, 1.0, 0.5], [4.0, 2.0, 1.0]  # an engine may refuse a tighter tolerance
@@ -78,6 +78,9 @@ def evaluate_scene(
         outcome = outcome_of(folder, engine, runner, limit, diagnosing=diagnosing)
     except _Invalid as error:
         return EvaluatedScene(invalid=str(error), seconds=processor_seconds() - begin)
+    except _Unable as error:
+        shown = [failure_of_ours(str(error))]
+        return EvaluatedScene(surprises=tuple(shown), seconds=processor_seconds() - begin)
     if outcome is None:
         return EvaluatedScene(fits=False, seconds=processor_seconds() - begin)
     (point,) = outcome.points.values()
@@ -95,6 +98,10 @@ class _Invalid(Exception):  # noqa: N818 -- a fact about a scene
     """The reader refuses a scene."""
 
 
+class _Unable(Exception):  # noqa: N818 -- a fact about a scene
+    """The comparison fails on a scene that the reader takes."""
+
+
 def outcome_of(folder: Path, engine: str, runner: Runner, limit: float, *, diagnosing: bool = False) -> Outcome | None:
     """Outcome of the comparison of a random scene, see :func:`evaluate_scene`; None: no formulation can represent it.
 
@@ -107,7 +114,15 @@ def outcome_of(folder: Path, engine: str, runner: Runner, limit: float, *, diagn
     rows = _rows(engine, scene, file, runner)
     if not rows and engine != TRUTH:
         return None
-    comparison = _comparison(folder, scene, file, rows, limit)
+    try:
+        return _compared(_comparison(folder, scene, file, rows, limit), scene, file, runner, diagnosing=diagnosing)
+    except InputError as error:
+        raise _Unable(str(error)) from error
+
+
+def _compared(comparison: Comparison, scene: Scene, file: SceneFile, runner: Runner, *, diagnosing: bool) -> Outcome:
+    """Outcome of a comparison; its runs are not made without a truth."""
+    rows = comparison.rows
     planned = plan(comparison, workers=runner.workers) if rows else _truth_alone(comparison, scene, file, runner)
     results = runner.run(planned.stages[0])
     (truth,) = results.values()

@@ -22,7 +22,7 @@ from proofroll.running.store import write_text
 from proofroll.studies.failure import CRASHED, GAVE_UP, LOST_PHASE, Yardstick, run_outcome
 from proofroll.studies.fuzz.evaluation import EvaluatedScene, evaluate_scene, outcome_of
 from proofroll.studies.fuzz.relations import relations_of, write_scene
-from proofroll.studies.fuzz.surprises import HANGS, TRUTH, Surprise
+from proofroll.studies.fuzz.surprises import HANGS, OURS, TRUTH, Surprise
 
 _DECADE = 1.0  # by which the size of a surprise may change
 _TIMES = 3.0  # limit of a try, relative to the first run of the scene
@@ -193,6 +193,8 @@ class Shrinker:
 
     def _program(self, folder: Path) -> str:
         """Path of a program that shows the failure by the engine alone, or as far as it can; empty: there is none."""
+        if self._surprise.kind.formulation == OURS:
+            return ""
         outcome = outcome_of(folder, self._engine, self._runner, self._limit)
         run = next(iter(outcome.runs), None) if outcome else None
         if outcome is None or run is None or run.case is None or run.case.engine.resolution is None:

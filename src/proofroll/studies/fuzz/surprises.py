@@ -27,6 +27,7 @@ _LARGE = 0.03  # part of its scale by which an observable without a shown limit 
 _EVENTFUL = 100.0  # by which the limit of small steps of a run with events may be farther off
 _FALLEN = 0.8  # largest ratio of the errors at the shortest and the longest step that counts as falling
 _OF_MOTION = frozenset({"m", "rad", "m/s", "rad/s", "1"})  # units of quantities of motion
+OURS = "proofroll"  # in place of a formulation where the comparison itself fails
 _EVENTS, _OF_EVENTS = "events", 1.0  # quantity, and size where their number is not the true one [decades]
 _SETTLING = 5.0  # longest steps behind an event in which a run may still follow it
 _SAME = 0.01  # relative difference of errors that are alike at all steps
@@ -179,6 +180,11 @@ def _failed(formulation: str, result: Result) -> Surprise:
     """Surprise of a run without a result."""
     surprise, size = _OF_STATUS.get(result.status, (result.status.value, 1.0))
     return Surprise(SurpriseKind(formulation, surprise, _words(result.message)), size, result.message)
+
+
+def failure_of_ours(message: str) -> Surprise:
+    """Surprise of a comparison that ends with an error on a scene that the reader takes."""
+    return Surprise(SurpriseKind(OURS, "fails", _words(message)), _OF_STATUS[Status.CRASHED][1], message)
 
 
 def _words(message: str) -> str:

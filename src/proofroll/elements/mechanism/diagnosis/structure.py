@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, above_round_off, hypothesis
@@ -19,6 +18,7 @@ from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import to_rpy
 
 _REMEDY = "an axis is given in the frame of the parent body; look at whose frame the engine takes"
 # Lines of the certificate that follow from the joints' axes.
@@ -117,17 +117,17 @@ def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
             continue
         axis = joint.parent_frame[:, 2]
         axis_seen = axis_seen / size * np.sign(axis_seen @ axis or 1.0)
-        turned = replace(
-            joint,
-            axis=tuple(R_C.T @ R_P @ axis_seen),
-            orientation=tuple(Rotation.from_matrix(R_P.T @ R_C).as_euler("xyz")),
-            q0=(0.0,),
-            rest=joint.rest - joint.q0[0],
-        )
-        joints = (*mechanism.joints[:index], turned, *mechanism.joints[index + 1 :])
         try:
+            turned = replace(
+                joint,
+                axis=tuple(R_C.T @ R_P @ axis_seen),
+                orientation=to_rpy(R_P.T @ R_C),
+                q0=(0.0,),
+                rest=joint.rest - joint.q0[0],
+            )
+            joints = (*mechanism.joints[:index], turned, *mechanism.joints[index + 1 :])
             expected = _first(MechanismElement(replace(mechanism, joints=joints)))
-        except InputError:  # its loops do not close
+        except InputError:  # its loops do not close, or a motion has it begin elsewhere
             continue
         difference, remainder = (_apart(lines, values) for values in ({}, expected))  # in tolerances
         seen = difference > 1
