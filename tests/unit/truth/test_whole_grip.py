@@ -160,3 +160,13 @@ def test_forces_of_a_shared_load_are_held_to_the_law_in_a_distribution_that_its_
     assert found.ended == ""
     assert [event.time for event in found.events] == pytest.approx([0.020580191355707818], abs=1e-13)
     assert np.isnan(found.pressed[-1]).any()
+
+
+@pytest.mark.parametrize("press", [1e-16, 1e-15])
+def test_a_ball_that_unbounded_friction_may_hold_by_round_off_has_no_one_motion(press: float) -> None:
+    """Along an upright shaft a ball falls freely or rolls, by the sign of round-off that presses it: it is told so."""
+    shapes = Geometry("ball", "ball", "sphere", radius=0.2), Geometry("shaft", "world", "shaft", radius=0.6)
+    free = Joint("free", "free", "world", "ball", q0=(0.8, 0, 0, 1, 0, 0, 0))
+    body, pair = Body("ball", 1.0, inertia=(1.0, 1.0, 1.0)), Pair("touch", ("ball", "shaft"), np.inf)
+    mechanism = Mechanism((body,), (free,), geometries=shapes, pairs=(pair,), gravity=(press, 1e-17, -10.0))
+    assert truth_of(mechanism, np.array([0.0, 0.1])).horizon == 0.0

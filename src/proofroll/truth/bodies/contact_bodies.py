@@ -152,6 +152,8 @@ class ContactBodies(ContactStretches):
             whole[k] = following(
                 lines[k], way - touch.normal * (touch.normal @ way), resting_mask[k] and self._rubs[k], SLACK * size
             )
+        if any(whole[k].kind == "slip" and np.isinf(self.contacts[k].friction) for k in idle):
+            return mode, kept  # what carries nothing moves on, and pressed by anything it would stick
         full = self.equations.accelerated(bodies, tuple(whole))
         shares = sharing(full.splits)
         apart = float(np.abs(full.moved - solution.moved).max())
