@@ -212,14 +212,13 @@ class JointCoordinates:
 
         Returns:
             Rate of the fastest mode [rad/s], at least 1; and the change of accelerations if the state moves by its
-            round-off.
+            round-off, by which a joint at rest begins to rub: engines whose friction is soft begin without it.
         """
         q, v = self.mechanism.start()
-        mode = self.sliding(v)  # of all: a joint at rest would rub where round-off moves it
-        acceleration = self.solve(q, v, mode).acceleration
+        acceleration = self.solve(q, v).acceleration
         ways = np.random.default_rng(0).choice([-1.0, 1.0], (3, self.mechanism.nv))
-        moved = [self.solve(self.tree.moved(q, _NEAR * way), v, mode).acceleration for way in ways]
-        nudged = [self.solve(self.tree.moved(q, np.spacing(1.0) * way), v + np.spacing(v) * way, mode) for way in ways]
+        moved = [self.solve(self.tree.moved(q, _NEAR * way), v).acceleration for way in ways]
+        nudged = [self.solve(self.tree.moved(q, np.spacing(1.0) * way), v + np.spacing(v) * way) for way in ways]
         slope = float(np.abs(np.array(moved) - acceleration).max(initial=0.0)) / _NEAR
         noise = max(float(np.abs(solution.acceleration - acceleration).max(initial=0.0)) for solution in nudged)
         return max(1.0, float(np.sqrt(slope))), noise

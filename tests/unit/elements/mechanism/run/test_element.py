@@ -406,12 +406,6 @@ def test_without_tracked_points_the_followed_places_move() -> None:
     np.testing.assert_allclose(centre, [-0.5 * np.sin(0.7), 0, -0.5 * np.cos(0.7)], atol=1e-15)
 
 
-@pytest.mark.parametrize("scene", ["friction_hold", "pendulum_friction", "spring_friction"])
-def test_friction_at_rest_is_no_noise_of_accelerations(scene: str) -> None:
-    """Round-off that moves a joint at rest adds no friction to what accelerations may differ by."""
-    assert element_of(scene).noise < 1e-9
-
-
 def test_a_freedom_that_friction_holds_twice_has_no_force_to_compare_at_the_start() -> None:
     """Two joints of a coupling that rub at rest share the load in more ways than one: accelerations alone are known."""
     made = element_of("gear_pair").mechanism
