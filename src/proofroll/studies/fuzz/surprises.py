@@ -29,7 +29,7 @@ _FALLEN = 0.8  # largest ratio of the errors at the shortest and the longest ste
 _OF_MOTION = frozenset({"m", "rad", "m/s", "rad/s", "1"})  # units of quantities of motion
 OURS = "proofroll"  # in place of a formulation where the comparison itself fails
 _EVENTS, _OF_EVENTS = "events", 1.0  # quantity, and size where their number is not the true one [decades]
-_SETTLING = 5.0  # longest steps behind an event in which a run may still follow it
+_SETTLING = 5.0  # steps behind an event in which a run may still follow it, seen at one stop of a joint
 _SAME = 0.01  # relative difference of errors that are alike at all steps
 _FEW = 2  # samples that count as the start of a run
 # Status of a run -> kind of surprise and its size [decades]: the worst first in a table of kinds.

@@ -95,8 +95,8 @@ class ContactSolution:
     def lasts(self, mode: ContactMode) -> float:
         """Time until one of the first contacts that is open closes at constant acceleration [s]; infinite: never."""
         times = [np.inf]
-        known = len(mode)
-        for acting, touch, rate in zip(mode, self.state.touching[:known], self.slide_rate[:known], strict=True):
+        count = len(mode)
+        for acting, touch, rate in zip(mode, self.state.touching[:count], self.slide_rate[:count], strict=True):
             if acting.kind == "open":
                 opening = touch.normal @ rate + touch.normal_rate @ touch.slide
                 roots = np.roots([opening / 2, touch.normal @ touch.slide, touch.gap])
