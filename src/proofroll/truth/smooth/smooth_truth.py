@@ -408,17 +408,22 @@ class _SmoothTruth:
         natural = mechanism.mass * (scale.length * scale.rate) ** 2  # a mechanism in balance may have no energy
         allowed = ENERGY * np.maximum(natural, np.maximum.accumulate(np.abs(parts).sum(axis=1)))
         lost = np.flatnonzero(change > allowed)
+        most = float(allowed[lost[0] - 1 if len(lost) else -1])
+
+        def loses(time: Array) -> bool:
+            return bool(abs(record_at(time).placed(mechanism).energies().sum() - parts[0].sum()) > most)
+
+        known, last = len(change), early.time * (1.0 - _END)  # where a path ends behind the samples
         if len(lost):
-            most = float(allowed[lost[0] - 1])
-
-            def loses(time: Array) -> bool:
-                return bool(abs(record_at(time).placed(mechanism).energies().sum() - parts[0].sum()) > most)
-
-            end = self._first_time(loses, lost[0])
-            rows = self._equations.rows(record_at(np.array([end])).q[0])
-            values, rank = singular_values(rows.C), self._equations.rank
-            at_pose = ", at a singular pose of the loops" if rank and values[rank - 1] < _SINGULAR * values[0] else ""
-            early.at(end, f"the route in {route} changes the energy by more than {most:.1g} J{at_pose}")
+            end = self._first_time(loses, float(self._times[lost[0]]), lost[0])
+        elif np.isfinite(last) and last > self._times[known - 1] and loses(np.array([last])):
+            end = self._first_time(loses, last, known)
+        else:
+            return
+        rows = self._equations.rows(record_at(np.array([end])).q[0])
+        values, rank = singular_values(rows.C), self._equations.rank
+        at_pose = ", at a singular pose of the loops" if rank and values[rank - 1] < _SINGULAR * values[0] else ""
+        early.at(end, f"the route in {route} changes the energy by more than {most:.1g} J{at_pose}")
 
     def _check_branch(
         self,
@@ -437,11 +442,12 @@ class _SmoothTruth:
                 by_tree, by_bodies = self._tree_at(paths[0], time), self._bodies_at(paths[1], time)
                 return bool(_apart(by_tree, on_same_turns(self._mechanism, by_tree, by_bodies), unit)[0] > BRANCH)
 
-            early.at(self._first_time(apart, parted[0]), "the two routes part, as at a singular pose")
+            first = float(self._times[parted[0]])
+            early.at(self._first_time(apart, first, parted[0]), "the two routes part, as at a singular pose")
 
-    def _first_time(self, fails: Callable[[Array], bool], sample: int) -> float:
-        """Time from which a check fails, between a sample that fails and the one before, wherever the samples lie."""
-        end, held = float(self._times[sample]), float(self._times[sample - 1]) if sample else 0.0
+    def _first_time(self, fails: Callable[[Array], bool], end: float, sample: int) -> float:
+        """Time from which a check fails, between one at which it fails and the last sample before it."""
+        held = float(self._times[sample - 1]) if sample else 0.0
         while end - held > _END * end:
             middle = (held + end) / 2
             held, end = (held, middle) if fails(np.array([middle])) else (middle, end)
