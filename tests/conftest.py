@@ -7,20 +7,29 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from ball_scenes import scene  # noqa: F401 -- a fixture, which pytest finds here
-from dear import pytest_runtest_setup, pytest_runtest_teardown, pytest_terminal_summary  # noqa: F401 -- hooks
+from dear import (  # noqa: F401 -- hooks, but for the first
+    mark_drills,
+    pytest_fixture_setup,
+    pytest_runtest_setup,
+    pytest_runtest_teardown,
+    pytest_sessionfinish,
+    pytest_terminal_summary,
+)
 from forked_workers import Forks
 from hostile import ENTRY_POINTS
 from hypothesis import HealthCheck, Phase, settings
 from known_truths import KnownTruths
 from no_skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 -- hooks, which pytest finds here
+from source_code import nodes
 from warm_workers import WarmWorkers
 from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
@@ -68,13 +77,25 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 gc.disable()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Truths come first: their files are the longest, and begun last would leave one process without work."""
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Marks what is nightly as drills before a mark chooses; truths come first.
+
+    The files of truths are the longest, and begun last would leave one process without work.
+    """
+    mark_drills(config, items)
     items.sort(key=lambda item: not item.nodeid.startswith("tests/unit/truth/"))
 
 
 def pytest_collection_finish() -> None:
-    """From here on what tests leave is collected, and what was imported is not looked at again."""
+    """From here on what tests leave is collected, and what was imported is not looked at again.
+
+    One of several processes imports here what nearly all its tests need: it is no time of the first of them.
+    """
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        for name in ("exudyn", "heyoka", "mujoco", "pinocchio", "xarray"):
+            with suppress(ImportError):
+                import_module(name)
     gc.freeze()
     gc.enable()
 
@@ -195,6 +216,13 @@ def install_engines(
         monkeypatch.syspath_prepend(str(site))
 
     return install
+
+
+@pytest.fixture(scope="session")
+def parsed_sources() -> None:
+    """Parses the package once for all tests that read its sources."""
+    for path in Path(cli.__file__).parents[1].rglob("*.py"):
+        nodes(path)
 
 
 @pytest.fixture

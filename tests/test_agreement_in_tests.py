@@ -131,6 +131,7 @@ def state_of(scene: str, **change: Any) -> dict[str, Any]:
     return state | {name: how(state[name]) for name, how in change.items()}
 
 
+@pytest.mark.drill_of("v_WB-sphere_in_cylinder")
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "pendulum"])
 @pytest.mark.parametrize("name", ["v_WB", "w_WB"])
 def test_velocities_that_are_given_are_judged(scene: str, name: str) -> None:
@@ -181,6 +182,7 @@ def test_a_file_that_run_wrote_knows_its_scene(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["judge", str(other)]).exit_code != 0
 
 
+@pytest.mark.drill_of("sphere_in_cylinder")
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "pendulum"])
 def test_a_run_of_which_variables_were_left_out(scene: str, tmp_path: Path) -> None:
     """A file that run wrote is judged by what somebody left in it."""
@@ -385,6 +387,7 @@ def test_what_is_not_judged_is_named() -> None:
     assert of_places == dict.fromkeys(("p_WB", "v_WB", "w_WB", "q_WB", "energy"), "no tolerance is given for it")
 
 
+@pytest.mark.drill
 def test_bodies_beside_the_tracked_points_are_named_where_no_tolerance_judges_them() -> None:
     """A crank that is a metre off agrees in the places of tracked points; that its own place is not judged is said."""
     run = proofroll.simulate("slider_crank", "projection", until=0.05)
@@ -405,6 +408,7 @@ def test_a_notebook_shows_a_verdict() -> None:
     assert "not judged: &lt;b&gt;mine; the truth has nothing of that name" in shown
 
 
+@pytest.mark.drill
 def test_the_command(proofroll: Proofroll, tmp_path: Path) -> None:
     """A file of somebody's is judged: exit 0 if it agrees, 1 if not, with the numbers as JSON; 2 for another scene."""
     import xarray as xr
@@ -482,6 +486,7 @@ def test_a_mechanism_that_switches_is_judged(name: str) -> None:
     assert found.agrees, found
 
 
+@pytest.mark.drill
 def test_what_lies_behind_the_end_of_a_truth_is_not_judged() -> None:
     """A run agrees whatever it does behind the end of the truth, and differs by what it does before."""
     scene = load_scene("bouncing_ball", back_spin=60.0, height=0.1, restitution=0.5, tangential_restitution=1.0)

@@ -133,6 +133,7 @@ BAD = {
 }  # fmt: skip
 
 
+@pytest.mark.drill_of("unknown setting")
 @pytest.mark.parametrize(("arguments", "code", "words"), BAD.values(), ids=BAD.keys())
 def test_bad_input(proofroll: Proofroll, arguments: list[str], code: int, words: list[str]) -> None:
     """Every bad input gives one line on standard error, nothing on standard output, and its exit code."""
@@ -246,6 +247,7 @@ def test_scenes(proofroll: Proofroll) -> None:
     assert found["sphere_in_cylinder"]["parameters"]["speed"]["unit"] == "m/s"
 
 
+@pytest.mark.drill_of("proofroll run bric-2-bricard", "proofroll compare pap-2-paper")
 @pytest.mark.parametrize(
     ("words", "index", "found"),
     [
@@ -263,6 +265,7 @@ def test_completion(words: str, index: int, found: str) -> None:
     assert done.stdout.split() == [found]
 
 
+@pytest.mark.drill
 def test_a_scene_says_which_step_suits_it(proofroll: Proofroll) -> None:
     """A run that fails with a longer step than the scene asks for names the engine with that step, which works."""
     code, _, err = proofroll("run", "andrews_squeezer", "--engine", "exudyn", "--json")
@@ -272,6 +275,7 @@ def test_a_scene_says_which_step_suits_it(proofroll: Proofroll) -> None:
     assert proofroll("run", "andrews_squeezer", "--engine", found[1], "--json")[0] == 0
 
 
+@pytest.mark.drill
 def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     """The engines are listed with what they provide, and one that is missing with the reason."""
     monkeypatch.setattr("proofroll.core.plugins.engine_names", lambda: ["absent", "misspelt", "oracle"])
@@ -309,6 +313,7 @@ tolerance = "tight"
 """
 
 
+@pytest.mark.drill_of("tiny-1", "exits-3")
 @pytest.mark.parametrize(("engine", "code"), [("tiny", 1), ("exits", 3), ("absent", 3)])
 def test_compare(proofroll: Proofroll, tmp_path: Path, engine: str, code: int) -> None:
     """A claim that a verdict contradicts ends with 1, an engine that is lost with 3."""
@@ -339,6 +344,7 @@ def test_compare_on_a_full_disk(tmp_path: Path) -> None:
     assert not done.stdout
 
 
+@pytest.mark.drill
 def test_compare_keeps_reuses_and_mends_results(proofroll: Proofroll, tmp_path: Path) -> None:
     """A second comparison runs nothing and says the same; changed results are made again, and a line says so."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
@@ -365,6 +371,7 @@ def test_compare_restricted_to_an_engine(proofroll: Proofroll, tmp_path: Path) -
     assert "there is no such engine; choose one of" in err
 
 
+@pytest.mark.drill
 def test_an_engine_that_is_asked_for_has_a_row(proofroll: Proofroll, tmp_path: Path) -> None:
     """An engine without a row in the file, also one with settings, has a verdict or a reason; nothing is dropped."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
@@ -377,6 +384,7 @@ def test_an_engine_that_is_asked_for_has_a_row(proofroll: Proofroll, tmp_path: P
     assert rows[0]["resolution_value"] == 0.005
 
 
+@pytest.mark.drill
 def test_an_engine_of_a_report_without_a_row(proofroll: Proofroll, tmp_path: Path) -> None:
     """Beside an engine that has rows in a report, one that has none is named once; what was asked for is run."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
@@ -388,6 +396,7 @@ def test_an_engine_of_a_report_without_a_row(proofroll: Proofroll, tmp_path: Pat
     assert err.count(said) == 1
 
 
+@pytest.mark.drill_of("exits")
 @pytest.mark.parametrize("engine", ["absent", "exits"])
 def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Path, engine: str) -> None:
     """An engine that is missing or crashes ends a comparison without claims with exit 3, and has a row that says so."""
@@ -453,6 +462,7 @@ def test_run_lists_events(proofroll: Proofroll) -> None:
         assert event["time_low"] <= event["time"] <= event["time_high"] < event["time_low"] + 1.1e-3
 
 
+@pytest.mark.drill_of("pinocchio[formulation=impulses,preset=tuned]-0-agree-done")
 @pytest.mark.parametrize(
     ("engine", "code", "verdict", "status"),
     [
@@ -585,6 +595,7 @@ def test_regimes_of_a_file_without_a_map(proofroll: Proofroll, tmp_path: Path) -
     assert err.count("\n") == 1
 
 
+@pytest.mark.drill
 @pytest.mark.own_workers
 def test_a_run_takes_one_process(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     """The process that tells the engine's settings also makes the run: starting another costs as much as both."""
@@ -616,6 +627,7 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     assert (code, err, out.startswith("Usage: ")) == (2, "", True)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("shell", "shown"),
     [

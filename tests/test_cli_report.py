@@ -112,6 +112,7 @@ def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path, out: 
         assert (out / run["trajectory"]).is_file()
 
 
+@pytest.mark.drill
 def test_the_terminal_begins_with_the_choice(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
     """The first line is the answer of the first screen; a witness is no engine to take."""
     (name,) = files(tmp_path, claim=COMPARISON.replace('"oracle"', '"reduced[formulation=closed_form]"'))
@@ -122,6 +123,7 @@ def test_the_terminal_begins_with_the_choice(proofroll: Proofroll, tmp_path: Pat
     assert "The cheapest that holds 0.1 mm per metre of the true path:" in unescape(html)
 
 
+@pytest.mark.drill
 def test_a_statement_that_does_not_hold_is_a_contradiction(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
     """Exit code 1, named in what to look at first, and on the page; a report needs no comparison."""
     names = files(tmp_path, figures=FIGURES.replace("STATED", "-150"))
@@ -131,6 +133,7 @@ def test_a_statement_that_does_not_hold_is_a_contradiction(proofroll: Proofroll,
     assert "Nothing was compared in this report" in (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.drill
 def test_a_part_that_fails_does_not_take_the_report_away(
     proofroll: Proofroll, tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -186,6 +189,7 @@ def test_a_stopped_report_keeps_what_has_ended_and_goes_on(
     assert content["awaited"] == []
 
 
+@pytest.mark.drill
 def test_progress_counts_comparisons(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """While cases run it is said how many comparisons have ended, and about how long the rest will take."""
     said: list[str] = []
@@ -214,6 +218,7 @@ def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) ->
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.drill
 def test_a_page_after_the_first_comparison(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -248,6 +253,7 @@ def test_a_page_after_the_first_comparison(
     assert "left out: 1 (balls 1). proofroll report --budget 3600 runs all" in " ".join(said.split())
 
 
+@pytest.mark.drill
 def test_a_budget_is_spent_briefly_first_and_grows(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -62,6 +62,7 @@ def asked(folder: Path, *more: str, tolerance: str = "1e-3") -> list[str]:
     return ["recommend", "sphere_in_cylinder", "--quantity", "z", "--tolerance", tolerance, *given, *more]
 
 
+@pytest.mark.drill
 def test_curves_reach_from_broken_to_fine(measured: TradeoffStudy) -> None:
     """Each curve has six points or more, coarse first; the good one begins broken and ends a thousandfold better."""
     curves: dict[str, list[MeasuredPoint]] = {}
@@ -261,6 +262,7 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
     assert f"the stored curves are of {ENGINE}; choose among these" in err
 
 
+@pytest.mark.drill
 def test_an_answer_over_a_range(proofroll: Proofroll, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With --over only curves checked over that range are answered from; --measure checks over it, and not another."""
     assert proofroll(*asked(folder), "--over", "speed=3:5")[0] == 0
@@ -344,6 +346,7 @@ def test_a_trade_off_that_makes_no_sense(proofroll: Proofroll, tmp_path: Path, m
     assert not list(tmp_path.glob("**/*.npz"))
 
 
+@pytest.mark.drill
 def test_the_diagram_says_what_was_run(measured: TradeoffStudy) -> None:
     """It names scene, parameters and length, and one front where no equations of the scene's own are on another."""
     drawn = svg(measured, ["z", "N"])

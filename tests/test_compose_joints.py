@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 import xarray as xr
 
 from proofroll.files.scene_file import load_scene
@@ -21,6 +22,7 @@ def run(text: str, folder: Path) -> xr.Dataset:
     return simulate(load_scene(str(folder)), "projection", until=0.5, every=0.1)
 
 
+@pytest.mark.drill
 def test_a_sleeve_without_mass_swings_and_turns(tmp_path: Path) -> None:
     """The rotor swings along the axis as on the spring alone, about the place where it holds the weight."""
     found = run(SCENES[0], tmp_path)

@@ -50,6 +50,7 @@ def arguments(tmp_path: Path) -> Callable[[str], list[str]]:
     return of
 
 
+@pytest.mark.drill_of("balance under control")
 @pytest.mark.parametrize("path", PATHS)
 def test_a_wrong_setting_is_told_alike(
     command_line: Proofroll, arguments: Callable[[str], list[str]], path: str

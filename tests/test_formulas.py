@@ -22,6 +22,7 @@ def formulas(page: Path) -> list[str]:
 PAGES = [page for page in sorted(DOCS.glob("*.md")) if formulas(page)]
 
 
+@pytest.mark.drill_of("method")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_formulas_of_a_page_are_drawn(page: Path) -> None:
     """Each formula is a picture with its text for those who do not see it."""

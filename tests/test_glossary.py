@@ -32,6 +32,7 @@ def words(text: str) -> list[str]:
     return re.findall(r"^`([\w-]+)`\n: ", text, flags=re.MULTILINE)
 
 
+@pytest.mark.drill
 def test_every_formulation_is_explained() -> None:
     """Each engine of this project has a section, and in it each of its formulations once, and no other."""
     sections = dict(re.findall(r"^### `(\w+)`\n(.*?)(?=^##)", GLOSSARY, flags=re.DOTALL | re.MULTILINE))

@@ -51,6 +51,7 @@ def interrupted(arguments: list[str], ready: Callable[[int], bool], times: int =
     return process.returncode, out, err
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("command", [["engines"], ["run", "sphere_in_cylinder", "--engine", "sleeper"]])
 def test_while_an_engine_is_asked(
     tmp_path: Path,
@@ -68,6 +69,7 @@ def test_while_an_engine_is_asked(
     assert err.count("\n") == 1
 
 
+@pytest.mark.drill
 def test_while_the_map_is_drawn(tmp_path: Path) -> None:
     """Processes that compute for the truth end with Ctrl-C as well, and none of them says anything."""
     code, out, err = interrupted(
@@ -99,6 +101,9 @@ def test_while_the_command_is_loaded(module: str) -> None:
 
 BROKEN_OFF = """
 import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+for ignored in (signal.SIGTERM, signal.SIGHUP):
+    signal.signal(ignored, signal.SIG_DFL)
 name, number = sys.argv.pop(1), int(sys.argv.pop(1))
 class Spoilt:
     def find_spec(self, module, *_):
@@ -113,6 +118,7 @@ main()
 """
 
 
+@pytest.mark.drill_of("proofroll.files.scene_file-2")
 @pytest.mark.parametrize(
     ("module", "number"),
     [
@@ -131,6 +137,7 @@ def test_a_signal_while_a_module_is_imported(module: str, number: int) -> None:
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.drill_of("arguments0", "arguments1")
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no /dev/full")
 @pytest.mark.parametrize("arguments", [["scenes"], ["scenes", "--json"], ["--help"]])
 def test_an_output_that_is_full(arguments: list[str]) -> None:

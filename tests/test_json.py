@@ -107,6 +107,7 @@ def fields(title: str) -> set[str]:
     return set(re.findall(r"^\| `(\w+)` \|", section(title), flags=re.MULTILINE))
 
 
+@pytest.mark.drill_of("check-study", "compare", "ladder", "engines")
 @pytest.mark.parametrize(
     ("title", "arguments"),
     [

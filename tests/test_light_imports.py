@@ -93,6 +93,7 @@ def loaded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
     return {step: set(names) for step, names in lines}
 
 
+@pytest.mark.drill_of("import")
 @pytest.mark.parametrize("step", STEPS)
 def test_a_step_loads_no_more_than_it_takes(step: str, loaded: dict[str, set[str]]) -> None:
     """A step loads no library that it can do without; those of arrays and datasets would take most of its time."""

@@ -108,6 +108,7 @@ def springs(home: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     truth.load_truths.cache_clear()
 
 
+@pytest.mark.drill
 def test_run(command_line: Proofroll, springs: Path) -> None:
     """Run gives the truth with its error bars, and the engine's end near it."""
     ends = {}
@@ -118,6 +119,7 @@ def test_run(command_line: Proofroll, springs: Path) -> None:
     assert ends["sprung"] == pytest.approx(ends["truth"], abs=1e-4)
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("springs")
 def test_compare(command_line: Proofroll) -> None:
     """Compare judges every observable of the new kind."""
@@ -166,6 +168,7 @@ def test_stability(command_line: Proofroll) -> None:
     assert all(point["sides"]["accurate"]["largest"] for point in study["points"])
 
 
+@pytest.mark.drill
 def test_ladder(command_line: Proofroll, springs: Path) -> None:
     """Ladder puts the engine on its rung."""
     code, out, err = command_line("ladder", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
@@ -173,6 +176,7 @@ def test_ladder(command_line: Proofroll, springs: Path) -> None:
     assert [rung["engine"] for rung in json.loads(out)["rungs"] if rung["engine"]] == ["sprung"]
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("springs")
 def test_report(command_line: Proofroll) -> None:
     """Report writes a page about it, of results that are stored."""
@@ -207,6 +211,7 @@ def test_other_kinds_keep_their_units(command_line: Proofroll, monkeypatch: pyte
     assert code == 0, err
 
 
+@pytest.mark.drill
 def test_replay_and_judge(command_line: Proofroll, springs: Path) -> None:
     """A run of a scene that is no scene of the package is held against its truth; who draws no such scene says so."""
     assert command_line("run", str(springs), "--engine", "sprung", "--until", "1", "--out", "run.nc")[0] == 0

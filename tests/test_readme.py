@@ -62,6 +62,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("readme")
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("line", sorted(COMMANDS))
 def test_a_command_of_the_readme_works(
@@ -85,6 +86,7 @@ def test_a_make_target_of_the_readme_exists(line: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("source", blocks("README.md", "python"))
 def test_a_snippet_of_the_readme_runs(source: str, tmp_path: Path) -> None:
     """Every Python snippet of the README runs in a fresh interpreter."""
@@ -166,6 +168,7 @@ def complaint(text: str, settings: list[EngineFacts], now: str) -> str:
     return "" if made_from.stamped(text) == now else f"{STALE}: comparison, scene, settings or versions have changed"
 
 
+@pytest.mark.drill
 def test_the_verdict_table_is_of_today() -> None:
     """Rows, settings, steps and verdicts are those of the comparison, and what it was made from has not changed."""
     settings = made_from.facts("paper")

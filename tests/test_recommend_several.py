@@ -173,6 +173,7 @@ def test_a_tolerance_means_the_same_everywhere(proofroll: Proofroll, report: Pat
     assert {(item["tolerance"], item["unit"]) for item in lengths} == {(1e-3, "m")}
 
 
+@pytest.mark.drill
 def test_a_kind_without_a_report_is_told_what_makes_one(proofroll: Proofroll, tmp_path: Path) -> None:
     """A kind of scenes, or several in one word, needs a report: the command that makes it is told, exit 2."""
     made_by = {"loops": "proofroll report --only loops", "pendulum,cone": "proofroll report pendulum cone"}

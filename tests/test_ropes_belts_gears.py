@@ -54,6 +54,7 @@ def test_the_force_of_a_coupling_is_that_on_one_joint(tmp_path: Path) -> None:
         assert float(values[-1]) == pytest.approx(force, rel=1e-11)
 
 
+@pytest.mark.drill
 def test_a_parcel_slides_on_a_conveyor(tmp_path: Path) -> None:
     """The scene of the page about conveyors starts with the acceleration mu g."""
     page = PAGE.with_name("conveyors.md").read_text("utf-8")

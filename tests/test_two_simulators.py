@@ -21,7 +21,6 @@ def _write_files(folder: Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 def test_the_page_ends_with_a_named_cause(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Engines agree; the page's loops break by half of kd and by a late target, and without the mistakes nowhere."""

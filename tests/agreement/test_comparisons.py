@@ -100,6 +100,9 @@ def outcomes(store: Store) -> Callable[[Comparison, Row], Outcome]:
     return outcome
 
 
+@pytest.mark.drill_of(
+    "accuracy", "four_bar", "inclined_plane", "paper", "sled", "slide_to_roll", "slider_crank", "stick_slip"
+)
 @pytest.mark.parametrize("name", comparison_names())
 def test_each_engine_begins(name: str, tmp_path: Path) -> None:
     """The first row of each engine that is expected to run does so for two samples, held against the truth."""
@@ -133,7 +136,6 @@ EVENTS = {"first_slip", "event_times", "event_order"}
 LAST_SPECIAL = 2.25
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["pinocchio[formulation=impulses,preset=tuned,dt=5e-4]"])

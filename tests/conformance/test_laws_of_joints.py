@@ -84,14 +84,12 @@ def test_formulations_are_checked_on_what_they_are_made_for() -> None:
     assert not any("sled" in check.name for check in checks(Single))
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     "law",
     [
         "damping",
-        *(
-            pytest.param(law, marks=[pytest.mark.drill, pytest.mark.nightly])
-            for law in ("armature", "torque", "friction", *DRIVES)
-        ),
+        *(pytest.param(law, marks=pytest.mark.nightly) for law in ("armature", "torque", "friction", *DRIVES)),
     ],
 )
 def test_a_law_that_is_left_out_is_noticed(law: str) -> None:

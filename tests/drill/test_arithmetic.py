@@ -56,7 +56,6 @@ def truths(kind: Arithmetic, folder: Path) -> Path:
     return folder
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @pytest.mark.slow
 def test_numbers_of_the_truth_hang_on_no_processor(tmp_path: Path) -> None:
@@ -190,7 +189,6 @@ def test_what_a_map_of_regimes_decides_is_recorded(tmp_path: Path) -> None:
     assert parted.what == f"{place}: regime"
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 def test_what_a_ladder_of_models_decides_is_recorded(tmp_path: Path) -> None:
     """Models that reach their end, and terms that are needed, which hang on no clock."""
@@ -202,7 +200,6 @@ def test_what_a_ladder_of_models_decides_is_recorded(tmp_path: Path) -> None:
     assert not verdicts & {"free", "paid for, not needed"}
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 def test_what_a_map_of_stability_decides_is_recorded(tmp_path: Path) -> None:
     """Largest steps and failures beyond, at each place; the claims that they contradict."""
@@ -302,6 +299,7 @@ def test_slow_arithmetic_has_the_time_it_needs() -> None:
     assert not unhurried(asked).timed
 
 
+@pytest.mark.drill
 def test_no_result_of_another_arithmetic_is_used(tmp_path: Path) -> None:
     """A folder that holds results already is refused: what is stored does not say with which kernel it was made."""
     (tmp_path / "store").mkdir()

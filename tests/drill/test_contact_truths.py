@@ -33,7 +33,6 @@ def held_out(name: str, seed: int) -> dict[str, float]:
     return {key: value * random.uniform(0.85, 1.15) for key, value in own.items()}
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @pytest.mark.parametrize(("name", "seed"), [(name, place % 3) for place, name in enumerate(ENDS)])
 def test_two_routes_agree_over_held_out_parameters(name: str, seed: int) -> None:

@@ -41,7 +41,6 @@ TRIED = {
 }  # fmt: skip
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # 20 s of processor time, on a machine that may have much else to do

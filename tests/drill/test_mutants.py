@@ -33,7 +33,6 @@ def _drilled() -> dict[str, object]:
     return dict(json.loads(done.stdout))
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # two minutes of processor time, on a machine that may have much else to do
@@ -51,7 +50,7 @@ def test_every_mutant_is_detected_and_most_are_named() -> None:
 
 
 WITHOUT_FAULT = {(kind.__bases__, repr(kind.scene), kind.until): kind for kind in map(without_fault, mutants())}
-NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
+NIGHTLY = pytest.mark.nightly
 # Scenes whose truth takes little time; the others are for the night, as the drill of mutants is.
 QUICK = {"sphere_in_cylinder", "two_bounces", "double_pendulum", "heavy_top", "free_body", "saturated_servo"}
 
@@ -70,6 +69,7 @@ def test_an_engine_without_a_fault_is_not_detected(kind: type[Mutant]) -> None:
     assert [item for item in judged_without_fault(kind) if item.error > 2e-3 * item.scale] == []
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("fault", [pytest.param("PyramidForCone", marks=pytest.mark.drill), "FrictionOfOneFoot"])
 def test_a_fault_of_contacts_is_detected_and_named(fault: str) -> None:
     """A law of friction that is not the scene's, or the coefficient of one of three feet, is found, and its cause."""
@@ -78,6 +78,7 @@ def test_a_fault_of_contacts_is_detected_and_named(fault: str) -> None:
     assert found.named, found.said
 
 
+@pytest.mark.drill_of("RoughJoint", "CoarseGear")
 @pytest.mark.parametrize(
     "fault", ["RoughJoint", "PushingJoint", "TightClamp", "SwappedGains", "UndampedServo", "InverseGear", "CoarseGear"]
 )
@@ -190,6 +191,7 @@ def test_a_jump_a_moment_later_is_no_other_clock() -> None:
     ]
 
 
+@pytest.mark.drill
 def test_a_ball_that_jumps_is_not_told_of_gravity() -> None:
     """A soft contact that throws the ball off the wall again and again has neither gravity nor a pyramid to blame."""
     scene = load_scene("slide_to_roll", speed=2.0, back_spin=400.0)

@@ -17,7 +17,6 @@ from proofroll.studies.fuzz.relations import relations_of, write_scene
 _ENDS = {12: "truth; ends; the truth ends at t = # s: friction or stops of"}
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.timeout(600)

@@ -58,6 +58,7 @@ def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
         assert not turning or {type(body) for body in made_bodies(mechanism, allow_planar=True)} == {Planar}
 
 
+@pytest.mark.drill_of("5", "10")
 @pytest.mark.parametrize("seed", [5, 10, 3060])
 def test_no_error_of_a_truth_lies_beyond_its_bar(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A loop in space, a planar tree and a free body, every quantity; `drill referee` has any number."""
@@ -117,6 +118,7 @@ def test_a_ball_starts_where_the_coordinates_of_its_wall_say(seed: int) -> None:
 # A bowl on which the ball slips until it sticks, a torus with resistance, a plane on which it bounces, two tori on
 # which it slips at first (it was taken to leave them), a plane whose gap has the round-off of the place, two bowls on
 # which the direction of a slip still turns at its end.
+@pytest.mark.drill_of("9")
 @pytest.mark.parametrize(
     "seed", [9, 60, *(pytest.param(seed, marks=pytest.mark.drill) for seed in (17, 45, 119, 144, 7017, 7092))]
 )

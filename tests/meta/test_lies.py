@@ -136,6 +136,7 @@ def band_of(about: str) -> dict[str, str]:
     return {name: "1 %" if item and item.role is Role.RESIDUAL else "0.1 %" for name, item in items.items()}
 
 
+@pytest.mark.drill_of("loop-3 ms early", "slips-no events")
 @pytest.mark.parametrize(("about", "lie"), LIES)
 def test_a_lie(about: str, lie: Lie) -> None:
     """It is found out, and what is said names what it is about; one far below the tolerance is none."""
@@ -221,7 +222,7 @@ SWING = ("double_pendulum", "pendulum", "oscillators", "gyroscope_cart", "driven
 FACTORS = (1.0, 0.5, 0.25)
 # Runs of them take seconds.
 LONG = {"chain", "gyroscope_cart", "servo", "sled"}
-NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
+NIGHTLY = (pytest.mark.nightly,)
 
 
 def _marks(scene: str, index: int, place: int) -> tuple[pytest.MarkDecorator, ...]:
@@ -262,6 +263,7 @@ def _honest_scene(name: str) -> tuple[Scene, Any]:
     return scene_of(name) if name in UNTIL else load_scene(name), Jointed
 
 
+@pytest.mark.drill_of("oscillators-order_4")
 @pytest.mark.parametrize(("name", "formulation"), HONEST)
 def test_an_honest_engine(name: str, formulation: str) -> None:
     """A textbook method is not accused at a coarse step, nor its limit of small steps, and no cause is told."""
@@ -392,6 +394,7 @@ class Remembers(Tiny):
         self.x, self.t = self.kept[t], t
 
 
+@pytest.mark.drill_of("Tiny-0")
 @pytest.mark.parametrize(("kind", "remarks"), [(Tiny, 0), (Remembers, 1)])
 def test_a_run_that_is_remembered(kind: type[Tiny], remarks: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """An engine whose first run, the judged one, costs ten times as much as later ones has a speed with a remark."""

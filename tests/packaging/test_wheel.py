@@ -79,6 +79,7 @@ def test_contents(wheel: Path) -> None:
     assert not any("__pycache__" in name for name in names)
 
 
+@pytest.mark.drill
 def test_it_is_the_wheel_that_is_used(installed: Path, tmp_path: Path) -> None:
     """The package and its data come from the wheel, not from the repository, and its claims are found by name."""
     code = (
@@ -94,6 +95,7 @@ def test_it_is_the_wheel_that_is_used(installed: Path, tmp_path: Path) -> None:
     assert {path.stem for path in (REPOSITORY / "comparisons").glob("*.toml")} >= set(names.split()) >= {"paper"}
 
 
+@pytest.mark.drill
 def test_scenes(installed: Path, tmp_path: Path) -> None:
     """The command line finds the scenes without the repository."""
     done = python(installed, tmp_path, "-m", "proofroll.cli", "scenes", "--json")
@@ -101,6 +103,7 @@ def test_scenes(installed: Path, tmp_path: Path) -> None:
     assert {scene["name"] for scene in json.loads(done.stdout)} >= {"sphere_in_cylinder", "inclined_plane"}
 
 
+@pytest.mark.drill
 def test_run(installed: Path, tmp_path: Path) -> None:
     """A run from another folder works, in a worker process of the same wheel."""
     arguments = [

@@ -1,19 +1,30 @@
-"""Line at the end of a test run about slow tests without the mark ``drill``; no test fails for its duration."""
+"""Slow tests without the mark ``drill``: named at the end of a run, which fails for them where none may be there.
+
+The variable ``PROOFROLL_NO_DEAR``, which ``make test`` sets, makes the run fail; no single test fails for its duration.
+On a slow or busy machine a time is divided by that of a loop that is measured beside it.
+"""
 
 from __future__ import annotations
 
 import os
+import time
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
 import pytest
 
-# Processor time [s] above which a test is a drill (CONTRIBUTING.md).
-LIMIT = 1.5
+VARIABLE = "PROOFROLL_NO_DEAR"
+# Processor time [s] above which a test is a drill (CONTRIBUTING.md), on a processor that takes LOOP [s] for the loop.
+LIMIT = 1.0
+LOOP = 0.008
+# Folder of tests -> mark of its drills, which .ci/run leaves out where nothing changed of what they hold.
+_SELDOM = {"conformance": "drill_of_the_judge", "meta": "drill_of_the_judge", "robots": "drill_of_robots"}
 # Largest number of tests named in the line.
 _MOST = 10
 _BEGAN = pytest.StashKey[float]()
+_SHARED = pytest.StashKey[float]()
 _TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 1
 _TOOK, _MARKED = "processor_seconds", "marked_drill"
 
@@ -44,10 +55,61 @@ def _spent() -> float:
     return sum(os.times()[:4]) + _of_children("self")
 
 
+def _slowness() -> float:
+    """Time of a loop of Python's numbers over LOOP, at least 1: the quickest of three."""
+    times = []
+    for _ in range(3):
+        start, total = time.process_time(), 0.0
+        for number in range(150_000):
+            total += number * 0.5
+        times.append(time.process_time() - start)
+    return max(1.0, min(times) / LOOP)
+
+
+def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Marks as drills what runs at night alone, and the cases of a test that its mark ``drill_of`` names.
+
+    Drills of some folders get a mark besides. Where a single case is asked for, names are not compared with cases.
+
+    Raises:
+        pytest.UsageError: a mark names a case that its test has not.
+    """
+    named, cases = {}, defaultdict(set)
+    for item in items:
+        case = item.name.partition("[")[2].removesuffix("]")
+        function = item.nodeid.partition("[")[0]
+        cases[function].add(case)
+        names = {name for mark in item.iter_markers("drill_of") for name in mark.args}
+        if names:
+            named[function] = names
+        if case in names or item.get_closest_marker("nightly"):
+            item.add_marker("drill")
+        if item.get_closest_marker("drill") and (mark := _SELDOM.get(item.nodeid.split("/")[1])):
+            item.add_marker(mark)
+    whole = not any("[" in argument for argument in config.args)
+    for function, names in named.items() if whole else ():
+        if unknown := names - cases[function]:
+            raise pytest.UsageError(f"{function}: drill_of names {', '.join(sorted(unknown))}, which it has not")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(fixturedef: pytest.FixtureDef[Any], request: pytest.FixtureRequest) -> Iterator[Any]:
+    """Counts what tests share, for it is no time of the test that is the first to need it."""
+    if fixturedef.scope == "function":
+        return (yield)
+    start = _spent()
+    try:
+        return (yield)
+    finally:
+        stash = request.session.stash
+        stash[_SHARED] = stash.get(_SHARED, 0.0) + _spent() - start
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Notes when a test begins, with the fixtures that it is the first to need: where the one before it ended."""
+    """Notes when a test begins: where the one before it ended."""
     item.stash[_BEGAN] = item.session.stash.get(_BEGAN, None) or _spent()
+    item.session.stash[_SHARED] = 0.0
 
 
 @pytest.hookimpl(wrapper=True)
@@ -55,20 +117,33 @@ def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
     """Records the processor time that a test took."""
     result = yield
     now = item.session.stash[_BEGAN] = _spent()
-    item.user_properties.append((_TOOK, now - item.stash.get(_BEGAN, now)))  # a skipped test has no start
+    took = now - item.stash.get(_BEGAN, now) - item.session.stash[_SHARED]  # a skipped test has no start
+    item.user_properties.append((_TOOK, took / _slowness() if took > LIMIT else took))
     # Keywords of a report hold names of folders too: a test in tests/drill has the word, not the mark.
     item.user_properties.append((_MARKED, item.get_closest_marker("drill") is not None))
     return result
 
 
-def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Prints the slow tests without the mark ``drill``, the slowest first."""
+def _dear(terminalreporter: Any) -> dict[str, float]:
+    """Processor times [s] of the slow tests without the mark ``drill``, by name, the slowest first."""
     reports = [report for found in terminalreporter.stats.values() for report in found if hasattr(report, "when")]
     told = {report.nodeid: dict(report.user_properties) for report in reports if report.when == "teardown"}
     took = {name: properties.get(_TOOK, 0.0) for name, properties in told.items() if not properties.get(_MARKED)}
-    dear = sorted((name for name in took if took[name] > LIMIT), key=lambda name: -took[name])
-    if dear:
-        names = ", ".join(f"{name} ({took[name]:.1f} s)" for name in dear[:_MOST])
+    return {name: took[name] for name in sorted(took, key=lambda name: -took[name]) if took[name] > LIMIT}
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Prints the slow tests without the mark ``drill``."""
+    if dear := _dear(terminalreporter):
+        names = ", ".join(f"{name} ({seconds:.1f} s)" for name, seconds in list(dear.items())[:_MOST])
+        failed = f" ({VARIABLE} is set, so this is a failure)" if os.environ.get(VARIABLE) else ""
         terminalreporter.write_line(
-            f"{len(dear)} without the mark drill took more than {LIMIT} s of processor: {names}"
+            f"{len(dear)} without the mark drill took more than {LIMIT} s of processor{failed}: {names}"
         )
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Fails the run of all quick tests if one of them is slow."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if reporter and os.environ.get(VARIABLE) and exitstatus == pytest.ExitCode.OK and _dear(reporter):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED

@@ -122,7 +122,6 @@ def test_rolling_in_euler_angles(motion: dict[str, float], size: float) -> None:
     assert_agrees(simulated(scene, EULER, until), check_truth(scene, until))
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @settings(max_examples=8)
 @given(motion=CYLINDERS, size=SIZES, mu=st.one_of(st.just(0.0), decades(1e-3, 1e3)))
@@ -176,7 +175,6 @@ def test_scale(mu: float, motion: dict[str, float], power: int, heavier: int) ->
             assert difference < 1e-11 * size_of(first, name), (engine, name)
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @settings(max_examples=5)
 @given(

@@ -61,6 +61,7 @@ def test_energy_and_constraints(engine: str, oscillations: int) -> None:
     assert slipped < 1e-12
 
 
+@pytest.mark.drill
 @needs_heyoka
 def test_angles_stay_within_a_turn() -> None:
     """However often the ball goes round, its angles keep all their digits: none grows beyond some turns."""

@@ -19,7 +19,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.referee.random_contacts import random_contacts
 
-NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
+NIGHTLY = pytest.mark.nightly
 ROLLING, SPINNING = 2e-3, 3e-3  # m
 APART = 3.0  # factor between bars, whose round-off depends on the axes
 LEAST = 1e-12  # bars of SI units below which they are round-off alone
@@ -87,6 +87,7 @@ def _cases() -> list[Any]:
     ]
 
 
+@pytest.mark.drill
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(("slides", "spins", "seed"), [(0.0, 0.0, 1), (0.0, 7.0, 2), (1.5, -4.0, 3)])
 def test_a_ball_with_resistance_rolls_alike_in_a_turned_world(slides: float, spins: float, seed: int) -> None:

@@ -22,7 +22,7 @@ from proofroll_drill.referee.random_contacts import random_contacts
 from proofroll_drill.referee.random_mechanisms import random_mechanism
 
 EVERY = 0.01  # s
-NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
+NIGHTLY = pytest.mark.nightly
 # Scenes of models/ -> last time [s]: those of the quick tests, and those of the night.
 QUICK = {"four_bar": 0.1, "stop": 0.3, "friction_hold": 0.1, "falling_rod": 0.1}
 NIGHT = dict.fromkeys(

@@ -60,6 +60,7 @@ def test_tab_reaches_everything_in_order_and_shows_where_it_is(seen: Visit) -> N
     assert numbers[: len(reachable)] == list(range(len(reachable))), [reachable[number] for number in left_out]
 
 
+@pytest.mark.drill
 def test_keys_do_what_the_mouse_does(seen: Visit) -> None:
     """Enter follows a verdict and folds a part, space presses a button of the legend."""
     link = seen.page.locator(".matrix .cell a").first
@@ -76,6 +77,7 @@ def test_keys_do_what_the_mouse_does(seen: Visit) -> None:
         seen.until(lambda pressed=pressed: button.get_attribute("aria-pressed") == pressed, what="the button's state")
 
 
+@pytest.mark.drill
 def test_headings_form_an_outline(unfolded: Visit) -> None:
     """One title; no level is skipped on the way down; no heading is empty, and none hides from a screen reader."""
     levels, texts = unfolded.page.evaluate(
@@ -92,6 +94,7 @@ def test_headings_form_an_outline(unfolded: Visit) -> None:
     assert tree.count("heading ") == len(levels)
 
 
+@pytest.mark.drill
 def test_everything_that_is_used_has_a_name(unfolded: Visit) -> None:
     """Links, buttons, scrolling regions and figures are announced by a name, not by silence; silence would be found."""
 

@@ -14,6 +14,7 @@ from browsing import UNDRAWN, Drawn, Visit
 Visiting = Callable[..., AbstractContextManager[Visit]]
 
 
+@pytest.mark.drill
 def test_requests_and_errors_would_be_seen(tmp_path: Path, visit: Visiting) -> None:
     """The check above can fail: a page that asks for an image, raises an error and opens a dialog is caught at all."""
     file = tmp_path / "page.html"
@@ -25,6 +26,7 @@ def test_requests_and_errors_would_be_seen(tmp_path: Path, visit: Visiting) -> N
         assert seen.requested == [file.as_uri(), address]
 
 
+@pytest.mark.drill
 def test_every_section_says_something(report_page: Path, visit: Visiting) -> None:
     """No section is a bare heading; one that is emptied is found."""
     with visit(report_page, before=UNDRAWN) as seen:
@@ -36,6 +38,7 @@ def test_every_section_says_something(report_page: Path, visit: Visiting) -> Non
         assert seen.page.evaluate("reading.empty()") == ["use"]
 
 
+@pytest.mark.drill
 def test_a_table_with_rows_below_says_so(report_page: Path, visit: Visiting) -> None:
     """A table that shows not all of its rows says that there are more, until the last one has been in sight."""
     region = ".scroll:has(.matrix)"
@@ -92,6 +95,7 @@ def test_no_number_is_broken_at_its_hyphen(report_page: Path, visit: Visiting) -
         assert len(seen.page.evaluate("reading.broken()")) > 1
 
 
+@pytest.mark.drill
 def test_what_is_folded_is_built_when_it_is_opened(everything: Any, tmp_path: Path, visit: Visiting) -> None:
     """Of two comparisons the second is a heading until it is opened; then its tables sort, and hidden engines are so.
 
@@ -176,6 +180,7 @@ def place(seen: Visit, share: float, figure: int = 0) -> tuple[float, float]:
     )
 
 
+@pytest.mark.drill
 def test_zoom_in_one_figure_is_zoom_in_all(drawn: Visit) -> None:
     """Dragging in a figure sets the time axis of each, and each is told once: nothing is passed back."""
     mouse = drawn.page.mouse
@@ -209,6 +214,7 @@ def test_pointer_in_one_figure_shows_the_time_in_all(drawn: Visit) -> None:
     drawn.wait(f"{labels} === 0")
 
 
+@pytest.mark.drill
 def test_a_row_is_switched_off_in_every_figure(drawn: Visit) -> None:
     """The legend acts on all figures of a comparison, and says so to a screen reader."""
     hidden = "drawn.map((element) => element.data.filter((trace) => trace.visible === false).length)"
@@ -229,6 +235,7 @@ def test_first_slips_and_bounds_of_friction_are_drawn(drawn: Visit) -> None:
     assert figure.evaluate(slips) == 5, "of the truth and of four runs"
 
 
+@pytest.mark.drill
 def test_the_contents_follow_the_reader(report_page: Path, visit: Visiting) -> None:
     """Wherever a reader is, the contents are in sight and mark the section that is being read."""
     with visit(report_page, before=UNDRAWN) as seen:

@@ -59,6 +59,7 @@ def ask(seen: Visit, decade: int, forces: bool) -> None:
     seen.wait(f"document.getElementById('choice').dataset.at === '{place}'")
 
 
+@pytest.mark.drill
 def test_everything_follows_the_question(seen: Visit, screen: FirstScreen) -> None:
     """Cells, frames, chips and advice are those of the answer at each tolerance; so with forces."""
     for decade, forces in [(DECADES.start, False), (6, False), (4, True), (4, False)]:
@@ -165,6 +166,7 @@ def test_the_question_is_in_the_address(two_kinds: Path, visit: Visiting) -> Non
         assert again.messages == []
 
 
+@pytest.mark.drill
 def test_facts_stand_above_the_cards(two_kinds: Path, everything: Any, visit: Visiting) -> None:
     """Agreement, silent errors, limits and statements of the paper are told of all scenes, or of the chosen kind."""
     kept = everything.content.kept()
@@ -279,6 +281,7 @@ def test_the_cells_are_one_stop_of_the_tab_key(seen: Visit) -> None:
     seen.page.locator("#tip").wait_for(state="hidden")
 
 
+@pytest.mark.drill
 def test_the_first_screen_is_there_without_a_program(report_page: Path, screen: FirstScreen, visit: Visiting) -> None:
     """Chips, cards, matrix and advice at the first tolerance are written; what needs a script is not shown."""
     with visit(report_page, java_script_enabled=False) as seen:
@@ -305,6 +308,7 @@ def test_the_matrix_can_be_had_as_a_file(seen: Visit) -> None:
     assert lines[1].startswith('"Alpha')
 
 
+@pytest.mark.drill_of("400", "1400")
 @pytest.mark.parametrize("width", [400, 900, 1400])
 def test_nothing_moves_while_the_page_loads(report_page: Path, visit: Visiting, width: int) -> None:
     """The first screen keeps its place while scripts start, and nothing scrolls sideways."""

@@ -68,6 +68,7 @@ def counted(load: Callable[..., Any], counts: Counter[str]) -> Callable[..., Any
     return loading
 
 
+@pytest.mark.drill
 def test_nothing_is_loaded_again_after_judging(
     install_engines: Callable[[Mapping[str, str]], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -109,6 +109,7 @@ def test_poison_would_be_felt(poisoned_page: Path, poison: Poison, tmp_path: Pat
             assert elements >= 1
 
 
+@pytest.mark.drill
 def test_everything_that_others_write_is_shown_as_it_is_written(
     report_page: Path, poisoned_page: Path, poison: Poison, visit: Visiting
 ) -> None:

@@ -133,6 +133,7 @@ def test_cells_can_be_read_without_colour(html: str) -> None:
         assert f'<span aria-hidden="true">{sign}</span><span class="vh">{verdict}</span>' in html
 
 
+@pytest.mark.drill
 def test_nothing_that_others_write_becomes_markup(made: tuple[Outcome, Store], parse: Any, unpack: Any) -> None:
     """Poison in every string is shown as text: no element, no handler, no end of a script."""
     poison = Poison()
@@ -172,6 +173,7 @@ def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, 
     )
 
 
+@pytest.mark.drill
 def test_the_largest_report_we_make_stays_small(made: tuple[Outcome, Store]) -> None:
     """Six points, 24 rows and 201 samples: what the default study has."""
     content = report_content([made[0]], COMMAND)

@@ -113,6 +113,7 @@ def truth_at(content: ReportContent, point: dict[str, float]) -> ReportedTruth:
     return next(entry for entry in evidence.truths if entry.point == point_name(point))
 
 
+@pytest.mark.drill
 def test_data_holds_events_onsets_and_their_verdicts(content: ReportContent) -> None:
     """Each run its events with brackets, each truth its conditioning; where friction has no bound, neither."""
     runs = runs_at(content, WELL)

@@ -64,6 +64,7 @@ def spin(body: Any, t: float) -> Any:
     return Rotation.from_euler("z", rate * t).apply(local)
 
 
+@pytest.mark.drill
 def test_the_true_ball_turns_as_its_spin_says(rolling: Any) -> None:
     """Frames between samples half a turn apart hold the orientation that the closed form's spin integrates to."""
     body, data = rolling
@@ -475,6 +476,7 @@ def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
     assert opened.messages == []
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("lacking", ["WebGL", "three.js"])
 def test_without_a_picture_the_values_follow_the_time(
     lacking: str, made: Any, content: ReportContent, tmp_path: Path, visit: Visiting

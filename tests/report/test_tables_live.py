@@ -47,6 +47,7 @@ def sort(live: Visit, name: str, wanted: str) -> None:
     assert head.get_attribute("aria-sort") == wanted
 
 
+@pytest.mark.drill
 def test_a_table_sorts_by_a_column(live: Visit) -> None:
     """By keys: settings keep their engine, errors sort as numbers, verdicts from best to worst and back."""
     settings = column(live, 0)
@@ -64,6 +65,7 @@ def test_a_table_sorts_by_a_column(live: Visit) -> None:
     assert live.messages == []
 
 
+@pytest.mark.drill
 def test_a_reason_goes_with_its_row(live: Visit) -> None:
     """The reason why there is no result stands in the row, in full, and is found by the filter."""
     assert "gamma is not installed here" in live.page.locator(f"{TABLE} tr[data-engine='gamma']").inner_text()
@@ -71,6 +73,7 @@ def test_a_reason_goes_with_its_row(live: Visit) -> None:
     live.wait(f'document.querySelectorAll("{TABLE} tbody tr").length === 1')
 
 
+@pytest.mark.drill
 def test_a_table_filters_by_words(live: Visit) -> None:
     """An engine, a verdict: the rows that have it are left; all come back."""
     box = live.page.get_by_label("Filter: Verdicts: An invented comparison")
@@ -79,6 +82,7 @@ def test_a_table_filters_by_words(live: Visit) -> None:
         live.wait(f'document.querySelectorAll("{TABLE} tbody tr").length === {found}')
 
 
+@pytest.mark.drill
 def test_a_table_downloads_as_csv(live: Visit, tmp_path: Path) -> None:
     """The file has the heads and each row, verdicts in words; it comes from the page itself."""
     with live.page.expect_download() as got:
@@ -149,6 +153,7 @@ def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, 
     assert {len(row) for row in rows} == {len(head)}
 
 
+@pytest.mark.drill
 def test_hidden_engines_stay_hidden_in_a_table_that_sorts(live: Visit) -> None:
     """The boxes of the first screen act on the rows of a table that has been taken apart."""
     live.page.locator("[name=engine][value=alpha]").uncheck()
@@ -159,6 +164,7 @@ def test_hidden_engines_stay_hidden_in_a_table_that_sorts(live: Visit) -> None:
     )
 
 
+@pytest.mark.drill
 def test_a_table_shows_that_it_has_columns_beyond_its_edge(report_page: Path, visit: Visiting) -> None:
     """The edge of a table that is wider than the screen fades until a reader has scrolled to its last column."""
     with visit(report_page, viewport={"width": 400, "height": 900}) as opened:

@@ -48,6 +48,7 @@ def written_page(report: Report) -> str:
     return page(report.content, report.curves, report.pictures)
 
 
+@pytest.mark.drill
 def test_every_part_of_the_default_report_is_found_in_its_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -77,6 +78,7 @@ def test_content_is_made_once_for_each_part(made: tuple[Outcome, Store]) -> None
     assert not before.further
 
 
+@pytest.mark.drill
 def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     """What agrees, what to use, why; each section is there, has a heading and says something."""
     elements = parse(written_page)
@@ -235,6 +237,7 @@ class Broken:
         return {prefix: ""}
 
 
+@pytest.mark.drill_of("error0")
 @pytest.mark.parametrize("error", [ProofrollError("there is no truth here"), ZeroDivisionError("by zero")])
 def test_a_part_that_fails_leaves_a_sentence(
     made: tuple[Outcome, Store], tmp_path: Path, parse: Any, error: Exception
@@ -266,6 +269,7 @@ def test_an_interrupted_part_takes_nothing_away(made: tuple[Outcome, Store], tmp
     assert content["comparisons"][0]["runs"]
 
 
+@pytest.mark.drill
 def test_what_is_kept_is_taken_and_what_is_outdated_is_not(tmp_path: Path) -> None:
     """The whole study before the brief one; none of another code; the map likewise."""
     tradeoff, stability = further()

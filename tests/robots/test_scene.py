@@ -83,6 +83,7 @@ def test_a_robot_moves_as_its_file_says(robot, name):
         assert found[at] == pytest.approx(want, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("name", FILES)
 def test_engines_follow_the_truth_of_a_robot(robot, name, monkeypatch):
     """MuJoCo, Pinocchio and Exudyn's constrained bodies move each robot as both routes of the truth, or refuse it.
@@ -106,6 +107,7 @@ def test_engines_follow_the_truth_of_a_robot(robot, name, monkeypatch):
                 )
 
 
+@pytest.mark.drill
 def test_a_joint_that_follows_another_is_coupled_to_it(robot):
     """A mimic of a URDF is a coupling that the truth and engines obey; couplings=0 leaves it out."""
     mimic = robot("mimic.urdf", urdf(third='<mimic joint="j1" multiplier="0.5" offset="0.1"/>'))
@@ -205,6 +207,7 @@ def test_an_element_outside_ascii(robot):
     assert len(load_scene(path).elements[0].mechanism.joints) == 3
 
 
+@pytest.mark.drill
 def test_a_robot_of_the_gallery():
     """The whole ur5 of a package falls in Pinocchio as the truth says."""
     pytest.importorskip("heyoka")

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from source_code import statements, tree
 
+pytestmark = pytest.mark.usefixtures("parsed_sources")
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("src", "benchmarks", "papers", "tests/drill", "tests/plugins", "examples/engines")
 # A clause or a phrase that hangs on a word which is not there.

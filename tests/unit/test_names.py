@@ -15,6 +15,7 @@ BARE = frozenset({
     "after", "along", "at", "before", "changed", "closed", "each", "first", "found", "given", "held", "here", "known",
     "never", "now", "one", "other", "own", "said", "still", "struck", "then", "there", "two", "wanted", "was", "where",
 })  # fmt: skip
+pytestmark = pytest.mark.usefixtures("parsed_sources")
 WORST = 0.1  # largest part of a folder's functions with such a name
 
 

@@ -57,6 +57,7 @@ def test_no_such_cause(proofroll: Proofroll, damped: Path) -> None:
     assert "write a list of causes" in " ".join(said.split())
 
 
+@pytest.mark.drill
 def test_what_an_engine_is_fed_without(proofroll: Proofroll, tmp_path: Path) -> None:
     """An engine without an importer does not make the command exit 1 by what it leaves out."""
     path = tmp_path / "arm.xml"
@@ -83,6 +84,7 @@ def test_notes_stand_below(proofroll: Proofroll, tmp_path: Path) -> None:
     assert out.index("warning: wheel") < out.index("joints mass") < out.index("note: gazebo")
 
 
+@pytest.mark.drill
 def test_where_it_differs(proofroll: Proofroll, tmp_path: Path) -> None:
     """A difference names the body or joint, the state, the value that is held and the true one."""
     path = tmp_path / "arm.xml"

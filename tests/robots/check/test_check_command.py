@@ -110,6 +110,7 @@ BAD_READERS = {
 }
 
 
+@pytest.mark.drill
 def test_bad_readers(proofroll: Proofroll, install_readers: Install, arm: Path) -> None:
     """An importer that crashes, raises or is mistaken is a row beside the others."""
     install_readers({name.lower(): name for name in BAD_READERS})
@@ -186,6 +187,7 @@ def test_nothing_moves(proofroll: Proofroll, tmp_path: Path) -> None:
     assert code == 0
 
 
+@pytest.mark.drill
 @pytest.mark.own_workers
 def test_who_compiles_a_file_also_reads_it(proofroll: Proofroll, tmp_path: Path, started_workers: list[str]) -> None:
     """The engine that defines the format is started once: for what the file means, and for what the engine holds."""

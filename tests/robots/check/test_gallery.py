@@ -49,7 +49,6 @@ def test_as_expected(name: str) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.drill
 def test_all_as_expected() -> None:
     """Every robot of an installed package does in every installed engine what the gallery expects."""
     unexpected, checked = {}, 0

@@ -59,6 +59,7 @@ def test_orders_of_a_robot_of_a_package() -> None:
         assert words in first.causes[0].sentence
 
 
+@pytest.mark.drill
 def test_sizes_are_fitted() -> None:
     """Sizes of gains, limits, scale and armature come back to three digits and more."""
     for attribute, factor in (("kp", 0.37), ("kd", 1.73), ("scale", 0.61), ("limit", 0.7), ("armature", 0.33)):
@@ -68,6 +69,7 @@ def test_sizes_are_fitted() -> None:
         assert cause.size == pytest.approx(factor, rel=1e-6)
 
 
+@pytest.mark.drill
 def test_implicit_damping_is_no_armature() -> None:
     """A record with implicit kd holds at two steps; an armature of h kd in an explicit one is named as an armature."""
     for step in (1e-3, 2e-3):
@@ -80,6 +82,7 @@ def test_implicit_damping_is_no_armature() -> None:
     assert [item.id for item in next(layer for layer in layers if not layer.holds).causes][:1] == ["armature"]
 
 
+@pytest.mark.drill
 def test_implicit_damping_and_an_armature_are_named_together() -> None:
     """Where no effort is clamped, one step cannot tell implicit kd from an armature h kd: both are named."""
     law = LAW.change(limit=np.full(len(LAW.joints), 100.0))
@@ -238,6 +241,7 @@ def test_rates_that_are_not_there_are_not_early() -> None:
     assert reading.layer.causes[0].sentence.startswith("v_WB: one row early")
 
 
+@pytest.mark.drill
 def test_the_fewest_causes_tell_the_importer() -> None:
     """Of robots that importers make, the one that needs no further cause is named, though another comes before it."""
     masses = [(1.2 if k % 2 else 0.8) * body.mass for k, body in enumerate(ROBOT.bodies)]
@@ -252,6 +256,7 @@ def test_the_fewest_causes_tell_the_importer() -> None:
     assert [cause.id for cause in layer.causes] == ["right"]
 
 
+@pytest.mark.drill
 def test_assumed_steps_decide_nothing() -> None:
     """What steps between the rows may explain is not decided where rows are steps only by the usual step."""
     record = recorded(ROBOT, LAW, LAW, scheme="rk4", step=2e-3, count=50)

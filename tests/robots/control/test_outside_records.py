@@ -55,7 +55,7 @@ QUICK = {
 }
 _DRILL = (pytest.mark.drill, pytest.mark.slow)
 ALL = [
-    pytest.param(*case, marks=() if case in QUICK else (*_DRILL, pytest.mark.nightly) if case[1] else _DRILL)
+    pytest.param(*case, marks=() if case in QUICK else pytest.mark.nightly if case[1] else _DRILL)
     for case in ((program, digits, name) for program in PROGRAMS for digits in ("", "single", "3") for name in MISTAKES)
     if case[1] != "3" or case[2] not in FINE
 ]
@@ -111,6 +111,7 @@ def test_a_right_record_of_another_program_holds(program: str, digits: str, judg
         assert all(layer.residual is not None and layer.residual < 1e-9 for layer in layers)
 
 
+@pytest.mark.drill_of("pinocchio-single-xyzw")
 @pytest.mark.parametrize(("program", "digits", "name"), ALL)
 def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: str, judged: Judged) -> None:
     """A mistake in a loop around another program stops at its layer and is named; a limit is that of the URDF."""
@@ -118,6 +119,7 @@ def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: 
     require_first(judged(recorded(name, program), digits), layer, cause)
 
 
+@pytest.mark.drill_of("first for last-pinocchio")
 @pytest.mark.parametrize(
     ("name", "program"),
     [
@@ -134,6 +136,7 @@ def test_numbers_of_single_joints_are_named(name: str, program: str, judged: Jud
     assert words in "\n".join(judgement.lines())
 
 
+@pytest.mark.drill_of("sign of spins")
 @pytest.mark.parametrize(
     "name",
     [
@@ -166,6 +169,7 @@ def test_a_lag_that_no_digit_shows_is_left_open(judged: Judged) -> None:
     assert "the digits of the record do not tell whether" in judgement.remarks[0]
 
 
+@pytest.mark.drill
 def test_rates_whose_rows_are_told_are_not_left_open(judged: Judged) -> None:
     """Rates that are called a row early are not called untold beside that."""
     judgement = judged(columns_of(miswritten(Loop().record(PROGRAMS["pinocchio"]), "early velocities")), "2")
@@ -236,6 +240,7 @@ def test_a_limit_that_is_never_reached_has_a_bound(judged: Judged) -> None:
     assert float(bound[1]) == pytest.approx(largest / 0.8, rel=1e-3)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("name", OF_OBSERVATIONS)
 def test_a_mistake_of_an_observation_shows_in_actions(name: str, judged: Judged) -> None:
     """Where no observation is recorded, its mistakes are named at the action."""
@@ -243,6 +248,7 @@ def test_a_mistake_of_an_observation_shows_in_actions(name: str, judged: Judged)
     require_first(judged(columns), "action", MISTAKES[name][0])
 
 
+@pytest.mark.drill_of("payload")
 @pytest.mark.parametrize("name", ["damping", "dry friction", "payload"])
 def test_what_no_file_has_is_named_with_what_it_explains(name: str, judged: Judged) -> None:
     """Damping, dry friction and a payload are named at the accelerations with their sizes, and close them."""
@@ -253,6 +259,7 @@ def test_what_no_file_has_is_named_with_what_it_explains(name: str, judged: Judg
     assert layer.causes[0].after < 1e-6 < layer.residual  # type: ignore[operator]
 
 
+@pytest.mark.drill
 def test_a_payload_shows_in_states_alone(judged: Judged) -> None:
     """A payload is named with its mass and place from states alone."""
     judgement = judged(only(recorded("payload")))
@@ -350,6 +357,7 @@ def test_states_of_a_record_that_begins_later(
     assert said in " ".join(out.split())
 
 
+@pytest.mark.drill
 def test_a_record_with_names_and_units_of_its_own(proofroll: Proofroll, legs: list[str], tmp_path: Path) -> None:
     """Columns of another program are named by ``--map``; milliseconds, degrees and axes of the base are converted.
 

@@ -58,6 +58,7 @@ def record(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> Callable[..
     return made
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("program", "name", "base"),
     [
@@ -108,6 +109,7 @@ def test_a_probe_that_is_there_says_what_to_do(proofroll: Proofroll) -> None:
     assert "'probe_arm_mujoco.py': this file is there already; remove or move it, or run the command in" in err
 
 
+@pytest.mark.drill
 def test_a_controller_and_a_ref_do_not_meet(proofroll: Proofroll, record: Callable[..., list[str]]) -> None:
     """Arrays count from `ref` and a controller from the file's pose: both together are refused in one line."""
     Path("stand.toml").write_text('rate = 50\n[[gains]]\njoints = "*"\nkp = 5\n')
@@ -124,6 +126,7 @@ def test_a_probe_of_an_mjcf(proofroll: Proofroll, record: Callable[..., list[str
     assert np.abs(hip).max() < np.radians(40)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("masses", [(2.1, 2.121), (2.1, 2.079)])
 def test_a_link_on_a_fixed_axis(
     masses: tuple[float, float], proofroll: Proofroll, record: Callable[..., list[str]]

@@ -43,6 +43,7 @@ def arrays(name: str, folder: Path) -> Path:
     return folder / f"{name}.npz"
 
 
+@pytest.mark.drill_of("defaults")
 @pytest.mark.parametrize("name", NAMED)
 def test_columns_are_explained(name: str) -> None:
     """Columns under our names: each setting that PyBullet's user left is named, and nothing besides."""
@@ -50,6 +51,7 @@ def test_columns_are_explained(name: str) -> None:
     assert named(judgement) == NAMED[name], "\n".join(judgement.lines())
 
 
+@pytest.mark.drill_of("air", "motors", "servos")
 @pytest.mark.parametrize("name", [name for name in NAMED if name != "defaults"])
 def test_arrays_of_pybullet_have_its_frame(name: str, tmp_path: Path) -> None:
     """Arrays under PyBullet's names: the frame of its base is no mistake, and the rest is named as before."""
@@ -58,6 +60,7 @@ def test_arrays_of_pybullet_have_its_frame(name: str, tmp_path: Path) -> None:
     assert judgement.looked_at
 
 
+@pytest.mark.drill
 def test_degrees_keep_the_frame_of_the_base(tmp_path: Path) -> None:
     """Arrays with joints in degrees are held against the robot with PyBullet's frame of the base, which is exact."""
     robot = tmp_path / "floater.urdf"
@@ -70,6 +73,7 @@ def test_degrees_keep_the_frame_of_the_base(tmp_path: Path) -> None:
     assert named(judgement) == [("state", "degrees")], "\n".join(judgement.lines())
 
 
+@pytest.mark.drill
 def test_searches_of_a_record_share_one_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """All searches of a record have one time, and one that ended among importers is told."""
     ends: list[float] = []
@@ -87,6 +91,7 @@ def test_searches_of_a_record_share_one_time(monkeypatch: pytest.MonkeyPatch) ->
     assert "the search for robots as importers read it ended after" in layer.reason
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("known", [False, True])
 def test_steps_that_are_assumed_are_told(known: bool, tmp_path: Path) -> None:
     """Where forces differ and the file has no ``sim_dt``, the answer says that PyBullet's usual step was assumed."""

@@ -77,6 +77,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.drill_of("many links", "many elements")
 @pytest.mark.parametrize("name", HOSTILE)
 def test_one_line(name: str, tmp_path: Path) -> None:
     """A file that is broken, endless or reaches outside is refused in one line that says what is wrong."""

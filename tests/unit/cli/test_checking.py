@@ -165,6 +165,7 @@ friction = 0.3
     assert lines[0] - lines[1] >= 12
 
 
+@pytest.mark.drill_of("accuracy")
 @pytest.mark.parametrize("path", sorted(COMPARISONS.glob("*.toml")), ids=lambda path: path.stem)
 def test_every_study_is_sound(proofroll: Proofroll, path: Path) -> None:
     """Each file of a study of the package passes with one sentence, whatever it is for."""

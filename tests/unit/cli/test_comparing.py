@@ -147,6 +147,7 @@ def test_a_first_look_stays_within_its_budget(
     assert {row["verdict"] for row in content["rows"]} == {"agrees"}
 
 
+@pytest.mark.drill
 def test_rows_that_exist_are_shown_where_a_comparison_is_interrupted(
     tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

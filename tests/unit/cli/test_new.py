@@ -25,6 +25,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return place
 
 
+@pytest.mark.drill
 def test_a_scene(proofroll: Proofroll) -> None:
     """A new scene is sound, and the truth covers it."""
     assert proofroll("new", "scene", "rod")[0] == 0
@@ -34,6 +35,7 @@ def test_a_scene(proofroll: Proofroll) -> None:
     assert '"status": "done"' in out
 
 
+@pytest.mark.drill_of("sphere_in_cylinder")
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "./rod"])
 def test_a_comparison(
     command_line: Proofroll, install_engines: Callable[[Mapping[str, str]], None], scene: str

@@ -71,6 +71,7 @@ def test_a_page_has_the_curves_that_are_furthest_off(proofroll: Proofroll, tmp_p
     assert {title.partition(" [")[0] for title in curves_of(tmp_path / "alone.html")} == set(names_of_curves(dataset))
 
 
+@pytest.mark.drill
 def test_json_says_what_was_written(proofroll: Proofroll, tmp_path: Path) -> None:
     """With --json the paths of the files stand in the document."""
     run, picture = tmp_path / "run.nc", tmp_path / "run.html"
@@ -130,6 +131,7 @@ def test_a_run_in_motion(proofroll: Proofroll, tmp_path: Path, words: list[str],
     assert case["label"] == ("speed=3" if "--set" in words else case["scene"])
 
 
+@pytest.mark.drill
 def test_elements_in_motion(proofroll: Proofroll, tmp_path: Path) -> None:
     """Of a scene of several elements each is a case of its own, with its truth and its part of the run."""
     (tmp_path / "mixed").mkdir()

@@ -98,6 +98,7 @@ def test_a_box_that_lands_flat_bounces_as_one() -> None:
     assert len({replace(item, name="") for item in found}) == 1
 
 
+@pytest.mark.drill
 def test_an_engine_has_bounces_by_its_samples() -> None:
     """Energies and heights of an engine's run follow from its samples, near those of the truth."""
     scene = load_scene("spinning_bounce")

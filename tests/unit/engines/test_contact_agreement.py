@@ -115,6 +115,12 @@ def scene_of(name: str, mechanism: Mechanism) -> Scene:
     return Scene(name, "", (MechanismElement(mechanism),))
 
 
+@pytest.mark.drill_of(
+    "box-pinocchio[formulation=impulses,dt=1e-4]-0.09-0.0002",
+    "cylinder-mujoco[formulation=geoms,preset=tuned,dt=1e-4]-0.09-0.0002",
+    "capsule-pinocchio[formulation=impulses,dt=1e-4]-0.09-0.0002",
+    "two capsules-mujoco[formulation=geoms,preset=tuned,dt=1e-4]-0.09-0.0002",
+)
 @pytest.mark.parametrize(
     ("name", "engine", "until", "largest"),
     [*AGREE, *(pytest.param(*drill, marks=pytest.mark.drill) for drill in DRILLS)],

@@ -66,6 +66,7 @@ def test_three_feet_at_rest_share_the_weight_by_their_levers(setting: str, place
     np.testing.assert_allclose(run.sample().contact_force[:, 2], N, rtol=part)
 
 
+@pytest.mark.drill_of("pinocchio impulses tuned")
 @pytest.mark.parametrize("setting", ["pinocchio impulses tuned", "mujoco geoms tuned"])
 def test_rows_that_turn_leave_no_contact_open(setting: str) -> None:
     """The foot of a rod that falls presses in every step, though its rows turn by several times gravity's pull."""
@@ -96,6 +97,7 @@ def test_a_joint_holds_without_creep_and_tells_its_friction(setting: str) -> Non
         assert sample.joint_force is None or sample.joint_force[0, 2] == pytest.approx(force, abs=1e-6)
 
 
+@pytest.mark.drill_of("projection dependent matched-1e-10-1e-09-0.5")
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize(
     ("setting", "place", "load"),

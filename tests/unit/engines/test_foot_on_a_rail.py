@@ -61,6 +61,7 @@ def happened(path: Path, *expected: str, at: float) -> None:
     assert [event.time for event in path.events] == pytest.approx([at] * len(expected), abs=1e-12)
 
 
+@pytest.mark.drill_of("by_truth")
 @BOTH
 def test_friction_of_a_joint_and_of_a_contact_stop_a_foot(follow: Follow) -> None:
     """A rail and a floor that rub together slow a foot by the sum of their frictions, and hold it where it stops."""

@@ -61,6 +61,7 @@ def climbing(static: float | None) -> Scene:
     return Scene("climbing", "", (MechanismElement(parts),))
 
 
+@pytest.mark.drill
 def test_static_friction_holds_what_kinetic_would_not() -> None:
     """A foot that slid up a slope stays with more static friction, else it slides back; the projection agrees."""
     ends = {}

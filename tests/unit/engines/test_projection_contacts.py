@@ -349,6 +349,7 @@ def test_a_ball_that_rolls_across_a_slope_begins_to_slip_down_it() -> None:
     assert run.sample().v_WB[0] == pytest.approx([0.1 * pull * normal[2], -speed, -0.1 * pull * normal[0]], abs=1e-9)
 
 
+@pytest.mark.drill
 def test_corners_of_a_face_land_together() -> None:
     """A box that falls from an edge back onto its face comes to rest by one impact of the other two corners."""
     tilt, half = 0.1, np.array([0.2, 0.1, 0.1])

@@ -34,7 +34,7 @@ SCENES = ("pendulum", "double_pendulum", "free_body")
 TIMES = np.linspace(0, 1, 21)
 # Round-off that is told of runs with some noise, which is as large as has been seen beside it.
 SCATTER = 16
-_NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
+_NIGHTLY = pytest.mark.nightly
 
 
 def first_lie(name: str, **changes: Any) -> str | None:
@@ -70,6 +70,7 @@ def test_another_precision_is_one_line() -> None:
         precision_of(SimpleNamespace(precision="half"))
 
 
+@pytest.mark.drill_of("double_pendulum")
 @pytest.mark.parametrize("name", SCENES)
 def test_errors_stay_errors(name: str) -> None:
     """Places are judged with the error that 24 bits leave, above that of doubles, and agree to a thousandth."""
@@ -204,7 +205,6 @@ def test_a_comparison_tells_precision_and_floor(
     assert ", f32, dt 1e-3 s reached 0.01 s" in out
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @pytest.mark.usefixtures("single")
 def test_a_tradeoff_tells_the_best_step(command_line: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:

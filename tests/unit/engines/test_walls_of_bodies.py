@@ -156,6 +156,7 @@ def test_a_ball_at_the_centre_of_a_bowl_falls(setting: str) -> None:
     assert run.sample().p_WB[0] == pytest.approx([0, 0, -GRAVITY * 0.1**2 / 2], abs=GRAVITY * 0.1 * 1e-3)
 
 
+@pytest.mark.drill_of("bowl-0.001-4e-06")
 @pytest.mark.parametrize(
     ("name", "resistance", "error"),
     [

@@ -84,6 +84,7 @@ def test_a_ball_on_a_driven_wall_moves_as_the_truth_says(engine: str, name: str,
     assert max(drive, errors["contact_forces"]) < push
 
 
+@pytest.mark.drill_of("projection")
 @pytest.mark.parametrize("engine", [ENGINES[0], "pinocchio[formulation=impulses,dt=2e-3]", "projection"])
 def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
     """It gains mu g until it has the belt's speed; the drive pulls with mu m g, and then with nothing."""
@@ -138,6 +139,7 @@ def test_exudyns_triangle_of_a_moving_plane_follows_a_sphere_that_goes_far() -> 
     np.testing.assert_allclose(place, [0.4, 0.0, 0.03], atol=1e-6)  # m; it fell by 25 mm beside the triangle
 
 
+@pytest.mark.drill_of("0.1")
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
 def test_the_projection_solver_rolls_a_ball_on_a_driven_table(tilt: float) -> None:
     """Path, forces and slip on a plane that a motion turns are the truth's to round-off."""

@@ -160,6 +160,7 @@ def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
         Store(tmp_path / "cases")
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("there", [False, True])
 def test_a_wrong_name_leaves_no_folder(tmp_path: Path, there: bool) -> None:
     """A command that ends before anything is stored takes the folders away that it made, and no others."""
@@ -230,6 +231,7 @@ def test_a_trajectory_that_is_not_there(tmp_path: Path, make_case: MakeCase) -> 
     assert not store.has(case)
 
 
+@pytest.mark.drill
 def test_two_writers_and_a_reader(tmp_path: Path, make_case: MakeCase) -> None:
     """Whoever looks while two runs replace the same result finds one of both, whole, and never none."""
     case = make_case("oracle")

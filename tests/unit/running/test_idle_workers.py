@@ -23,6 +23,7 @@ def process(worker: Worker) -> int:
     return int(worker._process.pid)
 
 
+@pytest.mark.drill
 def test_a_worker_is_kept_for_its_engine() -> None:
     """The same process answers for the same engine again, and never for another."""
     workers = Workers()

@@ -46,6 +46,7 @@ def case_in(python: Path, workers: Workers | None = None) -> Case:
     return single_case("sphere_in_cylinder", {}, f"aged@{python}", workers=workers, **SHORT)  # type: ignore[arg-type]
 
 
+@pytest.mark.drill
 def test_an_engine_runs_where_its_name_says(
     old: Path, new: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -102,6 +103,7 @@ def test_an_environment_that_changed_is_a_row(old: Path, tmp_path: Path) -> None
     assert "there is no" in by_status[Status.MISSING]
 
 
+@pytest.mark.drill
 def test_another_scene_there_is_a_row(old: Path, tmp_path: Path) -> None:
     """A case whose scene reads otherwise where the engine runs is no result."""
     case = Case(**{**vars(case_in(old)), "scene_digest": "other"})
@@ -110,6 +112,7 @@ def test_another_scene_there_is_a_row(old: Path, tmp_path: Path) -> None:
     assert "is another scene where" in result.message
 
 
+@pytest.mark.drill
 def test_a_worker_that_echoes_another_version_is_no_result(old: Path, tmp_path: Path) -> None:
     """What ran is compared with what had answered, also on this side of the pipe."""
     case = case_in(old)
@@ -131,6 +134,7 @@ def writes(text: str) -> Callable[[Path], Path]:
     return lambda folder: script(folder / "program", text)
 
 
+@pytest.mark.drill_of("too-old")
 @pytest.mark.parametrize(
     ("make", "error", "says"),
     [
@@ -182,6 +186,7 @@ def test_another_proofroll_is_not_trusted(tmp_path: Path) -> None:
     assert "has other code of proofroll" in str(found)
 
 
+@pytest.mark.drill
 def test_noise_is_not_an_answer(tmp_path: Path) -> None:
     """A Python that prints when it starts serves nevertheless."""
     python = seeing(tmp_path / "venv", "1.0")

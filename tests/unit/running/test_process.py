@@ -154,6 +154,7 @@ def test_a_flood_does_not_outlast_the_limit(pretend: Pretend) -> None:
     assert died(time_limit=0.3).status is Status.TIMEOUT
 
 
+@pytest.mark.drill
 def test_too_much_memory(pretend: Pretend) -> None:
     """A worker whose memory grows is ended, and the sentence says how much it was allowed."""
     pretend("""
@@ -252,6 +253,7 @@ def crowded() -> Iterator[int]:
         other.wait()
 
 
+@pytest.mark.drill
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not count waiting")
 def test_time_in_which_others_had_the_processor_does_not_count(pretend: Pretend, crowded: int) -> None:
     """A worker that needs half of its limit in seconds of the processor answers, however many compute beside it."""
@@ -267,6 +269,7 @@ def test_time_in_which_others_had_the_processor_does_not_count(pretend: Pretend,
         assert worker.ask({"do": "nothing"}, 0.4)["took"] > 0.4
 
 
+@pytest.mark.drill
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not count waiting")
 def test_who_computes_without_end_is_ended_beside_others_too(pretend: Pretend, crowded: int) -> None:
     """The limit of time is met by a worker that shares its processor: it is only met later."""

@@ -53,6 +53,7 @@ OUTCOMES = {
 }
 
 
+@pytest.mark.drill
 def test_each_engine_costs_its_own_case_alone(tmp_path: Path, make_case: MakeCase) -> None:
     """An exception, NaN, an engine that gives up, refuses or is lacking: each costs one case, said in a sentence."""
     cases = {name: make_case(name) for name in OUTCOMES}
@@ -69,6 +70,7 @@ def test_each_engine_costs_its_own_case_alone(tmp_path: Path, make_case: MakeCas
         assert dataset.sizes["time"] == (3 if results[cases[name].key].status is Status.DONE else 2)
 
 
+@pytest.mark.drill
 def test_stored_results_are_reused(tmp_path: Path, make_case: MakeCase) -> None:
     """What is there is not run again; ``fresh`` runs it again; a crash is never reused."""
     cases = [make_case("oracle"), make_case("refuses"), make_case("exits")]
@@ -229,6 +231,7 @@ def test_manifest(tmp_path: Path, make_case: MakeCase) -> None:
     assert all(line["holds"] for line in result.certificate)
 
 
+@pytest.mark.drill
 def test_manifest_of_the_truth(tmp_path: Path, make_case: MakeCase) -> None:
     """The truth's file says how it was made as an engine's does, and carries its error bars."""
     facts = resolve([("truth", {})])[0]
@@ -292,6 +295,7 @@ def test_resolve_gives_each_answer_in_its_place() -> None:
     assert found[0].resolution == "dt"
 
 
+@pytest.mark.drill
 @pytest.mark.own_workers
 def test_code_hash_follows_the_adapter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A change in the adapter's file changes the hash, so that no stored result outlives it."""

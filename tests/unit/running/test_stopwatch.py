@@ -25,6 +25,7 @@ def test_what_is_measured_is_a_run_of_the_case(install_engines: Callable[[Mappin
     assert cost >= 1.0, "it sleeps for a second in each simulated one; on a busy machine it may take longer"
 
 
+@pytest.mark.drill
 def test_what_cannot_be_built_has_no_speed() -> None:
     """An engine that refuses the scene gives None, and the stopwatch goes on with other cases."""
     refused = single_case(
@@ -36,6 +37,7 @@ def test_what_cannot_be_built_has_no_speed() -> None:
         assert [stopwatch(case, 0.01) is None for case in (refused, broken, good)] == [True, True, False]
 
 
+@pytest.mark.drill
 def test_a_fast_case_is_measured_as_long_as_a_slow_one(install_engines: Callable[[Mapping[str, str]], None]) -> None:
     """A run of a fraction of a millisecond is repeated as often as it takes, not twenty times."""
     install_engines({"tiny": "tiny:Tiny"})

@@ -117,6 +117,7 @@ def test_all_of_an_engines_package_decides_its_key(tmp_path: Path, monkeypatch: 
     assert identity.resolve("theirs", {})["code"] != before
 
 
+@pytest.mark.drill
 def test_what_a_plug_in_of_one_file_imports_decides_its_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A change of a module that an engine of one file imports, at any depth, outdates its results."""
     files = {

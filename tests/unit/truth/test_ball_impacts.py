@@ -46,6 +46,7 @@ def test_infinitely_many_bounces(e: float, height: float) -> None:
     assert settles.time_low <= rests <= settles.time_high
 
 
+@pytest.mark.drill
 @pytest.mark.arithmetic
 def test_an_impact_at_the_end_is_not_among_the_events() -> None:
     """An impact at the last sample, to the last digit, is left out by any arithmetic; one clearly before is told."""

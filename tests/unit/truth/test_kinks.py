@@ -26,6 +26,7 @@ def slider(law="", at=0.0, v0=1.0, mass=1.0, **more):
     return Mechanism((Body("m", mass),), (joint,), springs=springs, gravity=(0, 0, 0), **more)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("compiled", [True, pytest.param(False, marks=pytest.mark.drill)])
 def test_a_spring_with_two_stiffnesses_swings_through_its_kink(compiled, monkeypatch):
     """K = 4 N/m for pull and 1 N/m for push: half swings of pi/2 s and pi s, whatever integrates them."""

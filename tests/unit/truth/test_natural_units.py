@@ -51,6 +51,7 @@ DEAR = (("flick", 0.15), ("spinning_bounce", 0.4), ("sled", 0.65), ("spring_fric
 
 
 # Under other kinds of arithmetic the dear ones are made smaller and heavier alone.
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("scene", "until", "scale"),
     [
@@ -65,7 +66,7 @@ DEAR = (("flick", 0.15), ("spinning_bounce", 0.4), ("sled", 0.65), ("spring_fric
                 *((*case, SMALL_AND_HEAVY) for case in DEAR),
             )
         ),
-        *(pytest.param(*case, LARGE_AND_LIGHT, marks=[pytest.mark.drill, pytest.mark.nightly]) for case in DEAR[::2]),
+        *(pytest.param(*case, LARGE_AND_LIGHT, marks=pytest.mark.nightly) for case in DEAR[::2]),
     ],
 )
 def test_a_scene_of_another_size_has_the_same_events(

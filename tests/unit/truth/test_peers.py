@@ -17,7 +17,7 @@ from proofroll_drill.published import of_motion, of_scene, run_of, tables, true_
 QUICK = {"falling_screw"}
 # Those whose truths take longest.
 NIGHTLY = {"spatial_slider_crank", "car_axis"}
-MARKS = {True: (pytest.mark.drill, pytest.mark.nightly), False: pytest.mark.drill}
+MARKS = {True: pytest.mark.nightly, False: pytest.mark.drill}
 BARS = 1e-10  # s, and units of values: 1e-12 is seen
 # Meijaard, Papadopoulos, Ruina, Schwab 2007: the roots at 5 m/s.
 ROOTS = np.array([-14.0783896927982, -0.3228664296, -0.7753418818 - 4.4648677130j, -0.7753418818 + 4.4648677130j])

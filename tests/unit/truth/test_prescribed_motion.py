@@ -26,6 +26,7 @@ def shaken(motion: Signal) -> Mechanism:
     return replace(mechanism, joints=(replace(base, motion=motion, q0=(), v0=()), replace(hinge, damping=0.01)))
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("table", [pytest.param(False, marks=pytest.mark.drill), True])
 def test_a_shaken_pendulum_is_that_of_its_equation(table: bool) -> None:
     """Angle, place of the base and force of the drive are those of the pendulum's equation by another solver."""
@@ -109,6 +110,7 @@ def four_bar_moment(times: Array) -> Array:
     return moment
 
 
+@pytest.mark.drill
 def test_inverse_dynamics_through_a_loop_is_virtual_power() -> None:
     """The moment that drives a closed linkage is what links take, each by its own acceleration, over the speed."""
     times = np.array([0.0, 0.07, 0.31, 0.5])
@@ -145,6 +147,7 @@ def test_a_ball_follows_a_plate_that_shakes_until_it_would_pull() -> None:
     assert abs(event.time - leaves) <= 1e-12
 
 
+@pytest.mark.drill
 def test_a_belt_drags_a_ball_until_it_rolls() -> None:
     """On a belt that moves at v a ball slides with μ g until its place of contact has the belt's speed."""
     mechanism, mu, speed = on_a_moved_plate("prismatic", (1, 0, 0), "0.7*t"), 0.4, 0.7
@@ -176,6 +179,7 @@ def test_friction_and_stops_beside_a_motion_switch_alike() -> None:
     assert np.abs(run["drive.shaker"].to_numpy() - truth.record.named[:, 0])[1:].max() < 1e-8
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("angle", [0.3, pytest.param(3.0, marks=pytest.mark.drill)])
 def test_a_motion_that_leaves_nothing_free_holds_its_laws(angle: float) -> None:
     """Where all is prescribed no state bounds the steps, and yet each law is held over the whole turn."""

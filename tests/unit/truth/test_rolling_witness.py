@@ -58,6 +58,7 @@ def test_truth_of_a_ball_agrees_with_rolling_rows() -> None:
     assert not outside(true, found, {str(name): str(name) for name in true.data_vars if name in found})
 
 
+@pytest.mark.drill
 def test_numbers_and_series_agree() -> None:
     """DOP853 on the same rows, projected after each step, moves the ball as the series do."""
     pytest.importorskip("heyoka")
@@ -68,6 +69,7 @@ def test_numbers_and_series_agree() -> None:
     assert one.residual.max() < 1e-12
 
 
+@pytest.mark.drill
 def test_truth_of_a_mixed_scene_agrees_with_rolling_rows() -> None:
     """A ball in a cylinder beside a pendulum, in one system of equations, is within the bars of the truth of each."""
     pytest.importorskip("heyoka")

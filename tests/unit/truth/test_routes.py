@@ -69,6 +69,7 @@ SHORT = {
 }
 
 
+@pytest.mark.drill_of("bricard", "chain")
 @pytest.mark.parametrize("name", SHORT)
 def test_both_routes_agree(scene, name):
     """Motion within 1e-11 m and 1, and every determinate component of every reaction."""

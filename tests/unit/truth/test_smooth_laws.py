@@ -40,6 +40,7 @@ def test_a_wrong_load_of_one_route_is_refused_from_the_start(scene, monkeypatch)
         find_truth(mechanism, TIMES)
 
 
+@pytest.mark.drill
 def test_turns_of_a_fast_wheel_are_counted_in_each_route(scene):
     """A rotor that an elbow turns 50 times as fast holds the law of its gear in both routes, whole turns included."""
     assert find_truth(scene("arm_rotor", elbow=0.8), np.array([0.0, 0.2, 0.4])).laws.startswith("holds ")
@@ -55,6 +56,7 @@ def test_a_body_at_rest_beside_one_that_swings_holds_the_laws():
     assert find_truth(mechanism, TIMES).laws.startswith("holds ")
 
 
+@pytest.mark.drill
 def test_a_mass_on_a_strut_is_known_however_far_its_samples_are_apart():
     """From one sample to the next the strut may turn so far that its rows do not tell a singular pose between."""
     angle, r = np.radians(80.0), 1.0

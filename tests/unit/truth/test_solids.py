@@ -94,6 +94,7 @@ def top(kind: Any) -> Geometry:
     return Geometry("solid", "world", kind, position=turned((0, 0, -0.5)), **TOP[kind])  # type: ignore[arg-type]
 
 
+@pytest.mark.drill_of("0.0-cylinder", "inf-box")
 @pytest.mark.parametrize("kind", TOP)
 @pytest.mark.parametrize("friction", [0.0, np.inf])
 def test_a_ball_leaves_an_edge_where_its_load_ends(kind: Any, friction: float) -> None:
@@ -111,6 +112,7 @@ def test_a_ball_leaves_an_edge_where_its_load_ends(kind: Any, friction: float) -
     assert at[0] == pytest.approx(0.5 + RADIUS * np.sqrt(1 - cosine**2), abs=1e-12)
 
 
+@pytest.mark.drill
 def test_a_ball_on_a_face_moves_as_on_a_plane() -> None:
     """On a face of a box, which it does not leave, it slides, spins and rolls as on a plane."""
     plane = Geometry("solid", "world", "plane", normal=turned((0, 0, 1)))
@@ -151,6 +153,7 @@ def rods(shapes: tuple[Geometry, Geometry], friction: float = 0.3) -> Mechanism:
     return Mechanism(bodies, joints, gravity=(0, 0, 0), geometries=shapes, pairs=(pair,))
 
 
+@pytest.mark.drill
 def test_two_capsules_strike_as_two_balls_at_their_nearest_points() -> None:
     """Where sides that cross touch, the impact with friction is that of two balls there, and it stays in momentum."""
     sides = (
@@ -177,6 +180,7 @@ def test_two_capsules_strike_as_two_balls_at_their_nearest_points() -> None:
     np.testing.assert_allclose(momentum[0], momentum[1], rtol=0, atol=1e-13)
 
 
+@pytest.mark.drill
 def test_a_capsule_without_length_is_a_ball() -> None:
     """A ball rolls over a capsule of a length of round-off, across its side, as over a ball of its radius."""
     shapes = (
@@ -226,6 +230,7 @@ def test_a_box_on_a_box_rests(size: Any, below: Any, closed: tuple[int, ...]) ->
     assert set(np.flatnonzero(loose)) <= set(closed)
 
 
+@pytest.mark.drill
 def test_a_capsule_rests_on_a_face() -> None:
     """Both ends bear half of its weight."""
     across = replace(ROD, axis=(0, 1, 0))
@@ -285,6 +290,7 @@ def test_a_rod_that_slides_over_a_rim_tips_on_it_and_leaves_by_its_end() -> None
     np.testing.assert_allclose(place[:, [0, 2]], over_the_rim(since, ACROSS)[:, :2], rtol=0, atol=1e-11)
 
 
+@pytest.mark.drill
 def test_edges_that_cross_rebound_from_each_other() -> None:
     """An edge below that falls across an edge above rebounds by its restitution, v' = -e v, without turning."""
     across = Rotation.from_rotvec([np.pi / 4, 0, 0])
@@ -305,6 +311,7 @@ def test_edges_that_cross_rebound_from_each_other() -> None:
     assert np.abs(found.record.w_WB[-1]).max() < 1e-11
 
 
+@pytest.mark.drill
 def test_a_box_that_meets_a_side_rebounds_from_it() -> None:
     """Faces that come to meet are those of the sides: a box that flies at the side of another one comes back."""
     found = followed(on_box((0.15, 0, -0.1), (-1.0, 0, 0.3), restitution=0.6), [0.0, 0.06])

@@ -79,6 +79,7 @@ def test_an_impact_that_presses_two_stops_has_no_unique_outcome() -> None:
     assert found.record.q[:, 1] == pytest.approx([0.0, -0.05], abs=TIGHT)
 
 
+@pytest.mark.drill
 def test_impacts_of_two_masses_that_accumulate_are_summed() -> None:
     """Two masses that fall on a stop and on each other hit without end in finite time, and then rest."""
     joints = (
@@ -129,6 +130,7 @@ def test_rebounds_on_a_guide_that_rubs_come_to_rest_too() -> None:
     assert found.record.q[-1, 0] == 0.0
 
 
+@pytest.mark.drill_of("0.7-0.1-6")
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(("restitution", "impacts"), [(0.1, 6), (0.01, 3), (0.001, 2)])
 @pytest.mark.parametrize("height", [pytest.param(0.3, marks=pytest.mark.drill), 0.7])
@@ -404,6 +406,7 @@ def test_a_joint_that_grazes_its_stop_is_ill_posed(inside: float, restitution: f
     assert found.events == ()
 
 
+@pytest.mark.drill_of("-1e-06-0")
 @pytest.mark.parametrize(("inside", "impacts"), [(1e-6, 1), (-1e-6, 0)])
 def test_a_joint_that_passes_or_misses_its_stop_for_certain_is_well_posed(inside: float, impacts: int) -> None:
     """A thousandth of a millimetre decides; the impact takes all speed, and the mass swings back from there."""

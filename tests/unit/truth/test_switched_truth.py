@@ -155,6 +155,7 @@ def test_infinitely_many_impacts_end_when_their_sum_says() -> None:
     assert found.pressed[1, 0, 2] == pytest.approx(0.517 * 9.81, abs=DIGITS)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_the_error_of_rebounds_cut_short_is_within_the_bars(friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Infinitely many rebounds are summed from some on: where that begins changes the motion within its bars."""
@@ -269,6 +270,7 @@ def test_early_events_lie_within_their_brackets() -> None:
     assert stick.time_high - stick.time_low < 1e-14
 
 
+@pytest.mark.drill
 def test_stops_with_friction_beside_contact_are_followed_to_the_stop() -> None:
     """A joint with both stays on its stop, where the shares of what holds it are not determinate."""
     times = np.array([0.0, 0.05, 0.1, 0.2])
@@ -296,6 +298,7 @@ def test_a_joint_that_rubs_bounces_off_its_stop_beside_contacts() -> None:
     assert np.isinf(bounces.end)
 
 
+@pytest.mark.drill_of("rail0", "rail2")
 @pytest.mark.parametrize(
     "rail",
     [
@@ -322,6 +325,7 @@ def test_a_joint_that_rubs_rests_on_its_stop_and_leaves_it_beside_contacts_as_wi
         assert b.time_low <= a.time_high
 
 
+@pytest.mark.drill_of("laws0-kinds0")
 @pytest.mark.parametrize(
     ("laws", "kinds"), [({"sole": 0.0, "pull": 3.0}, ["impact"]), ({"restitution": 0.5}, ["impact", "turn"])]
 )
@@ -741,6 +745,7 @@ def test_a_plate_slides_straight_on_eight_feet() -> None:
     assert found.record.p_WB[1, 0] == pytest.approx([0.6 * way, 0.8 * way, 0.1], abs=DIGITS)
 
 
+@pytest.mark.drill_of("0.01")
 @pytest.mark.parametrize("spinning", [0.0, 0.01])
 def test_feet_that_resist_rolling_leave_the_turn_of_a_plate_open_unless_they_hold_its_spin(spinning: float) -> None:
     """Moments against rolling split the load anyhow; friction then turns the plate, up to μ times their bound."""
@@ -788,6 +793,7 @@ def test_a_box_that_lands_on_a_cart_moves_on_with_it() -> None:
     assert found.record.v_WB[2, :, 0] == pytest.approx(0.5 * 50 / 52, abs=DIGITS)
 
 
+@pytest.mark.drill
 def test_a_box_that_bounces_flat_comes_to_rest_when_its_rebounds_are_summed() -> None:
     """With e = 1/2 the flights last 2 e^n t, t the fall: at 3 t it rests, flat, where it was dropped."""
     falls = float(np.sqrt(0.2 / 9.81))

@@ -458,6 +458,7 @@ def test_routes_of_a_spinning_body_agree(scene):
     assert max(found.differences["q_WB"], found.differences["points"]) < 2e-10
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("route", [find_truth, switched_truth], ids=["smooth", "switching"])
 @pytest.mark.parametrize("compiled", [True, False])
 def test_a_failure_of_the_rates_ends_the_truth_at_its_time(monkeypatch, route, compiled):

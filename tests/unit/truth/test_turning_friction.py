@@ -83,6 +83,7 @@ def test_a_ball_that_slips_and_rolls_has_both_laws() -> None:
     assert abs(at(found, "w_WB")[-1, 1] + spin - slows * time) <= bar(found, "w_WB") <= 1e-9
 
 
+@pytest.mark.drill
 def test_both_routes_agree_on_a_ball_of_unequal_moments() -> None:
     """A ball with three moments of inertia lands, slips, rolls and spins with all laws at once."""
     pair = law(0.3, rolling_resistance=1e-3, spinning_friction=2e-3)
@@ -132,6 +133,7 @@ def test_a_planar_joint_bears_what_friction_against_spin_would(rpy: tuple[float,
     assert np.linalg.norm(moves[0]) == pytest.approx(0.5 - 0.1 * G * 0.1, abs=1e-12)
 
 
+@pytest.mark.drill
 def test_a_bounce_has_a_bar_for_its_last_instants() -> None:
     """An impact has no moment of friction, so the bar covers the short time of the bounces that are left out."""
     scene = ball(law(0.3, restitution=0.4, rolling_resistance=1e-3), (0.8, 0.3, 0, 4.0, -20.0, 9.0), 0.08)
@@ -179,6 +181,7 @@ def test_the_projection_solver_follows_friction_against_turning(
     assert max(item.error for item in moved) < 1e-11  # 1e-13 is seen
 
 
+@pytest.mark.drill_of("laws0-velocity0-0.0-pinocchio[formulation=impulses]-errors0")
 @pytest.mark.parametrize(
     ("setting", "errors"),
     [

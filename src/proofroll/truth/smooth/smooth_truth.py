@@ -413,11 +413,11 @@ class _SmoothTruth:
         def loses(time: Array) -> bool:
             return bool(abs(record_at(time).placed(mechanism).energies().sum() - parts[0].sum()) > most)
 
-        known, last = len(change), early.time * (1.0 - _END)  # where a path ends behind the samples
+        count, path_end = len(change), early.time * (1.0 - _END)  # which may lie behind the samples
         if len(lost):
             end = self._first_time(loses, float(self._times[lost[0]]), lost[0])
-        elif np.isfinite(last) and last > self._times[known - 1] and loses(np.array([last])):
-            end = self._first_time(loses, last, known)
+        elif np.isfinite(path_end) and path_end > self._times[count - 1] and loses(np.array([path_end])):
+            end = self._first_time(loses, path_end, count)
         else:
             return
         rows = self._equations.rows(record_at(np.array([end])).q[0])
@@ -442,15 +442,15 @@ class _SmoothTruth:
                 by_tree, by_bodies = self._tree_at(paths[0], time), self._bodies_at(paths[1], time)
                 return bool(_apart(by_tree, on_same_turns(self._mechanism, by_tree, by_bodies), unit)[0] > BRANCH)
 
-            first = float(self._times[parted[0]])
-            early.at(self._first_time(apart, first, parted[0]), "the two routes part, as at a singular pose")
+            end = self._first_time(apart, float(self._times[parted[0]]), parted[0])
+            early.at(end, "the two routes part, as at a singular pose")
 
     def _first_time(self, fails: Callable[[Array], bool], end: float, sample: int) -> float:
         """Time from which a check fails, between one at which it fails and the last sample before it."""
-        held = float(self._times[sample - 1]) if sample else 0.0
-        while end - held > _END * end:
-            middle = (held + end) / 2
-            held, end = (held, middle) if fails(np.array([middle])) else (middle, end)
+        start = float(self._times[sample - 1]) if sample else 0.0
+        while end - start > _END * end:
+            middle = (start + end) / 2
+            start, end = (start, middle) if fails(np.array([middle])) else (middle, end)
         return end
 
 

@@ -140,6 +140,7 @@ def test_a_push_that_grows_finds_static_and_then_kinetic_friction() -> None:
     assert content["p_WB"].to_numpy()[:, 0, 0] == pytest.approx(place, abs=1e-8)
 
 
+@pytest.mark.drill
 def test_a_turned_scene_moves_alike() -> None:
     """A scene whose forces along the world are turned with it, and those along bodies kept, moves as before, turned."""
     scene: Any = load_scene("slung_load").elements[0]

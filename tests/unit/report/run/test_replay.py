@@ -6,11 +6,14 @@ import math
 import re
 from pathlib import Path
 
+import pytest
+
 from proofroll.files.scene_file import load_scene
 from proofroll.report.run.replay import replay_page
 from proofroll.running.simulation import simulate
 
 
+@pytest.mark.drill
 def test_nothing_is_drawn_behind_the_end_of_a_truth() -> None:
     """The page of a run whose truth ends early draws both up to there, and says when and why."""
     bouncing = {"restitution": 0.5, "tangential_restitution": 1.0, "mu_static": math.inf, "mu_kinetic": math.inf}

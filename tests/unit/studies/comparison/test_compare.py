@@ -304,6 +304,7 @@ def test_another_scene_is_shown_and_not_judged(tmp_path: Path) -> None:
     assert judged(tmp_path / "b", claim([row], [1.2, 4.0]), the_truth, certificate=[number]).contradictions == []
 
 
+@pytest.mark.drill
 def test_exceptions_decide(tmp_path: Path) -> None:
     """At the point of an exception its verdict is expected and no other, elsewhere the row's."""
     differs = ExceptAt({"speed": [4.0]}, [Verdict.DIFFERS])
@@ -443,6 +444,7 @@ def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) ->
     assert (run.verdict, run.contradictions) == (Verdict.ILL_POSED, [])
 
 
+@pytest.mark.drill_of("0.0001")
 @pytest.mark.parametrize("tolerance", [1e-4, 2e-3])
 def test_events_that_are_late_alike_in_every_run_are_no_other_limit(tmp_path: Path, tolerance: float) -> None:
     """An event that ends with the same step on each rung of a ladder is known to that step, within tolerance or not."""
@@ -465,6 +467,7 @@ def test_events_that_are_late_alike_in_every_run_are_no_other_limit(tmp_path: Pa
     assert not found.remarks
 
 
+@pytest.mark.drill
 def test_what_holds_on_every_path_is_judged_at_a_stair_edge(tmp_path: Path) -> None:
     """At a stair edge a wrong path is not judged, but energy from nowhere and a ball off the wall are."""
     bounds = {"z": Tolerance(1e-9, False, "m"), "energy_balance": Tolerance(1e-3, True)}
@@ -485,6 +488,7 @@ def test_what_holds_on_every_path_is_judged_at_a_stair_edge(tmp_path: Path) -> N
     assert "differs, expected: agrees" in said
 
 
+@pytest.mark.drill
 def test_neighbouring_points_have_truths_of_their_own(
     tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]
 ) -> None:

@@ -155,7 +155,6 @@ _PLANTED = {
 }
 
 
-@pytest.mark.drill
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.timeout(900)

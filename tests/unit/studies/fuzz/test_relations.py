@@ -50,6 +50,7 @@ def _evaluated(folder: Path, tables: dict[str, Any], name: str, relation: Relati
     return evaluated
 
 
+@pytest.mark.drill_of("other samples", "turned", "reordered", "welded")
 @pytest.mark.parametrize("name", _RELATIONS)
 def test_a_sound_truth_keeps_each_relation(name: str, tmp_path: Path) -> None:
     """The truth of a double pendulum moves alike turned, renamed, reordered, reversed, halved and sampled otherwise."""
@@ -57,6 +58,7 @@ def test_a_sound_truth_keeps_each_relation(name: str, tmp_path: Path) -> None:
     assert (tmp_path / "scene" / name.replace(" ", "_") / "scene.toml").is_file()
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("name", ["turned", "reversed"])
 def test_another_motion_is_a_breach(name: str, tmp_path: Path) -> None:
     """A changed scene with 1e-9 more gravity breaks its relation, by a number of error bars."""

@@ -153,6 +153,7 @@ def test_a_late_record_is_named(*, whole: bool, clock: bool) -> None:
     assert "cause: the record is late by 0.1 s (" in str(judged)
 
 
+@pytest.mark.drill
 def test_a_clock_that_begins_later_is_no_delay_less_some_periods() -> None:
     """The first row of a swing that comes back is the scene's start, wherever its clock begins."""
     scene = load_scene("pendulum", angle=0.5)

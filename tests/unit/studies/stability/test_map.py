@@ -64,6 +64,7 @@ def small(resumed: tuple[Runner, int, Path]) -> Any:
     return stability("sphere_in_cylinder", [SPEED], resumed[0], engines=[ENGINE], effort=SHORT)
 
 
+@pytest.mark.drill
 def test_a_map(small: Any) -> None:
     """RK4 has a boundary at either speed, and as nothing but Ωh matters here, it is the same Ωh."""
     study = stability_study(small)
@@ -112,6 +113,7 @@ def test_a_run_that_met_the_limit_of_time_contradicts_nothing() -> None:
     assert "limit of time" in claim.untested(late)
 
 
+@pytest.mark.drill
 def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
     """What has neither step nor tolerance is named with the reason, and its neighbour is mapped by its tolerance."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
@@ -138,6 +140,7 @@ def test_what_refuses_the_scene_everywhere_has_no_boundary() -> None:
     assert _refused(points) == {"cannot": "needs universal joints"}
 
 
+@pytest.mark.drill
 def test_a_map_resumes(small: Any, resumed: tuple[Any, int, Path]) -> None:
     """A map that was interrupted takes up what it had, and one that was finished runs nothing."""
     runner, before, folder = resumed
@@ -231,6 +234,7 @@ def test_a_quick_map_leaves_out_the_longest_runs() -> None:
     assert Effort().values_of(horizon) == horizon.values
 
 
+@pytest.mark.drill
 def test_of_each_formulation_the_matched_settings(tmp_path: Path) -> None:
     """Where only matched settings are mapped, others of the same formulation are not, but where it has no matched."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})

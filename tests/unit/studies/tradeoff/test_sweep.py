@@ -88,6 +88,7 @@ def test_round_off_does_not_make_another_run_of_the_same_one() -> None:
         assert curve.saturated("z") is same
 
 
+@pytest.mark.drill
 def test_a_tolerance_that_holds_only_between_many_samples_does_not_hold(
     swept: tuple[dict[str, Curve], float],
 ) -> None:

@@ -22,6 +22,7 @@ def box_on(gravity: tuple[float, float, float], joint: Joint, friction: float) -
     return Mechanism((Body("box", 1.0, inertia=INERTIA),), (joint,), gravity=gravity, geometries=shapes, pairs=pairs)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("planar", [pytest.param(False, marks=pytest.mark.drill), True])
 def test_a_box_that_begins_to_slide_on_four_corners_is_well_posed(planar: bool) -> None:
     """Its motion has a truth to the end, also where two corners lie behind one another; loads of corners have none."""

@@ -192,6 +192,7 @@ def test_a_motion_beside_a_singular_pose_goes_on(scene):
     by_joints(scene("slider_crank", crank=0.4 * (1 - 1e-7), speed=3.0), np.array([0.0, 0.5]), 1e-10)
 
 
+@pytest.mark.drill
 def test_a_stop_elsewhere_ends_no_other_way_at_a_singular_pose(scene):
     """A mechanism with a stop that it does not reach is followed by other steps, to the same pose."""
     mechanism = scene("slider_crank", crank=0.4 * (1 - 1e-10), speed=3.0)

@@ -86,6 +86,7 @@ def test_compiled_values_of_a_slip_that_leads_are_those_of_the_route(number: int
         assert row == pytest.approx(route._guards(state, with_heading(mode, direction), guards), abs=1e-12)
 
 
+@pytest.mark.drill
 def test_a_falling_rod_slips_when_it_does_without_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
     """A rod slips at the same time and place either way, and each route names the integrator that it used."""
     pytest.importorskip("heyoka")
@@ -180,6 +181,7 @@ def test_stops_and_dry_friction_of_joints_are_compiled(law: dict[str, Any]) -> N
         )
 
 
+@pytest.mark.drill
 def test_an_effort_at_its_limit_is_compiled() -> None:
     """A motor reaches its limit and comes back: both routes stay compiled, with the limit as a guard."""
     pytest.importorskip("heyoka")

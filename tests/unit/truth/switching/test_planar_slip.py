@@ -82,6 +82,7 @@ def test_a_slip_that_slows_gently_ends_in_one_line(monkeypatch: pytest.MonkeyPat
     assert taken[0] <= 12  # of two routes; 550 without lines
 
 
+@pytest.mark.drill
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
     ("seed", "sticks", "beyond"),
@@ -184,6 +185,7 @@ def slip_under_a_push(push: float, rate: float, hold: float) -> tuple[float, flo
 PUSHED, SLIP = bead("5.2*sin(10*t)"), slip_under_a_push(5.2, 10.0, 0.5 * 9.81)
 
 
+@pytest.mark.drill
 def test_a_slip_that_turns_fast_is_followed_from_its_first_instant() -> None:
     """A pull that turns by 20 rad/s as friction gives way takes the bead with it, as Coulomb's law says."""
     until, hold = 0.05, 0.5 * 9.81
@@ -238,6 +240,7 @@ def rolling_in(way: tuple[float, float]) -> Mechanism:
     )  # fmt: skip
 
 
+@pytest.mark.drill
 def test_friction_opposes_a_slip_until_its_last_instant() -> None:
     """Friction turns with a slip that vanishes: a sample just before its end has the force against its direction."""
     ball = rolling_in((0.6, 0.8))

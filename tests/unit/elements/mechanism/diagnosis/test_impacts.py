@@ -110,6 +110,7 @@ def test_one_impact_tells_a_law_by_all_velocities_after_it(law: str) -> None:
     assert diagnose(Evidence(element, [], true, true, STEP), hypotheses_of(element)) == []
 
 
+@pytest.mark.drill
 def test_an_impact_on_a_driven_plate_is_followed() -> None:
     """A motion takes one velocity from the mechanism; its impacts have an inertia all the same."""
     bodies = (Body("plate", 1.0, inertia=(0.1,) * 3), Body("ball", 1.0, inertia=(0.004,) * 3))

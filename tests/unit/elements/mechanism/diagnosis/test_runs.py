@@ -129,6 +129,7 @@ def _numbers(what: str, change: float) -> tuple[Scene, xr.Dataset]:
     return scene, truth(scene, np.arange(0, 0.3, 0.015))
 
 
+@pytest.mark.drill_of("stop-stops-0.003-False")
 @pytest.mark.parametrize(("change", "accuses"), [(3e-3, False), (3e-2, True)])
 @pytest.mark.parametrize(("what", "name"), [("stop", "stops"), ("axis", "joint axis")])
 def test_a_number_within_a_hundredth_of_the_scenes_accuses_nobody(
@@ -291,6 +292,7 @@ def test_another_push_is_no_wrong_report(run: Table | float, gravity: bool) -> N
     assert _told(scene, truth(_pushed(run, gravity), times), truth(scene, times)) == []
 
 
+@pytest.mark.drill_of("double_pendulum")
 @pytest.mark.parametrize("name", ["pendulum", "double_pendulum"])
 def test_a_flipped_axis_is_no_inverse_rotation(name: str) -> None:
     """Rods that turn the other way have another motion: nothing is inverted, reversed or mirrored."""
@@ -411,6 +413,7 @@ def test_first_steps_contradict_masses_of_another_order(factor: float, contradic
     assert contradicts_first_steps(first, 5.0, Change(mechanism, mass=masses)) is contradicted
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("damping", "moved_with", "named"),
     [(0.0, 0.05, False), pytest.param(1.0, 1.05, False, marks=pytest.mark.drill), (0.0, 0.5, True)],

@@ -44,6 +44,7 @@ def is_valid(folder: Path, tables: Mapping[str, Any]) -> bool:
     return True
 
 
+@pytest.mark.drill_of("loop")
 @pytest.mark.parametrize("family", FAMILIES)
 def test_changes_apply_or_are_refused_in_words(family: str, tmp_path: Path) -> None:
     """Each change leads to a scene that the reader accepts, or refuses with its own error; most are accepted."""

@@ -113,6 +113,7 @@ def test_a_held_table_belongs_to_its_own_time() -> None:
         read_signal("target", {**table, "hold": "yes"}, none, "rad")
 
 
+@pytest.mark.drill_of("table-mujoco-3.5-1e-08")
 @pytest.mark.parametrize(
     ("name", "engine", "order", "most"),
     [
@@ -131,6 +132,7 @@ def test_an_engine_keeps_its_order(name: str, engine: str, order: float, most: f
     assert _error(name, engine, STEPS[1], "effort.hip_servo") < 2e4 * most
 
 
+@pytest.mark.drill_of("limited")
 @pytest.mark.parametrize("name", list(SCENES))
 def test_the_truth_is_exact(name: str) -> None:
     """Both routes of the truth ask for targets from their own states, and agree with a third solver to 1e-10."""

@@ -283,6 +283,7 @@ def test_bad_input_is_one_line(tmp_path, old: str, new: str, said: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.drill_of("oscillators-energy_change")
 @pytest.mark.parametrize(("scene", "name"), [("pendulum", "energy_error"), ("oscillators", "energy_change")])
 def test_a_change_of_energy_is_an_error_where_a_law_keeps_it(scene: str, name: str) -> None:
     """What is driven or damped changes its energy, and nothing calls that an error; the truth knows it with a bar."""

@@ -63,6 +63,7 @@ def test_a_nut_turns_as_it_falls(tmp_path: Path) -> None:
     assert np.max(np.abs(content["coupling.j"].to_numpy() - thread)) < 1e-12
 
 
+@pytest.mark.drill
 def test_what_a_screw_has_along_its_angle_acts_there(tmp_path: Path) -> None:
     """A spring about the axis swings the nut with the inertia I + m r²; a motion carries it along the axis."""
     content = of_truth(screw(tmp_path, "q0 = 0.5\nstiffness = 9\nrest = 0.1\n"))
@@ -92,6 +93,7 @@ def test_a_body_on_an_inclined_cylindrical_joint_slides_and_swings(tmp_path: Pat
     assert np.max(np.abs(swing - turn.y[0])) < 1e-11
 
 
+@pytest.mark.drill
 def test_a_gimbal_is_a_ball_joint(tmp_path: Path) -> None:
     """A heavy body that a gimbal holds off its centre moves as on a ball joint, from the pose of its three angles."""
     push = PUSH.replace("value", "position = [0.2, 0.1, 0.4]\nvalue")

@@ -61,6 +61,7 @@ def test_figures_and_numbers(proofroll: Proofroll, tmp_path: Path) -> None:
     assert (out / "height.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.drill
 def test_a_wrong_number_is_a_contradiction(proofroll: Proofroll, tmp_path: Path) -> None:
     """Exit 1, and the table shows what was stated and found, within 100 columns."""
     path = written(tmp_path, TEXT.replace('"-160"', '"-150"'))
@@ -73,6 +74,10 @@ def test_a_wrong_number_is_a_contradiction(proofroll: Proofroll, tmp_path: Path)
     assert not stderr
 
 
+@pytest.mark.drill_of(
+    'runs = ["free"]-runs = ["free"]\\ntitle = "$z_{$"-arguments4-2-its text cannot be drawn',
+    'label = "free"-label = "free"-arguments5-3-no wheel, no ball',
+)
 @pytest.mark.parametrize(
     ("old", "new", "arguments", "code", "words"),
     [

@@ -15,6 +15,7 @@ from proofroll.files.scene_file import load_scene
 G, A, C = 9.81, 0.025, 0.2
 
 
+@pytest.mark.drill
 @settings(max_examples=8, deadline=None)
 @given(
     tilt=st.floats(0.05, 1.55),
@@ -54,6 +55,7 @@ def test_quadrature(tilt: float, k: float, axial: float, spin: float) -> None:
     np.testing.assert_allclose(found["N"], press, rtol=1e-9)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(("k", "speed"), [(0.4, 2.2), pytest.param(2 / 3, 2.1, marks=pytest.mark.drill)])
 def test_where_it_leaves_the_wall(k: float, speed: float) -> None:
     """Energy says at which angle: cos γ = -(V0²(1 + k) - 2 g' c) / (g' c (3 + k)) with g' = g sin α."""
