@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from proofroll.cli import options
+from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,13 +21,33 @@ if TYPE_CHECKING:
 _LONGEST = 300  # characters of a message in the table
 
 
+def seed_of(text: str) -> int:
+    """Seed that a whole number is, or that a date YYYY-MM-DD stands for: dates a day apart have no scene in common.
+
+    Raises:
+        InputError: the text is neither.
+    """
+    if text.isdecimal():
+        return int(text)
+    try:
+        day = date.fromisoformat(text)
+    except ValueError:
+        raise InputError(f"--seed {text}: neither a whole number from 0 on nor a date, e.g. 2026-11-30") from None
+    return int.from_bytes(hashlib.sha256(day.isoformat().encode()).digest()[:5])
+
+
 def fuzz(
     engine: Annotated[
         str,
         typer.Argument(help="An engine, e.g. mujoco[formulation=joints]; or truth.", autocompletion=options.runs_like),
     ],
     minutes: Annotated[float, typer.Option(help="Processor time [min], compilation included.")] = 10.0,
-    seed: Annotated[int, typer.Option(help="Seed of the first scene; the next ones have the seeds behind it.")] = 0,
+    seed: Annotated[
+        str,
+        typer.Option(
+            help="Seed of the first scene, or a date; the next ones have the seeds behind it.", metavar="SEED"
+        ),
+    ] = "0",
     family: Annotated[
         list[str] | None, typer.Option(help="Family of scenes, e.g. loop; repeat. All by default.")
     ] = None,
@@ -43,12 +66,13 @@ def fuzz(
     """
     from proofroll.studies.fuzz.hunt import hunt
 
+    first_seed = seed_of(seed)
     with options.progress_bar("scenes") as advance:
         result = hunt(
             engine,
             out,
             minutes=minutes,
-            seed=seed,
+            seed=first_seed,
             families=tuple(family or ()),
             shrink=shrink,
             jobs=jobs,
