@@ -32,7 +32,7 @@ def seed_of(text: str) -> int:
     try:
         day = date.fromisoformat(text)
     except ValueError:
-        raise InputError(f"--seed {text}: neither a whole number from 0 on nor a date, e.g. 2026-11-30") from None
+        raise InputError("--seed", text, "must be a whole number from 0 on, or a date, e.g. 2026-11-30") from None
     return int.from_bytes(hashlib.sha256(day.isoformat().encode()).digest()[:5])
 
 
@@ -44,9 +44,7 @@ def fuzz(
     minutes: Annotated[float, typer.Option(help="Processor time [min], compilation included.")] = 10.0,
     seed: Annotated[
         str,
-        typer.Option(
-            help="Seed of the first scene, or a date; the next ones have the seeds behind it.", metavar="SEED"
-        ),
+        typer.Option(help="Seed of the first scene, or a date; the next ones follow it.", metavar="SEED"),
     ] = "0",
     family: Annotated[
         list[str] | None, typer.Option(help="Family of scenes, e.g. loop; repeat. All by default.")

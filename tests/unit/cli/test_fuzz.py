@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import date, timedelta
+from itertools import pairwise
 
 import pytest
 
@@ -16,7 +17,7 @@ _NIGHT = 10_000
 def test_nights_have_no_scene_in_common() -> None:
     """Seeds of a year's dates lie further apart than a night draws scenes, and are the same everywhere."""
     seeds = sorted(seed_of((date(2026, 11, 29) + timedelta(days=day)).isoformat()) for day in range(365))
-    assert min(after - before for before, after in zip(seeds, seeds[1:], strict=False)) > _NIGHT
+    assert min(after - before for before, after in pairwise(seeds)) > _NIGHT
     assert seed_of("2026-11-29") == 575535891297
 
 
@@ -30,4 +31,4 @@ def test_other_seeds_are_refused(seed: str, command_line: Callable[..., tuple[in
     """Text that is neither a number nor a date is one line that says so."""
     code, out, err = command_line("fuzz", "truth", f"--seed={seed}")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert f"--seed {seed}: neither a whole number from 0 on nor a date" in err
+    assert f"--seed = {seed!r}: must be a whole number from 0 on, or a date" in err
