@@ -13,17 +13,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import dear
 import numpy as np
 import pytest
 from ball_scenes import scene  # noqa: F401 -- a fixture, which pytest finds here
-from dear import (  # noqa: F401 -- hooks, but for the first
-    mark_drills,
-    pytest_fixture_setup,
-    pytest_runtest_setup,
-    pytest_runtest_teardown,
-    pytest_sessionfinish,
-    pytest_terminal_summary,
-)
 from forked_workers import Forks
 from hostile import ENTRY_POINTS
 from hypothesis import HealthCheck, Phase, settings
@@ -77,13 +70,18 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 gc.disable()
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Registers hooks that fixtures of a whole session call, too, which they do not in this file."""
+    config.pluginmanager.register(dear, "dear")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Marks what is nightly as drills before a mark chooses; truths come first.
 
     The files of truths are the longest, and begun last would leave one process without work.
     """
-    mark_drills(config, items)
+    dear.mark_drills(config, items)
     items.sort(key=lambda item: not item.nodeid.startswith("tests/unit/truth/"))
 
 

@@ -1,19 +1,31 @@
-"""Times at which a formula of a scene has no finite value: no motion goes on there, whatever integrates it."""
+"""Times and lengths at which a formula has no finite value: no motion goes on there, whatever integrates it."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism import Mechanism, Spring
+from proofroll.elements.mechanism.dynamics.link_forces import length_and_rate
+from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import Formula, Signal
+from proofroll.elements.mechanism.scene.spring_law import SpringLaw
 
 _POINTS = 4097  # a pole raises its neighbours on such a grid, however narrow it is
 _ZOOM, _ROUNDS = 33, 12  # points of each closer look at a peak, and number of looks: 16 times closer each
 _GROWS = 1e9  # growth of a peak, of its size on the grid, that no smooth peak shows between two points
 _MOST = 64  # largest number of peaks that are looked at closely
 NEAR = 1e-6  # relative distance from a pole up to which routes integrate; nearer, steps would have to shrink too far
+# Ways ahead at which a spring's pull is looked at, in those that its length goes on by from a time NEAR its end to it.
+_AHEAD = np.linspace(0.0, 10.0, 201)
+
+
+class _Function(Protocol):
+    """A formula of one number."""
+
+    def at(self, values: Array) -> Array:
+        """Values of the formula; NaN or infinite where there is none."""
 
 
 class Pole(NamedTuple):
@@ -38,6 +50,33 @@ class Pole(NamedTuple):
         """Clause for a person."""
         near = f"{self.value:.3g} at t = {self.last:.9g} s"
         return f"{self.field} {self.formula} has no finite value at t = {self.time:.6g} s ({near}): end before it"
+
+
+class _Pull(NamedTuple):
+    """Pull of a spring [N] as its length [m] changes at a rate [m/s]."""
+
+    spring: Spring
+    rate: float
+
+    def at(self, lengths: Array) -> Array:
+        """Pulls at lengths [m]."""
+        return np.asarray(self.spring.pull(lengths, self.rate))
+
+
+def spring_without_pull(motion: Placed, end: float) -> str:
+    """Clause about the spring whose formula has no value from the end [s] of a motion on; empty if there is none.
+
+    ``motion``: at one time, NEAR the end.
+    """
+    for spring in motion.mechanism.springs:
+        if isinstance(spring.force, SpringLaw):
+            length, rate = (float(values[0]) for values in length_and_rate(motion, spring))
+            pull, lengths = _Pull(spring, rate), length + rate * NEAR * end * _AHEAD
+            broken = np.flatnonzero(~np.isfinite(_sizes(pull, lengths)))
+            if len(broken) and broken[0]:
+                beyond, _, _ = _broken(pull, lengths[broken[0] - 1], lengths[broken[0]])
+                return f"springs.{spring.name}.force = {spring.force.text} has no value beyond L = {beyond:.9g} m"
+    return ""
 
 
 def first_pole(mechanism: Mechanism, until: float) -> Pole | None:
@@ -94,18 +133,18 @@ def _closer(signal: Formula, low: float, high: float, size: float) -> tuple[floa
     return None
 
 
-def _broken(signal: Formula, last: float, beyond: float) -> tuple[float, float, float]:
-    """First time without a finite value between the last with one and the first without."""
-    while np.nextafter(last, beyond) < beyond:
+def _broken(signal: _Function, last: float, beyond: float) -> tuple[float, float, float]:
+    """First number without a finite value between the last with one and the first without, the last, and its value."""
+    while np.nextafter(last, beyond) != beyond:
         middle = (last + beyond) / 2
         if np.isfinite(_sizes(signal, np.array([middle]))[0]):
             last = middle
         else:
             beyond = middle
-    return float(beyond), float(last), float(signal.at(last))
+    return float(beyond), float(last), float(signal.at(np.asarray(last)))
 
 
-def _sizes(signal: Formula, times: Array) -> Array:
-    """Absolute values at times [s]; NaN or infinite where there is none."""
+def _sizes(signal: _Function, times: Array) -> Array:
+    """Absolute values at times [s] or other numbers; NaN or infinite where there is none."""
     with np.errstate(all="ignore"):
         return np.asarray(np.broadcast_to(np.abs(signal.at(times)), times.shape), dtype=float)

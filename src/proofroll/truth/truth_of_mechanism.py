@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Diverged, NotUnique, Refused
 from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.held_signals import has_held
@@ -13,9 +13,10 @@ from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.dynamics.switches import with_stops_at_start
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import breaks
+from proofroll.elements.mechanism.scene.spring_law import SpringLaw
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.natural_units import natural_units
-from proofroll.truth.signal_poles import NEAR, first_pole
+from proofroll.truth.signal_poles import NEAR, first_pole, spring_without_pull
 from proofroll.truth.smooth.smooth_truth import find_truth
 from proofroll.truth.switched_truth import switched_truth
 from proofroll.truth.tree.contact_tree import ContactTree
@@ -35,12 +36,24 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     """
     times, mechanism = np.asarray(times, dtype=float), with_stops_at_start(mechanism)
     if (pole := first_pole(mechanism, float(times[-1]))) is None:
-        return _truth_of(mechanism, times)
+        return _with_reason(mechanism, _truth_of(mechanism, times))
     known_times = times[times < (1 - NEAR) * pole.time]
     if not len(known_times):
         raise Refused(pole.clause)
     motion = _truth_of(mechanism, known_times)
     return motion if motion.ended else replace(motion, end=pole.time, ended=pole.clause)
+
+
+def _with_reason(mechanism: Mechanism, motion: TwoRouteMotion) -> TwoRouteMotion:
+    """The motion, whose end is that of a spring's formula where it is."""
+    if not motion.ended or not any(isinstance(spring.force, SpringLaw) for spring in mechanism.springs):
+        return motion
+    try:
+        nearer = _truth_of(mechanism, np.array([(1 - NEAR) * motion.end]))
+    except (Refused, NotUnique):
+        return motion
+    clause = spring_without_pull(nearer.record.placed(mechanism), motion.end)
+    return replace(motion, ended=clause) if clause else motion
 
 
 def _truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:

@@ -133,3 +133,13 @@ def test_unknown_functions_are_refused_with_the_known_ones():
     """The advice names functions with kinks, too."""
     with pytest.raises(InputError, match="abs, sign, max, min"):
         SpringLaw("sinh(L)")
+
+
+def test_a_prescribed_motion_starts_on_the_side_to_which_time_goes():
+    """From a kink at time 0 a motion |sin 3t| has the rate 3, up to the next kink, at which the truth ends."""
+    joint = Joint("x", "prismatic", "world", "m", axis=(1, 0, 0), motion=Formula("0.1*abs(sin(3*t))"))
+    found = truth_of(Mechanism((Body("m", 2.0),), (joint,)), np.array([0.0, 0.5, 1.0, 1.2]))
+    assert found.record.v[0] == pytest.approx(0.3, abs=1e-14)
+    assert found.record.q[:, 0] == pytest.approx(0.1 * np.sin(3 * np.array([0.0, 0.5, 1.0])), abs=1e-13)
+    assert found.end == pytest.approx(np.pi / 3, rel=1e-9)
+    assert "jumps in its rate" in found.ended

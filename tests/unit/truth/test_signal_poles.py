@@ -5,7 +5,9 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
+from proofroll.elements.mechanism.scene.parts import Spring
 from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.elements.mechanism.scene.spring_law import SpringLaw
 from proofroll.truth.signal_poles import first_pole
 from proofroll.truth.truth_of_mechanism import truth_of
 
@@ -58,3 +60,16 @@ def test_nothing_before_a_pole_is_refused_by_name() -> None:
     """Where no time lies before the pole, the refusal names force, time and value."""
     with pytest.raises(Refused, match=r"forces\.push\.value\.0 .* no finite value at t = 1e-05 s"):
         truth_of(pushed("1/(1e-5 - t)"), np.linspace(0.1, 1, 10))
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")  # of routes beyond the end
+@pytest.mark.parametrize(("law", "end"), [("3*sqrt(1.2 - L)", 1.2), ("log(L - 0.9)", 0.9), ("0.1*(L - 1)", 0.0)])
+def test_an_end_names_the_spring_whose_formula_ends_there(law: str, end: float) -> None:
+    """A truth that ends where a spring's formula has no value beyond a length says so; other springs end nothing."""
+    way = 0.7 if end > 1 else -0.7
+    slide = Joint("slide", "prismatic", "world", "b", axis=(1, 0, 0), v0=(way,))
+    spring = Spring("bump", "world", "b", position_a=(-1, 0, 0), force=SpringLaw(law))
+    found = truth_of(
+        Mechanism((Body("b", 2.0),), (slide,), springs=(spring,), gravity=(0, 0, 0)), np.array([0.0, 0.1, 1.0])
+    )
+    assert found.ended == (f"springs.bump.force = {law} has no value beyond L = {end:g} m" if end else "")

@@ -109,7 +109,8 @@ class ImpactSeries:
             if not 0 <= last.speed < middle.speed:
                 continue
             ratio = last.speed / middle.speed
-            if period < previous_period and abs(period / previous_period - ratio) <= _ALIKE:
+            # of impacts at one time the periods are round-off
+            if 0 < period < previous_period and abs(period / previous_period - ratio) <= _ALIKE:
                 hit = (entry.contacts for entry in self._all if entry.time > middle.time)
                 return GeometricSeries(ratio, period * ratio / (1 - ratio), period, frozenset().union(*hit))
         return None

@@ -168,3 +168,12 @@ def test_contacts_that_meet_without_speed_form_no_series() -> None:
     """Impacts of speed zero, as of bodies that start inside each other, have no ratio of speeds."""
     impacts = ImpactSeries()
     assert [impacts.after("", Impact(time, frozenset({0}), 0.0)) for time in (0.0, 0.1, 0.15, 0.175)] == [None] * 4
+
+
+@pytest.mark.parametrize("times", [(1.0, 1.0, 1.0), (1.0, 1.0, 1.0 - 1e-16), (1.0, 1.0, 1.0 + 1e-15)])
+def test_impacts_at_one_time_form_no_series(times: tuple[float, ...]) -> None:
+    """Impacts of one pair at the same time to the last bit have no periods whose ratio says anything."""
+    impacts = ImpactSeries()
+    speeds = (1.0, 0.5, 0.25)
+    found = [impacts.after("", Impact(time, frozenset({0}), speed)) for time, speed in zip(times, speeds, strict=True)]
+    assert found == [None] * 3

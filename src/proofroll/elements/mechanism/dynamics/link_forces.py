@@ -22,12 +22,18 @@ WORKING = ("effort", "drive")  # fields of named forces whose work is a result
 _BUSHINGS = (("bushing_forces", "N", "forces"), ("bushing_torques", "N m", "moments"))
 
 
-def pull_of(placed: Placed, spring: Spring) -> FloatArray:
-    """Pull of a spring by its law, positive if it draws its ends together [N], shape (time,)."""
+def length_and_rate(placed: Placed, spring: Spring) -> tuple[FloatArray, FloatArray]:
+    """Length of a spring [m] and its rate [m/s], shape (time,) each."""
     apart = placed.point(spring.body_b, spring.position_b) - placed.point(spring.body_a, spring.position_a)
     slide = placed.velocity(spring.body_b, spring.position_b) - placed.velocity(spring.body_a, spring.position_a)
     length = np.linalg.norm(apart, axis=-1)
-    return np.asarray(spring.pull(length, np.sum(apart * slide, axis=-1) / length) + np.zeros(len(length)))
+    return length, np.sum(apart * slide, axis=-1) / length
+
+
+def pull_of(placed: Placed, spring: Spring) -> FloatArray:
+    """Pull of a spring by its law, positive if it draws its ends together [N], shape (time,)."""
+    length, rate = length_and_rate(placed, spring)
+    return np.asarray(spring.pull(length, rate) + np.zeros(len(length)))
 
 
 def load_of(placed: Placed, bushing: Bushing) -> FloatArray:

@@ -79,8 +79,12 @@ def held_sides(laws: Mapping[Hashable, Sequence[str]], sides: Sequence[Any], fun
 
 
 def side_of(argument: Any) -> Any:
-    """Side that follows from an argument: a number, an array or a jet."""
-    return np.sign(getattr(argument, "value", argument))
+    """Side that follows from an argument: a number, an array, or a jet in time, whose kink is left as time goes on."""
+    value, *derivatives = getattr(argument, "parts", [argument])
+    side = np.sign(value)
+    for derivative in derivatives:
+        side = np.where(side == 0, np.sign(derivative), side)
+    return side[()] if isinstance(side, np.ndarray) else side
 
 
 def with_sides(functions: Functions, side: Callable[[Any], Any]) -> Functions:
