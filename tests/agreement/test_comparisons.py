@@ -100,9 +100,7 @@ def outcomes(store: Store) -> Callable[[Comparison, Row], Outcome]:
     return outcome
 
 
-@pytest.mark.drill_of(
-    "accuracy", "four_bar", "inclined_plane", "paper", "sled", "slide_to_roll", "slider_crank", "stick_slip"
-)
+@pytest.mark.drill
 @pytest.mark.parametrize("name", comparison_names())
 def test_each_engine_begins(name: str, tmp_path: Path) -> None:
     """The first row of each engine that is expected to run does so for two samples, held against the truth."""

@@ -308,7 +308,7 @@ def test_the_matrix_can_be_had_as_a_file(seen: Visit) -> None:
     assert lines[1].startswith('"Alpha')
 
 
-@pytest.mark.drill_of("400", "1400")
+@pytest.mark.drill
 @pytest.mark.parametrize("width", [400, 900, 1400])
 def test_nothing_moves_while_the_page_loads(report_page: Path, visit: Visiting, width: int) -> None:
     """The first screen keeps its place while scripts start, and nothing scrolls sideways."""

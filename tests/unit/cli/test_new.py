@@ -35,7 +35,7 @@ def test_a_scene(proofroll: Proofroll) -> None:
     assert '"status": "done"' in out
 
 
-@pytest.mark.drill_of("sphere_in_cylinder")
+@pytest.mark.drill
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "./rod"])
 def test_a_comparison(
     command_line: Proofroll, install_engines: Callable[[Mapping[str, str]], None], scene: str

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,7 +31,7 @@ def ball(**parameters: float) -> RollingBall:
     return rolling_ball(load_scene("sphere_in_cylinder", **parameters))
 
 
-@cache
+@pytest.fixture(scope="module")
 def paper() -> xr.Dataset:
     """The truth of the paper's case with resistance and bounded friction, once for all tests."""
     return truth(load_scene("sphere_in_cylinder", **PAPER), np.linspace(0.0, UNTIL, 401))
@@ -47,9 +46,9 @@ def final_height(path: Path, route: Sliding) -> float:
 @pytest.mark.parametrize(
     "route", [pytest.param(SlidingTaylor, marks=needs_heyoka), pytest.param(Polar, marks=pytest.mark.drill)]
 )
-def test_the_route_of_first_slips_agrees_with_the_truth(route: Any) -> None:
+def test_the_route_of_first_slips_agrees_with_the_truth(route: Any, paper: xr.Dataset) -> None:
     """Events and final height are those of the general mechanics, which shares no equation with it, to 1e-9."""
-    body, true = ball(**PAPER), paper()
+    body, true = ball(**PAPER), paper
     taken = route(body)
     path, events = follow(body, taken, UNTIL), events_of(true)
     assert [kind for kind, _ in path.events] == [event.kind for event in events] == ["slip", "stick", "slip"]
@@ -149,9 +148,9 @@ def test_many_short_slips_settle() -> None:
     assert lengths[-1] < 0.1 * lengths[0]
 
 
-def test_energy_goes_into_slip_and_rolling() -> None:
+def test_energy_goes_into_slip_and_rolling(paper: xr.Dataset) -> None:
     """While it slips the energy falls by the work of slip μk N |u| and of rolling resistance f N ω, and no other."""
-    later = paper().sel(time=slice(2.495, 4.001))
+    later = paper.sel(time=slice(2.495, 4.001))
     slip = np.hypot(later["slip2"], later["slip3"])
     turning = np.hypot(later["omega2"], later["omega3"])
     power = (later["N"] * (0.35 * slip + 5e-4 * turning)).to_numpy()
