@@ -164,8 +164,14 @@ def observe(scene: Scene, dataset: xr.Dataset) -> dict[str, FloatArray]:
 
 
 def scales(scene: Scene, truth: xr.Dataset) -> dict[str, float]:
-    """Size of each observable in the truth, but at least its floor; relative tolerances refer to it."""
-    sizes = {
+    """Size of each observable in the truth, but at least its floor; relative tolerances refer to it.
+
+    That of the times of events is the time that the truth spans.
+    """
+    events = {name: item.unit for name, item in scene.observables.items() if item.role is Role.EVENT}
+    time = truth.variables["time"].values
+    sizes = {name: float(time[-1] - time[0]) if unit == "s" else 1.0 for name, unit in events.items()}
+    sizes |= {
         scene.label(element, name): size
         for element in scene.elements
         for name, size in element.scales(part(scene, element, truth)).items()

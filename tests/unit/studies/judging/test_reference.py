@@ -200,3 +200,11 @@ def test_routes_are_declared_for_formulations_that_there_are() -> None:
     assert isinstance(Reduced, SharesEquations)
     assert set(Reduced.shares) <= set(Reduced.presets)
     assert resolve("projection", {})["shares"] == []
+
+
+@pytest.mark.parametrize("until", [1e-3, 2e-2])
+def test_a_percentage_of_event_times_is_one_of_the_time_of_the_run(until: float) -> None:
+    """Times of events have the size of the time that a truth spans, in a scene of milliseconds as in one of hours."""
+    scene = load_scene("stop", height=1e-6, restitution=0.5)
+    reference = Reference.of(scene, truth(scene, np.linspace(0, until, 11)))
+    assert reference.sizes["event_times"] == until
