@@ -26,6 +26,7 @@ from proofroll.elements.mechanism.scene.signal import breaks
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.contact_bounces import contact_bounces
 from proofroll.truth.early_end import cut_at
 from proofroll.truth.error_bars import TwoRouteMotion, check_start, on_same_turns
@@ -42,7 +43,6 @@ from proofroll.truth.followed_paths import (
     times_known,
     two_route_motion,
 )
-from proofroll.truth.law_check.held_to_laws import held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
 from proofroll.truth.switching.held_route import HeldPath, HeldRoute

@@ -14,9 +14,9 @@ from numpy.polynomial import chebyshev
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.laws.integrals import POINTS, RESOLVED, TO_SERIES, dot, integral, tail
-from proofroll.truth.laws.record import Array, Passage, Pieces
-from proofroll.truth.laws.scene import LawScene
+from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES, dot, integral, tail
+from proofroll.truth.check.laws.record import Array, Passage, Pieces
+from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.numerics.hybrid import DenseStep
 
 if TYPE_CHECKING:

@@ -35,8 +35,8 @@ from proofroll.running.simulation import simulate
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.check.laws import impacts
 from proofroll.truth.error_bars import TwoRouteMotion
-from proofroll.truth.laws import impacts
 from proofroll.truth.plug_in import MechanismTruth
 from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.published import true_values

@@ -27,6 +27,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
+from proofroll.truth.check.held_to_laws import Recorded, held_to_laws, of_bodies, of_tree
 from proofroll.truth.early_end import EarlyEnd
 from proofroll.truth.error_bars import (
     NUDGE,
@@ -38,7 +39,6 @@ from proofroll.truth.error_bars import (
     on_same_turns,
 )
 from proofroll.truth.followed_paths import FollowedPath, before_first, end_of, followed, time_accuracy, two_route_motion
-from proofroll.truth.law_check.held_to_laws import Recorded, held_to_laws, of_bodies, of_tree
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, states_inside
 from proofroll.truth.smooth.singular_poses import BRANCHING, singular_poses, singular_poses_of

@@ -14,7 +14,7 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contact.sequences import Outcomes, refuse_spread
 from proofroll.elements.mechanism.dynamics import switches
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
-from proofroll.truth.laws import impacts
+from proofroll.truth.check.laws import impacts
 from proofroll.truth.switching.contact_stretches import GeometricSeries, Impact, ImpactSeries
 from proofroll.truth.truth_of_mechanism import truth_of
 

@@ -11,10 +11,10 @@ from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.motion import BallMotion
-from proofroll.truth.laws.check import LawCheck
-from proofroll.truth.laws.integrals import COUNT, POINTS, integral
-from proofroll.truth.laws.record import Modes, Pieces
-from proofroll.truth.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.integrals import COUNT, POINTS, integral
+from proofroll.truth.check.laws.law_check import LawCheck
+from proofroll.truth.check.laws.record import Modes, Pieces
+from proofroll.truth.check.laws.residuals import LawResiduals
 
 # Pieces of a motion that are looked at, and the turn of the ball in each [rad], which their points resolve.
 _PIECES, _TURN = 8, 0.5

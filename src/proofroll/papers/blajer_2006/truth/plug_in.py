@@ -29,8 +29,8 @@ from proofroll.papers.blajer_2006.truth.ball_laws import checked_motion
 from proofroll.papers.blajer_2006.truth.onset import edge_between, onset
 from proofroll.papers.blajer_2006.truth.rolling import reduced, unreduced
 from proofroll.truth import SAFETY
-from proofroll.truth.laws.check import sentence, verdict
-from proofroll.truth.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.law_check import sentence, verdict
+from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.plug_in import MechanismTruth
 
 if TYPE_CHECKING:

@@ -8,12 +8,20 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
-from proofroll.truth.laws.integrals import dot, norm
-from proofroll.truth.laws.joint_forces import forces_along
-from proofroll.truth.laws.loads import BodyLoads
-from proofroll.truth.laws.record import Array, Pieces
-from proofroll.truth.laws.residuals import ROUND, LawResiduals
-from proofroll.truth.laws.scene import FREE, HELD_PLACES, HELD_TURNS, JointFrames, LawScene, PlacedFrames, motion_of
+from proofroll.truth.check.laws.integrals import dot, norm
+from proofroll.truth.check.laws.joint_forces import forces_along
+from proofroll.truth.check.laws.loads import BodyLoads
+from proofroll.truth.check.laws.record import Array, Pieces
+from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
+from proofroll.truth.check.laws.scene import (
+    FREE,
+    HELD_PLACES,
+    HELD_TURNS,
+    JointFrames,
+    LawScene,
+    PlacedFrames,
+    motion_of,
+)
 
 
 class FreeDirection(NamedTuple):

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.laws.contacts import gap_of, slide_of
-from proofroll.truth.laws.impacts import impact
-from proofroll.truth.laws.integrals import dot, norm
-from proofroll.truth.laws.joints import Coordinates
-from proofroll.truth.laws.motion import jump
-from proofroll.truth.laws.record import Passage, Pieces
-from proofroll.truth.laws.residuals import LawResiduals
-from proofroll.truth.laws.scene import LawScene
+from proofroll.truth.check.laws.contacts import gap_of, slide_of
+from proofroll.truth.check.laws.impacts import impact
+from proofroll.truth.check.laws.integrals import dot, norm
+from proofroll.truth.check.laws.joints import Coordinates
+from proofroll.truth.check.laws.motion import jump
+from proofroll.truth.check.laws.record import Passage, Pieces
+from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.scene import LawScene
 
 _STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
 

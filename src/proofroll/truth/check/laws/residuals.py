@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.truth.laws.record import Array
+from proofroll.truth.check.laws.record import Array
 
 # Law -> allowance of its residual, relative to its natural size, and the law as a clause. On honest records of all
 # models the largest residual is 0.2 of its allowance, most are below 1e-3 of it.

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from proofroll.truth.laws.contacts import contact_laws
-from proofroll.truth.laws.joints import Coordinates, joint_laws
-from proofroll.truth.laws.loads import BodyLoads
-from proofroll.truth.laws.motion import energy, joined, kinematics, momenta
-from proofroll.truth.laws.record import Passage, Pieces
-from proofroll.truth.laws.residuals import COARSE, LAWS, LawResiduals, Violation
-from proofroll.truth.laws.scene import LawScene
-from proofroll.truth.laws.transitions import transition
+from proofroll.truth.check.laws.contacts import contact_laws
+from proofroll.truth.check.laws.joints import Coordinates, joint_laws
+from proofroll.truth.check.laws.loads import BodyLoads
+from proofroll.truth.check.laws.motion import energy, joined, kinematics, momenta
+from proofroll.truth.check.laws.record import Passage, Pieces
+from proofroll.truth.check.laws.residuals import COARSE, LAWS, LawResiduals, Violation
+from proofroll.truth.check.laws.scene import LawScene
+from proofroll.truth.check.laws.transitions import transition
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism

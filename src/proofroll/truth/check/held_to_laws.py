@@ -15,12 +15,12 @@ from proofroll.elements.mechanism.dynamics.link_forces import working
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.check.law_records import LawRecorder
+from proofroll.truth.check.law_states import by_the_bodies, by_the_tree
+from proofroll.truth.check.laws.law_check import LawCheck, LawVerdict, sentence, verdict
+from proofroll.truth.check.laws.record import Pieces, joined_pieces
+from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.followed_paths import CLOSE
-from proofroll.truth.law_check.law_records import LawRecorder
-from proofroll.truth.law_check.law_states import by_the_bodies, by_the_tree
-from proofroll.truth.laws.check import LawCheck, LawVerdict, sentence, verdict
-from proofroll.truth.laws.record import Pieces, joined_pieces
-from proofroll.truth.laws.residuals import LawResiduals
 from proofroll.truth.natural_units import Units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, first_close
 from proofroll.truth.switching.held_route import HeldPath

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.unit.truth.laws.conftest import HandMade, bounce, free_body, guided, pendulum, sliding
+from tests.unit.truth.check.laws.conftest import HandMade, bounce, free_body, guided, pendulum, sliding
 
 from proofroll.elements.mechanism import Body
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
-from proofroll.truth.laws.check import sentence, verdict
+from proofroll.truth.check.laws.law_check import sentence, verdict
 
 MILLIONTH = 1 + 1e-6
 HONEST = 1e-3  # largest residual of a record by hand, in parts of its allowance; 1e-5 is seen
@@ -139,7 +139,7 @@ def test_laws_take_no_code_of_the_routes() -> None:
     import ast
     from pathlib import Path
 
-    import proofroll.truth.laws as package
+    import proofroll.truth.check.laws as package
 
     for file in Path(package.__file__).parent.glob("*.py"):
         tree = ast.parse(file.read_text(encoding="utf-8"))
@@ -155,5 +155,5 @@ def test_laws_take_no_code_of_the_routes() -> None:
                 and id(node) not in typed
                 and (node.module or "").startswith("proofroll")
             ):
-                allowed = ("proofroll.truth.laws", "proofroll.elements.mechanism.scene.joint_kinds")
+                allowed = ("proofroll.truth.check.laws", "proofroll.elements.mechanism.scene.joint_kinds")
                 assert (node.module or "").startswith(allowed), f"{file.name} imports {node.module}"

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.laws.integrals import dot, integral, norm, since_start, tail, turned
-from proofroll.truth.laws.joints import FreeDirection
-from proofroll.truth.laws.loads import BodyLoads
-from proofroll.truth.laws.record import Array, Pieces
-from proofroll.truth.laws.residuals import LawResiduals
-from proofroll.truth.laws.scene import LawScene
+from proofroll.truth.check.laws.integrals import dot, integral, norm, since_start, tail, turned
+from proofroll.truth.check.laws.joints import FreeDirection
+from proofroll.truth.check.laws.loads import BodyLoads
+from proofroll.truth.check.laws.record import Array, Pieces
+from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.scene import LawScene
 
 _ARM = 1e-2  # part of the natural length that a body extends at least, for the size of its angular momentum
 _MEETS = 1e-13  # difference of times, relative to them, up to which a piece begins where the last one ended

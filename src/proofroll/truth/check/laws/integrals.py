@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from proofroll.truth.laws.record import Array
+from proofroll.truth.check.laws.record import Array
 
 COUNT = 12  # points of a piece: they resolve a turn of 1 rad to the last digit
 POINTS: Array = -np.cos(np.pi * np.arange(COUNT) / (COUNT - 1))

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from proofroll.truth.laws.integrals import dot, norm, of_angles, turned, turned_back
-from proofroll.truth.laws.record import Array
+from proofroll.truth.check.laws.integrals import dot, norm, of_angles, turned, turned_back
+from proofroll.truth.check.laws.record import Array
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair

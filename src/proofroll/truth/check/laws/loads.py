@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.truth.laws.integrals import dot, norm, of_angles, turned, turned_back
-from proofroll.truth.laws.record import Array, Pieces
-from proofroll.truth.laws.residuals import ROUND
-from proofroll.truth.laws.scene import LawScene, value_of, velocity_at
+from proofroll.truth.check.laws.integrals import dot, norm, of_angles, turned, turned_back
+from proofroll.truth.check.laws.record import Array, Pieces
+from proofroll.truth.check.laws.residuals import ROUND
+from proofroll.truth.check.laws.scene import LawScene, value_of, velocity_at
 
 _ARM = 1e-2  # part of the natural length by which a force turns at least, for sizes of moments
 _SMALL = 0.03  # rad, below which a series has more digits than the quotient

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.truth.laws.integrals import dot, norm
-from proofroll.truth.laws.loads import BodyLoads
-from proofroll.truth.laws.record import Array, Pieces
-from proofroll.truth.laws.residuals import ROUND, LawResiduals
-from proofroll.truth.laws.scene import LawScene, velocity_at
-from proofroll.truth.laws.surfaces import PairContact, gap, near, seen_from
+from proofroll.truth.check.laws.integrals import dot, norm
+from proofroll.truth.check.laws.loads import BodyLoads
+from proofroll.truth.check.laws.record import Array, Pieces
+from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
+from proofroll.truth.check.laws.scene import LawScene, velocity_at
+from proofroll.truth.check.laws.surfaces import PairContact, gap, near, seen_from
 
 _KNOWN = 1e-3  # rad, error of the direction of a slip from which on its law says nothing
 _DIRECTION = 3.0  # errors of that direction that are allowed

@@ -10,7 +10,7 @@ from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.law_check.law_states import by_the_bodies, by_the_tree
+from proofroll.truth.check.law_states import by_the_bodies, by_the_tree
 from proofroll.truth.switching.contact_taylor import CompiledStretch
 from proofroll.truth.tree.contact_tree import ContactTree
 from proofroll_drill.law_faults import SCENES

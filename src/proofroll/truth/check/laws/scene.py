@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.laws.integrals import frame_of, of_angles, turned
-from proofroll.truth.laws.record import Array, Pieces
-from proofroll.truth.laws.surfaces import PairContact, contacts_of
+from proofroll.truth.check.laws.integrals import frame_of, of_angles, turned
+from proofroll.truth.check.laws.record import Array, Pieces
+from proofroll.truth.check.laws.surfaces import PairContact, contacts_of
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
-from proofroll.truth.laws.contacts import gap_of, slide_of
-from proofroll.truth.laws.integrals import norm, turned
-from proofroll.truth.laws.joints import Coordinates
-from proofroll.truth.laws.record import Array, Passage, Pieces
-from proofroll.truth.laws.residuals import LawResiduals
-from proofroll.truth.laws.scene import FREE, HELD_PLACES, HELD_TURNS, JointFrames, LawScene
-from proofroll.truth.laws.surfaces import PairContact
+from proofroll.truth.check.laws.contacts import gap_of, slide_of
+from proofroll.truth.check.laws.integrals import norm, turned
+from proofroll.truth.check.laws.joints import Coordinates
+from proofroll.truth.check.laws.record import Array, Passage, Pieces
+from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.scene import FREE, HELD_PLACES, HELD_TURNS, JointFrames, LawScene
+from proofroll.truth.check.laws.surfaces import PairContact
 
 _CLOSED = 1e-13  # gap in natural sizes below which a contact may take an impulse
 _RANK = 1e-11  # singular value, relative to the largest, below which impulses are not independent

@@ -10,10 +10,10 @@ import numpy as np
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
-from proofroll.truth.laws.check import LawCheck
-from proofroll.truth.laws.integrals import POINTS
-from proofroll.truth.laws.record import Array, Modes, Passage, Pieces
-from proofroll.truth.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.integrals import POINTS
+from proofroll.truth.check.laws.law_check import LawCheck
+from proofroll.truth.check.laws.record import Array, Modes, Passage, Pieces
+from proofroll.truth.check.laws.residuals import LawResiduals
 
 GRAVITY = 9.81
 

@@ -19,9 +19,9 @@ from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies
-from proofroll.truth.law_check.law_states import stated_named
-from proofroll.truth.laws.integrals import POINTS, RESOLVED, TO_SERIES
-from proofroll.truth.laws.record import Modes, Passage, Pieces
+from proofroll.truth.check.law_states import stated_named
+from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES
+from proofroll.truth.check.laws.record import Modes, Passage, Pieces
 from proofroll.truth.natural_units import Units
 from proofroll.truth.numerics.hybrid import DenseStep, HybridPath, Stretch, states_inside
 from proofroll.truth.switching.contact_taylor import CompiledStretch

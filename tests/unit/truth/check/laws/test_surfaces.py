@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry
-from proofroll.truth.laws.surfaces import near, shape_of
+from proofroll.truth.check.laws.surfaces import near, shape_of
 
 
 @pytest.mark.filterwarnings("error")

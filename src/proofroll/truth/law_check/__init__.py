@@ -1,1 +1,0 @@
-"""Each route of a truth held against the laws: records, states between samples, verdict that ends a truth."""
