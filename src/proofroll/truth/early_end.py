@@ -7,9 +7,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch
 
 _Path = HybridPath[Stretch[ContactMode]]
@@ -72,4 +73,32 @@ def cut_at(path: _Path, end: float, text: str) -> _Path:
         known=False,
         ended=text,
         transitions=path.transitions[: len(kept)],
+    )
+
+
+def cut_motion(motion: TwoRouteMotion, end: float, text: str) -> TwoRouteMotion:
+    """Motion before a time [s], and the reason why it ends there.
+
+    Raises:
+        Refused: no sample lies before it.
+    """
+    count = int(np.sum(motion.record.time < end))
+    if not count:
+        raise Refused(text)
+
+    def first(values: Array | None) -> Array | None:
+        return None if values is None else values[:count]
+
+    return replace(
+        motion,
+        record=motion.record.first(count),
+        bars={name: bar[:count] for name, bar in motion.bars.items()},
+        events=tuple(event for event in motion.events if event.time < end),
+        bounces=tuple(bounce for bounce in motion.bounces if bounce.time < end),
+        end=end,
+        ended=text,
+        laws="",
+        pressed=first(motion.pressed),
+        sums=first(motion.sums),
+        works=first(motion.works),
     )

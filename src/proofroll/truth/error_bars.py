@@ -19,6 +19,7 @@ from proofroll.elements.mechanism.dynamics.record import Record, record_of
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
+from proofroll.truth.check.laws.tiles import Tiles
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
@@ -53,6 +54,7 @@ class TwoRouteMotion:
         sums: their sums, (times, sums, 3); None: as ``pressed``.
         works: work of drives since the start [J], (times, drives).
         laws: outcome of the law check, as a clause; empty: it ended the motion, or there was none.
+        tiles: poses and velocities in all pieces of the route of the record; None: there are none.
     """
 
     record: Record
@@ -72,6 +74,7 @@ class TwoRouteMotion:
     bounces: Sequence[Bounce] = ()
     works: Array | None = None
     laws: str = ""
+    tiles: Tiles | None = None
 
 
 def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:

@@ -25,6 +25,8 @@ from proofroll.elements.mechanism.scene.shapes.geometry import shared_pairs
 if TYPE_CHECKING:
     import xarray as xr
 
+    from proofroll.truth.error_bars import TwoRouteMotion
+
 # Error bar of the routes that a variable gets.
 _BARS = {
     "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
@@ -51,6 +53,9 @@ class MechanismTruth:
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
         """See :func:`proofroll.truth.truth_of_mechanism.truth_of`; of motions that are not unique, laws alone."""
         # imports of a third of a second, which what has another truth does not need
+        from proofroll.truth.check.answer import held_answer
+        from proofroll.truth.check.laws.answer import answer_sentence
+        from proofroll.truth.early_end import cut_motion
         from proofroll.truth.smooth.singular_poses import branching
         from proofroll.truth.truth_of_mechanism import truth_of
 
@@ -59,6 +64,19 @@ class MechanismTruth:
             motion = truth_of(element.mechanism, times)
         except NotUnique as error:
             return _laws_alone(element, times, str(error))
+        dataset = MechanismTruth._dataset(element, motion, branching(motion.branches))
+        if motion.tiles is None:
+            return dataset
+        check = held_answer(element, dataset, motion.tiles, times)
+        if text := answer_sentence(check.residuals):
+            assert check.residuals.first is not None  # as there is a text
+            motion = cut_motion(motion, check.residuals.first.time, text)
+            dataset = MechanismTruth._dataset(element, motion, branching(motion.branches))
+        return dataset
+
+    @staticmethod
+    def _dataset(element: MechanismElement, motion: TwoRouteMotion, branches: str) -> xr.Dataset:
+        """Dataset of a motion with its bars; ``branches``: note on singular poses along it."""
         record = motion.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
         pressed = np.zeros((len(record.time), 0, 3)) if motion.pressed is None else motion.pressed
@@ -118,7 +136,7 @@ class MechanismTruth:
             dataset.attrs["second_route"] += f", {motion.checked_by[0]}"
         if motion.laws:
             dataset.attrs[LAWS] = motion.laws
-        notes = [branching(motion.branches)]
+        notes = [branches]
         if np.isfinite(motion.horizon):
             dataset.attrs["horizon"] = motion.horizon
             if not motion.ended or motion.horizon < record.time[-1]:

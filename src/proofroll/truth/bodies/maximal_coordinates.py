@@ -24,6 +24,7 @@ from proofroll.elements.mechanism.dynamics.named_forces import joint_force_share
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
 from proofroll.elements.mechanism.scene.kinks import Functions
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.bodies.constraint_rows import ConstraintRow
 from proofroll.truth.bodies.maximal_bodies import BodyInScalars
 from proofroll.truth.bodies.maximal_equations import FUNCTIONS, ConstrainedEquations, MaximalEquations, Switched
@@ -180,6 +181,19 @@ class NumericEquations:
         R, r, v, w = (np.array([getattr(view, name) for view in views], float) for name in "Rrvw")
         arm = np.einsum("nij,nj->ni", R, np.array([body.com for body in self.equations.mechanism.bodies]))
         return r - arm, v - np.cross(w, arm), Rotation.from_matrix(R).as_quat(scalar_first=True), w
+
+    def poses_at(self, states: Array) -> tuple[Array, Array, Array, Array]:
+        """Places, velocities, rotations and angular velocities at states, each (states, bodies, …), world axes."""
+        unit = np.array([self.normalised(state) for state in states]).T
+        views = self.equations.views(list(unit), SMOOTH)[:-1]
+
+        def stacked(values: Sequence[Any]) -> Array:
+            return np.stack([np.broadcast_to(value, len(states)) for value in values], -1)
+
+        R = np.stack([np.stack([stacked(row) for row in view.R], -2) for view in views], 1)
+        r, v, w = (np.stack([stacked(getattr(view, name)) for view in views], 1) for name in "rvw")
+        arm = np.einsum("tnij,nj->tni", R, np.array([body.com for body in self.equations.mechanism.bodies]))
+        return r - arm, v - np.cross(w, arm), R, w
 
     def normalised(self, state: Array) -> Array:
         """State with quaternions of unit length."""

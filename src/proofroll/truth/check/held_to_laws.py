@@ -20,6 +20,7 @@ from proofroll.truth.check.law_states import by_the_bodies, by_the_tree
 from proofroll.truth.check.laws.law_check import LawCheck, LawVerdict, sentence, verdict
 from proofroll.truth.check.laws.record import Pieces, joined_pieces
 from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.tiles import Tiles, joined_tiles
 from proofroll.truth.followed_paths import CLOSE
 from proofroll.truth.natural_units import Units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, first_close
@@ -77,12 +78,26 @@ def of_bodies(
     return Recorded("bodies", recorder, path, held_path)
 
 
-def held_to_laws(
-    mechanism: Mechanism, units: Units, routes: Sequence[Recorded], most: int | None = None
-) -> tuple[tuple[float, str], str, list[WorkAlong]]:
-    """End of the paths by the first violation of a law, the outcome of the check, and the work of drives along each.
+class HeldMotion(NamedTuple):
+    """Outcome of the law check.
 
-    The end is a time in natural units, inf if there is none, and its reason; then the outcome is empty.
+    Attributes:
+        end: time of the first violation of a law, in natural units; inf: there is none.
+        text: its reason.
+        laws: sentence of the outcome; empty after a violation.
+        works: work of drives along each route.
+        tiles: of each route, by its place among them: poses and velocities at all times before one in natural units.
+    """
+
+    end: float
+    text: str
+    laws: str
+    works: list[WorkAlong]
+    tiles: Callable[[int, float], Tiles]
+
+
+def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[Recorded], most: int | None = None) -> HeldMotion:
+    """Outcome of the law check of all routes.
 
     Args:
         mechanism: in SI units.
@@ -99,27 +114,26 @@ def held_to_laws(
     early = min((path.stretches[-1].end for path in paths if not path.known), default=np.inf)
     end = min(early, first_close(paths, CLOSE))
     works = most is None and bool(working(mechanism))
-    alongs = list[WorkAlong]()
+    walks = list[_Walk]()
 
     def outcome(most: int | None) -> LawVerdict:
-        checked = {}
-        alongs.clear()
-        for route in routes:
-            walk = _Walk(mechanism, units, route, works)
-            checked[route.name] = walk.through(end * (1 - CLOSE), most)
-            alongs.append(walk.work)
-        return verdict(checked)
+        walks[:] = [_Walk(mechanism, units, route, works) for route in routes]
+        names = [route.name for route in routes]
+        return verdict({name: walk.through(end * (1 - CLOSE), most) for name, walk in zip(names, walks, strict=True)})
+
+    def tiles(number: int, until: float) -> Tiles:
+        return walks[number].tiles(until)
 
     result = outcome(None if works else most or _MOST)
     if result.violation is not None and most is None and not works:
         # The first violation may lie in a piece that was left out, and a joint may have turned around meanwhile.
         result = outcome(None)
-    text = sentence(result, len(routes))
+    text, alongs = sentence(result, len(routes)), [walk.work for walk in walks]
     if result.violation is None:
-        return (np.inf, ""), text, alongs
+        return HeldMotion(np.inf, "", text, alongs, tiles)
     if not result.violation.time > 0:
         raise Refused(text)
-    return (result.violation.time / units.time, text), "", alongs
+    return HeldMotion(result.violation.time / units.time, text, "", alongs, tiles)
 
 
 def work_along(mechanism: Mechanism, units: Units, tree: ContactTree, path: _Path) -> WorkAlong:
@@ -141,6 +155,7 @@ class _Walk:
         self._recorder, self._path, self._held = route.recorder, route.path, route.held
         self._check = LawCheck(mechanism, units.length, 1 / units.time)
         self.work, self._working = WorkAlong(mechanism, units.length, 1 / units.time), works
+        self._taken = dict[int, list[Pieces]]()
         self._waiting = list[Pieces]()  # of stretches in one mode, which are checked together
 
     def through(self, end: float, most: int | None) -> LawResiduals:
@@ -159,6 +174,7 @@ class _Walk:
             if self._held is not None:
                 self._held.recall(stretch.start)
             pieces = self._recorder.pieces(stretch, most)
+            self._taken[number] = pieces
             if last_pieces is not None:
                 passage = self._recorder.passage(self._path, number, last_pieces, self._recorder.start(stretch, pieces))
                 if passage.happens:
@@ -175,6 +191,19 @@ class _Walk:
             last_pieces = self._recorder.end(stretch, pieces)
         self._take_waiting()
         return judged
+
+    def tiles(self, until: float) -> Tiles:
+        """Poses and velocities in all pieces that begin before a time in natural units."""
+        parts = list[Tiles]()
+        for number, stretch in enumerate(self._path.stretches):
+            if stretch.start >= until and number:
+                break
+            if self._held is not None:
+                self._held.recall(stretch.start)
+            pieces = self._taken[number] if number in self._taken else self._recorder.pieces(stretch, 0)
+            part = self._recorder.tiles(number, stretch, pieces)
+            parts += [] if part is None else [part]
+        return joined_tiles(parts)
 
     def _take_waiting(self) -> None:
         if self._waiting:

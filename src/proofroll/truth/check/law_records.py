@@ -20,8 +20,9 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.check.law_states import stated_named
-from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES
+from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES, of_quaternion
 from proofroll.truth.check.laws.record import Modes, Passage, Pieces
+from proofroll.truth.check.laws.tiles import Tiles, joined_tiles
 from proofroll.truth.natural_units import Units
 from proofroll.truth.numerics.hybrid import DenseStep, HybridPath, Stretch, states_inside
 from proofroll.truth.switching.contact_taylor import CompiledStretch
@@ -96,6 +97,50 @@ class LawRecorder:
                 stated.append(self._stated(time, pace, np.array(records), stretch.mode, coarse=coarse))
         return stated
 
+    def tiles(self, number: int, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Tiles | None:
+        """Poses and velocities in all pieces of the stretch of a number; None: it has none.
+
+        ``pieces``: of :meth:`pieces`, which are all of a compiled stretch.
+        """
+        if isinstance(stretch, CompiledStretch) and stretch.by is not None and pieces:
+            return joined_tiles([Tiles.of(part, number) for part in pieces])
+        cut = list(self._whole(stretch))
+        if not cut:
+            return None
+        time, pace = (np.array([getattr(piece, name) for piece in cut]) for name in ("time", "pace"))
+        moving = self._moving(self._poses(np.concatenate([piece.states for piece in cut])).reshape(*time.shape, -1, 18))
+        return Tiles(
+            time=time * self._units.time,
+            pace=pace * self._units.time,
+            p=moving["p"],
+            R=moving["R"],
+            v=moving["v"],
+            w=moving["w"],
+            stretch=np.full(len(time), number),
+            modes=(self._modes(stretch.mode),) * len(time),
+        )
+
+    def _poses(self, states: Array) -> Array:
+        """Values of the bodies at states, (states, 18 bodies), in the order of a record."""
+        if isinstance(self._route, ContactBodies):
+            p, v, turned, w = self._route.equations.equations.poses_at(states[:, :-1])
+        else:
+            p, v, quaternions, w = map(np.array, zip(*map(self._route.bodies, states), strict=True))
+            turned = of_quaternion(quaternions)
+        return np.concatenate([p, turned.reshape(*p.shape[:2], 9), v, w], -1).reshape(len(states), -1)
+
+    def _moving(self, of_bodies: Array) -> dict[str, Array]:
+        """Poses and velocities in SI units, the world last, from values (pieces, points, bodies, 18)."""
+        length, shape = self._units.length, of_bodies.shape[:2]
+        world = np.broadcast_to(np.concatenate([np.zeros(3), np.eye(3).ravel(), np.zeros(6)]), (*shape, 1, 18))
+        of_bodies = np.concatenate([of_bodies, world], 2)
+        return {
+            "p": of_bodies[..., :3] * length,
+            "R": of_bodies[..., 3:12].reshape(*of_bodies.shape[:3], 3, 3),
+            "v": of_bodies[..., 12:15] * (length / self._units.time),
+            "w": of_bodies[..., 15:] / self._units.time,
+        }
+
     def start(self, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Pieces:
         """First point of a stretch with these pieces, as exact as its steps."""
         if pieces and self._reaches(pieces[0], 0, stretch.start):
@@ -146,8 +191,7 @@ class LawRecorder:
         in_named = np.split(self._named_units, np.cumsum(sizes[2:4]))
         of_bodies, of_contacts = of_bodies.reshape(*shape, bodies, 18), of_contacts.reshape(*shape, -1, 9)
         length, force, moment = units.length, units.force, units.force * units.length
-        world = np.broadcast_to(np.concatenate([np.zeros(3), np.eye(3).ravel(), np.zeros(6)]), (*shape, 1, 18))
-        of_bodies, forces = np.concatenate([of_bodies, world], 2), of_contacts[..., :3]
+        moving, forces = self._moving(of_bodies), of_contacts[..., :3]
         drive = np.zeros((*shape, joints))
         for k, (joint, _, _) in enumerate(m.prescribed):
             drive[..., m.joint_index[joint.name]] = drives[..., k] * in_named[1][k]
@@ -171,10 +215,10 @@ class LawRecorder:
         return Pieces(
             time=time * units.time,
             pace=pace * units.time,
-            p=of_bodies[..., :3] * length,
-            R=of_bodies[..., 3:12].reshape(*shape, bodies + 1, 3, 3),
-            v=of_bodies[..., 12:15] * (length / units.time),
-            w=of_bodies[..., 15:] / units.time,
+            p=moving["p"],
+            R=moving["R"],
+            v=moving["v"],
+            w=moving["w"],
             effort=effort * in_named[0],
             coupling=coupling * in_named[2],
             drive=drive,
@@ -212,6 +256,39 @@ class LawRecorder:
             stops=tuple((low, high) for low, high in stops),
         )
 
+    def _whole(self, stretch: Stretch[ContactMode]) -> Iterator[_Piece]:
+        """Pieces of a stretch that leave no time out, without forces."""
+        if isinstance(stretch, StoppingSlip):
+            edges = [stretch.start, *(step.time for step in stretch.steps), stretch.end]
+            for start, end in pairwise(edges):
+                if end > start:
+                    yield from self._parts(start, end, lambda times: stretch.at(times).T, None)
+        elif stretch.exact and not isinstance(stretch, CompiledStretch):
+            for start, end, inside in stretch.dense:
+                if min(end, stretch.end) > start:
+                    yield from self._equal_parts(start, min(end, stretch.end), inside)
+        else:
+            yield from self._cut(stretch, None)
+
+    def _equal_parts(self, start: float, end: float, inside: Callable[[Array], Any]) -> Iterator[_Piece]:
+        """Equal pieces of a step, so many that their points resolve states and turns."""
+        count = 1
+        for _ in range(_HALVINGS):
+            half = (end - start) / (2 * count)
+            middles = start + half * (2 * np.arange(count) + 1)
+            times = middles[:, None] + half * POINTS
+            states = np.asarray(inside(times.ravel()))
+            moving = self._poses(states.T).reshape(count, len(POINTS), -1, 18)
+            turn = 2 * half * float(np.abs(moving[..., 15:]).max(initial=0.0))
+            values = states.reshape(-1, len(POINTS))
+            if self._mechanism.prescribed:
+                values = np.concatenate([values, np.moveaxis(moving[..., 3:12], 1, -1).reshape(-1, len(POINTS))])
+            if turn <= _TURN and not _unresolved(values):
+                break
+            count = max(2 * count, int(np.ceil(count * turn / _TURN)))
+        states = states.T.reshape(*times.shape, -1)
+        yield from (_Piece(time, np.full(len(POINTS), half), part) for time, part in zip(times, states, strict=True))
+
     def _cut(self, stretch: Stretch[ContactMode], most: int | None) -> Iterator[_Piece]:
         """Pieces of a stretch; ``most``: see :meth:`pieces`."""
         if isinstance(stretch, BegunSlip):
@@ -230,8 +307,8 @@ class LawRecorder:
             for start, end, inside_step in stretch.by.steps_of(stretch):
                 yield from self._parts(start, end, inside_step, recorded, paced=True)
         elif stretch.exact:
-            whole = [[step] for step in stretch.dense if min(step[1], stretch.end) > step[0]]
-            yield from (self._window(step) for (step,) in self._looked_at(whole, most))
+            steps_apart = [[step] for step in stretch.dense if min(step[1], stretch.end) > step[0]]
+            yield from (self._window(step) for (step,) in self._looked_at(steps_apart, most))
         elif stretch.dense:
             groups = [stretch.dense[begin : begin + _TOGETHER] for begin in range(0, len(stretch.dense), _TOGETHER)]
             for steps in self._looked_at(groups, most):

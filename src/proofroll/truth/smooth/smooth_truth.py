@@ -10,6 +10,7 @@ conservative mechanism has failed, and shows no chaos.
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
-from proofroll.truth.check.held_to_laws import Recorded, held_to_laws, of_bodies, of_tree
+from proofroll.truth.check.held_to_laws import HeldMotion, Recorded, held_to_laws, of_bodies, of_tree
 from proofroll.truth.early_end import EarlyEnd
 from proofroll.truth.error_bars import (
     NUDGE,
@@ -51,7 +52,7 @@ CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indis
 BRANCH = 1e-3  # natural lengths, 1: distance between routes that chaos causes only long after the horizon
 ENERGY = 1e-8  # change of energy relative to its parts, a thousand times that of routes through chaos, 1e-11
 _PIECES = 2  # of a route that are held to the laws: they cost a tenth of a truth of few samples
-_FORM_STEPS = 4  # parts of a run at which a closed form is held to the laws
+_FORM_STEPS = 4  # parts of a run, at least, at which a closed form is held to the laws
 _FORM_STEP = 1.0  # length of each at most, in natural units
 _WITNESS_STEP = 2.0**-7  # length of the equal steps of a closed form's witness at most, in natural units
 _POSE_STEP = 2.0**-6  # length of steps that look for singular poses at most, in natural units
@@ -148,7 +149,7 @@ class _SmoothTruth:
             count = len(by_the_tree)
             chaotic = chaotic[:count] & (by_the_tree * NUDGE > CHAOS)
         self._check_branch(by_tree.first(count), by_bodies.first(count), chaotic, early, paths)
-        laws = self._held_to_laws(paths, early)
+        held = self._held_to_laws(paths, early)
         count = len(early.known(self._times))
         by_tree, by_bodies = by_tree.first(count), by_bodies.first(count)
         best, nearby = by_bodies, on_same_turns(self._mechanism, by_bodies, nearby.first(count))
@@ -182,7 +183,9 @@ class _SmoothTruth:
             ended=units.text_in_seconds(self._reason(early.time, early.reason)),
             checked_by=self._checked_by(best),
             branches=branches,
-            laws=laws,
+            laws=held.laws,
+            # the published motion is that of the second route, or of a closed form, which it follows within the bar
+            tiles=held.tiles(-1, float(self._times[count - 1])),
         )
 
     @staticmethod
@@ -200,8 +203,8 @@ class _SmoothTruth:
         witness = self._in_seconds(self._equations.recorded(self._times, states))
         exact = on_same_turns(self._mechanism, witness, self._from_form(form, self._seconds))
         early = EarlyEnd()
-        (broken, text), laws, _ = held_to_laws(self._mechanism, self._units, [self._recorded()], most=_PIECES)
-        early.at(broken, text)
+        held = held_to_laws(self._mechanism, self._units, [self._recorded()], most=_PIECES)
+        early.at(held.end, held.text)
         count = len(early.known(self._times))
         path, unknown = self._path_of_form(), np.full((count, len(working(self._mechanism))), np.nan)
         motion = two_route_motion(
@@ -216,7 +219,8 @@ class _SmoothTruth:
             left=dict.fromkeys(_apart_in_fields(self._mechanism, exact, exact), np.zeros(count)),
         )
         end = early.time * self._units.time
-        return replace(motion, end=end, ended=early.reason, branches=self._branches(), laws=laws)
+        tiles = held.tiles(0, float(self._times[count - 1]))
+        return replace(motion, end=end, ended=early.reason, branches=self._branches(), laws=held.laws, tiles=tiles)
 
     def _branches(self) -> list[float]:
         """Times of singular poses along the closed form [s]."""
@@ -312,8 +316,8 @@ class _SmoothTruth:
         moved, record = (equations.recorded(times, tree.within(item, times)[:, :-1]) for item in (nearby, stretch))
         return _apart(moved, record) / BESIDE
 
-    def _held_to_laws(self, paths: tuple[FollowedPath, FollowedPath], early: EarlyEnd) -> str:
-        """Outcome of the law check; a violation ends the truth, and the outcome is empty."""
+    def _held_to_laws(self, paths: tuple[FollowedPath, FollowedPath], early: EarlyEnd) -> HeldMotion:
+        """Outcome of the law check; a violation ends the truth."""
         mechanism, units, stretch = self._mechanism, self._units, paths[0].stretches[0]
 
         def turns_at(times: Array) -> Array:
@@ -328,9 +332,9 @@ class _SmoothTruth:
             of_tree(mechanism, units, self._tree, paths[0], turns_at=of_the_tree),
             of_bodies(mechanism, units, self._bodies, self._second, paths[1], turns_at=turns_at),
         ]
-        (broken, text), laws, _ = held_to_laws(mechanism, units, routes, most=_PIECES)
-        early.at(broken, text)
-        return laws
+        held = held_to_laws(mechanism, units, routes, most=_PIECES)
+        early.at(held.end, held.text)
+        return held
 
     def _recorded(self) -> Recorded:
         """The closed form as a route that is held to the laws."""
@@ -355,8 +359,7 @@ class _SmoothTruth:
         def inside(times: Array) -> Array:
             return np.column_stack([*motion(times), times]).T
 
-        length = min(self._until / _FORM_STEPS, _FORM_STEP)
-        starts = np.linspace(0.0, self._until, _FORM_STEPS, endpoint=False).tolist()
+        edges = np.linspace(0.0, self._until, max(_FORM_STEPS, int(np.ceil(self._until / _FORM_STEP))) + 1).tolist()
         first, last = inside(np.array([0.0, self._until])).T
         stretch = Stretch[tuple[()]](
             start=0.0,
@@ -365,7 +368,7 @@ class _SmoothTruth:
             first=first,
             last=last,
             guard=None,
-            dense=[(start, start + length, inside) for start in starts],
+            dense=[(start, end, inside) for start, end in pairwise(edges)],
             exact=True,
         )
         return HybridPath(stretches=(stretch,), happenings=(), margins=())

@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.truth.check.laws.integrals import dot, norm
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import Array, Pieces
+from proofroll.truth.check.laws.record import Array, Moving, Pieces
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene, velocity_at
 from proofroll.truth.check.laws.surfaces import PairContact, gap, near, seen_from
@@ -30,10 +30,16 @@ class ClosedContact(NamedTuple):
     fast: Array
 
 
-def gap_of(contact: PairContact, pieces: Pieces) -> Array:
+def gap_of(contact: PairContact, pieces: Moving) -> Array:
     """Gap of a contact from poses alone [m]; of one of several places of two solids that of the solids."""
     A, B = ((pieces.p[..., body, :], pieces.R[..., body, :, :]) for body in (contact.a, contact.b))
     return gap(contact.shape_a, contact.shape_b, A, B)
+
+
+def apart(scene: LawScene, contact: PairContact, pieces: Moving, residuals: LawResiduals) -> None:
+    """No body passes into another."""
+    far = scene.length + np.abs(pieces.p[..., [contact.a, contact.b], :]).max((-1, -2))
+    residuals.note("gap", contact.name, np.maximum(-gap_of(contact, pieces), 0), far, pieces.time)
 
 
 def slide_of(contact: PairContact, pieces: Pieces, place: Array) -> Array:
@@ -45,13 +51,12 @@ def contact_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads
     """Checks all contacts, and adds their forces and moments to the loads."""
     if not scene.contacts:
         return
-    largest = norm(pieces.force).max(-1) + scene.faint
+    largest = np.nan_to_num(norm(pieces.force)).max(-1) + scene.faint
     passed = set[str]()
     for k, contact in enumerate(scene.contacts):
         if contact.alone or contact.pair.name not in passed:
             passed.add(contact.pair.name)
-            far = scene.length + np.abs(pieces.p[..., [contact.a, contact.b], :]).max((-1, -2))
-            residuals.note("gap", contact.name, np.maximum(-gap_of(contact, pieces), 0), far, pieces.time)
+            apart(scene, contact, pieces, residuals)
         if pieces.modes.contacts[k] == "open":
             residuals.note("pull", contact.name, norm(pieces.force[..., k, :]), largest, pieces.time)
             continue

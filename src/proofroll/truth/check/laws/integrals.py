@@ -70,3 +70,14 @@ def of_angles(angles: Array) -> Array:
         step[i, j], step[j, i] = -np.sin(angle), np.sin(angle)
         rotation = step @ rotation
     return rotation
+
+
+def of_quaternion(q: Array) -> Array:
+    """Rotation of a unit quaternion, scalar first."""
+    s, x, y, z = np.moveaxis(q, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - s * z), 2 * (x * z + s * y)],
+        [2 * (x * y + s * z), 1 - 2 * (x * x + z * z), 2 * (y * z - s * x)],
+        [2 * (x * z - s * y), 2 * (y * z + s * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.asarray(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))

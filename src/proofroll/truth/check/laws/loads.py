@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.truth.check.laws.integrals import dot, norm, of_angles, turned, turned_back
-from proofroll.truth.check.laws.record import Array, Pieces
+from proofroll.truth.check.laws.record import Array, Moving
 from proofroll.truth.check.laws.residuals import ROUND
 from proofroll.truth.check.laws.scene import LawScene, value_of, velocity_at
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism.scene.bushing import Bushing
+    from proofroll.elements.mechanism.scene.parts import Spring
 
 _ARM = 1e-2  # part of the natural length by which a force turns at least, for sizes of moments
 _SMALL = 0.03  # rad, below which a series has more digits than the quotient
@@ -26,7 +30,7 @@ class BodyLoads:
         power_size: sum of the sizes of its parts.
     """
 
-    def __init__(self, scene: LawScene, pieces: Pieces) -> None:
+    def __init__(self, scene: LawScene, pieces: Moving) -> None:
         self._scene, self._pieces = scene, pieces
         self._centres = scene.centres(pieces)[0]
         self.force, self.moment = np.zeros_like(pieces.p), np.zeros_like(pieces.p)
@@ -71,16 +75,9 @@ class BodyLoads:
         scene, pieces = self._scene, self._pieces
         for spring in scene.mechanism.springs:
             a, b = scene.index[spring.body_a], scene.index[spring.body_b]
-            ends = [
-                pieces.p[..., body, :] + turned(pieces.R[..., body, :, :], np.array(position))
-                for body, position in ((a, spring.position_a), (b, spring.position_b))
-            ]
+            pull, rate, ends = spring_pull(scene, pieces, spring)
             length = norm(ends[1] - ends[0])
             direction = (ends[1] - ends[0]) / length[..., None]
-            rate = dot(direction, velocity_at(pieces, b, ends[1]) - velocity_at(pieces, a, ends[0]))
-            pull = spring.stiffness * (length - spring.length) + spring.damping * rate
-            if spring.force is not None:
-                pull = pull + spring.force.in_piece(length, rate)
             for body, end, sign in ((a, ends[0], 1.0), (b, ends[1], -1.0)):
                 self.add(body, end, (sign * pull)[..., None] * direction)
                 self._stiff(body, spring.stiffness, length + norm(end))
@@ -90,16 +87,10 @@ class BodyLoads:
         scene, pieces = self._scene, self._pieces
         for bushing in scene.mechanism.bushings:
             a, b = scene.index[bushing.body_a], scene.index[bushing.body_b]
-            A = pieces.R[..., a, :, :] @ of_angles(np.array(bushing.orientation_a))
-            B = pieces.R[..., b, :, :] @ of_angles(np.array(bushing.orientation_b))
-            origin_a = pieces.p[..., a, :] + turned(pieces.R[..., a, :, :], np.array(bushing.position_a))
-            origin_b = pieces.p[..., b, :] + turned(pieces.R[..., b, :, :], np.array(bushing.position_b))
-            slide = turned_back(A, velocity_at(pieces, b, origin_b) - velocity_at(pieces, a, origin_b))
-            spin = turned_back(A, pieces.w[..., b, :] - pieces.w[..., a, :])
-            stiffness, damping = np.array(bushing.stiffness), np.array(bushing.damping)
-            force = -stiffness[:3] * turned_back(A, origin_b - origin_a) - damping[:3] * slide
-            moment = -_bent(A.swapaxes(-1, -2) @ B, stiffness[3:]) - damping[3:] * spin
-            self.between(b, a, origin_b, turned(A, force), turned(A, moment))
+            force, moment, slide, spin = bushing_load(scene, pieces, bushing)
+            origin_b = spring_ends(scene, pieces, bushing)[1]
+            stiffness = np.array(bushing.stiffness)
+            self.between(b, a, origin_b, force, moment)
             for body in (a, b):
                 self._stiff(body, stiffness[:3].max(), norm(origin_b), stiffness[3:].max())
             size = norm(force) * scene.speed + norm(moment) * scene.rate
@@ -123,12 +114,57 @@ class BodyLoads:
             self.works(power, norm(value) * scene.speed)
 
 
-def _bent(R: Array, stiffness: Array) -> Any:
-    """Derivative of ½ Σ k θ² by a rotation about the axes of A, θ being the rotation vector of B in A."""
+def spring_ends(scene: LawScene, pieces: Moving, link: Spring | Bushing) -> tuple[Array, Array]:
+    """Ends of a spring or bushing on its bodies [m]."""
+    a, b = (
+        pieces.p[..., body, :] + turned(pieces.R[..., body, :, :], np.array(position))
+        for body, position in (
+            (scene.index[link.body_a], link.position_a),
+            (scene.index[link.body_b], link.position_b),
+        )
+    )
+    return a, b
+
+
+def spring_pull(scene: LawScene, pieces: Moving, spring: Spring) -> tuple[Array, Array, tuple[Array, Array]]:
+    """Pull of a spring [N], the rate of its length [m/s], and its ends [m]."""
+    ends = spring_ends(scene, pieces, spring)
+    length = norm(ends[1] - ends[0])
+    speeds = [
+        velocity_at(pieces, scene.index[body], end)
+        for body, end in zip((spring.body_a, spring.body_b), ends, strict=True)
+    ]
+    rate = dot((ends[1] - ends[0]) / length[..., None], speeds[1] - speeds[0])
+    pull = spring.stiffness * (length - spring.length) + spring.damping * rate
+    return pull if spring.force is None else pull + spring.force.in_piece(length, rate), rate, ends
+
+
+def bushing_load(scene: LawScene, pieces: Moving, bushing: Bushing) -> tuple[Array, Array, Array, Array]:
+    """Force and moment of a bushing on its second body [N, N m], velocity and spin of that seen from the first."""
+    a, b = scene.index[bushing.body_a], scene.index[bushing.body_b]
+    A = pieces.R[..., a, :, :] @ of_angles(np.array(bushing.orientation_a))
+    B = pieces.R[..., b, :, :] @ of_angles(np.array(bushing.orientation_b))
+    origin_a, origin_b = spring_ends(scene, pieces, bushing)
+    slide = velocity_at(pieces, b, origin_b) - velocity_at(pieces, a, origin_b)
+    spin = pieces.w[..., b, :] - pieces.w[..., a, :]
+    stiffness, damping = np.array(bushing.stiffness), np.array(bushing.damping)
+    force = -stiffness[:3] * turned_back(A, origin_b - origin_a) - damping[:3] * turned_back(A, slide)
+    moment = -_bent(A.swapaxes(-1, -2) @ B, stiffness[3:]) - damping[3:] * turned_back(A, spin)
+    return turned(A, force), turned(A, moment), slide, spin
+
+
+def rotation_vector(R: Array) -> Array:
+    """Axis times angle of a rotation by less than half a turn [rad]."""
     sine = 0.5 * np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1)
     size = norm(sine)
     angle = np.arctan2(size, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1))
-    theta = sine * np.where(size > 0, angle / np.where(size > 0, size, 1.0), 1.0)[..., None]
+    return np.asarray(sine * np.where(size > 0, angle / np.where(size > 0, size, 1.0), 1.0)[..., None])
+
+
+def _bent(R: Array, stiffness: Array) -> Any:
+    """Derivative of ½ Σ k θ² by a rotation about the axes of A, θ being the rotation vector of B in A."""
+    theta = rotation_vector(R)
+    angle = norm(theta)
     large = np.where(angle > _SMALL, angle, 1.0)
     series = 1 / 12 + angle**2 / 720 + angle**4 / 30240
     factor = np.where(angle > _SMALL, 1 / large**2 - 1 / (2 * large * np.tan(large / 2)), series)

@@ -2,17 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    pass
-
 Array = NDArray[np.float64]
+
+
+class Moving(Protocol):
+    """Poses and velocities of all bodies and the world at points of pieces, see :class:`Pieces`."""
+
+    @property
+    def time(self) -> Array:
+        """[s]."""
+
+    @property
+    def pace(self) -> Array:
+        """Rate of the time by the variable of a piece [s]."""
+
+    @property
+    def p(self) -> Array:
+        """Origins [m]."""
+
+    @property
+    def R(self) -> Array:
+        """Rotations."""
+
+    @property
+    def v(self) -> Array:
+        """Velocities [m/s]."""
+
+    @property
+    def w(self) -> Array:
+        """Angular velocities [rad/s]."""
+
+
+class Turning(Moving, Protocol):
+    """The same, with coordinates for their whole turns."""
+
+    @property
+    def turns(self) -> Array | None:
+        """See :class:`Pieces`."""
 
 
 class Modes(NamedTuple):
@@ -120,3 +153,43 @@ class Passage:
     def happens(self) -> bool:
         """True if modes change or velocities may jump."""
         return bool(self.impacts or self.settles) or self.before.modes != self.after.modes
+
+
+@dataclass(frozen=True)
+class Change:
+    """An event as it is published: kind, name of a contact or joint, time and bracket [s]."""
+
+    kind: str
+    name: str
+    time: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Published:
+    """What a truth publishes, SI units.
+
+    Attributes:
+        pieces: motion, contacts and forces along coordinates at each sample, a piece of one point each; NaN: not
+            determined; modes and turns are those of the tile that holds the sample.
+        reactions: force and moment of each joint and loop on its child, at its place there, world axes [N, N m],
+            (samples, 1, connections, 6).
+        values: all variables, by name, (samples, …).
+        bars: their error bars.
+        changes: events.
+    """
+
+    pieces: Pieces
+    reactions: Array
+    values: Mapping[str, Array]
+    bars: Mapping[str, float]
+    changes: Sequence[Change]
+
+    def of(self, chosen: NDArray[np.intp]) -> Published:
+        """Some of the samples."""
+        arrays = {item.name: getattr(self.pieces, item.name) for item in fields(Pieces)}
+        taken: dict[str, Any] = {name: value[chosen] for name, value in arrays.items() if isinstance(value, np.ndarray)}
+        count = len(self.reactions)
+        values = {name: value[chosen] if len(value) == count else value for name, value in self.values.items()}
+        return replace(self, pieces=replace(self.pieces, **taken), reactions=self.reactions[chosen], values=values)

@@ -41,6 +41,18 @@ LAWS: dict[str, tuple[float, str]] = {
     "impulse": (1e-10, "velocities jump by impulses of joints, stops and contacts"),
     "restitution": (1e-10, "v+ = -e v- at an impact"),
     "impact cone": (1e-9, "impulses press, within the bound of friction"),
+    "start": (1e-10, "the motion begins as the joints say"),
+    "tiled": (1e-6, "the motion that was followed leaves no time out"),
+    "sample": (1e-10, "a sample lies on the motion that was followed"),
+    "times": (1e-14, "samples are at the times that were asked for"),
+    "newton": (3e-9, "mass times acceleration = sum of the published forces"),
+    "euler": (3e-9, "rate of angular momentum = sum of the published moments"),
+    "along": (3e-9, "a joint transmits along a free direction what its drives, springs and friction give"),
+    "power": (3e-8, "rate of the energy = power of the published forces"),
+    "value": (1e-10, "a published value follows from places and velocities"),
+    "spelling": (1e-12, "two variables of one quantity are equal"),
+    "work": (1e-8, "work = integral of force times rate"),
+    "change": (1e-11, "an event lies where the motion changes, and each change has its event"),
 }
 # Laws that a route keeps by their second derivatives alone: their residuals (1e-13 after 1 s of `stopped_fall`) grow
 # as a random walk of rates does. So their allowances grow with the time in natural units.
@@ -82,6 +94,7 @@ class LawResiduals:
         events: number of transitions.
         coarse: factor on all allowances, now.
         rate: natural rate of the scene [1/s].
+        known_alone: True if NaN is a value that is not determined, of which no law says anything.
     """
 
     largest: dict[str, tuple[float, float, str]] = field(default_factory=dict)
@@ -91,6 +104,7 @@ class LawResiduals:
     events: int = 0
     coarse: float = 1.0
     rate: float = 0.0
+    known_alone: bool = False
 
     def note(
         self,
@@ -117,10 +131,12 @@ class LawResiduals:
             parts = np.where(residual > 0, residual / allowed, 0.0)
             relative = np.where(residual > 0, np.maximum(residual - extra, 0.0) / size, 0.0)
         parts = np.where(np.isfinite(residual), parts, np.inf)
+        if self.known_alone:
+            parts = np.where(np.isnan(residual) | np.isnan(allowed), 0.0, parts)
         worst = int(np.argmax(parts))
         if parts.flat[worst] >= self.largest.get(law, (0.0,))[0]:
             self.largest[law] = float(parts.flat[worst]), float(times.flat[worst]), part
-        self.relative[law] = max(self.relative.get(law, 0.0), float(np.nanmax(relative)))
+        self.relative[law] = max(self.relative.get(law, 0.0), float(np.nanmax(relative, initial=0.0)))
         if not parts.flat[worst] > 1.0:
             return
         violating = (parts > 1.0).reshape(len(parts), -1).any(1)

@@ -1,0 +1,95 @@
+"""Hook of the check of the answer: the dataset that a truth is about to return, read back and held against the laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import ENDS
+from proofroll.core.events import events_of
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.truth.check.laws.answer import AnswerCheck
+from proofroll.truth.check.laws.integrals import of_quaternion
+from proofroll.truth.check.laws.record import Array, Change, Modes, Pieces, Published
+from proofroll.truth.check.laws.tiles import Tiles
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def held_answer(element: MechanismElement, dataset: xr.Dataset, tiles: Tiles, asked: FloatArray) -> AnswerCheck:
+    """Check of a dataset, whose samples were asked for at these times [s], along the motion that was followed."""
+    check = AnswerCheck(element.mechanism, element.length, element.speed / element.length)
+    with np.errstate(all="ignore"):
+        check.take(_published(element, dataset), tiles, asked, float(dataset.attrs.get(ENDS, np.inf)))
+    return check
+
+
+def _published(element: MechanismElement, dataset: xr.Dataset) -> Published:
+    """What a dataset says."""
+    m = element.mechanism
+    values = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
+    count, joints = len(values["time"]), len(m.joints)
+
+    def along(field: str, names: list[str]) -> Array:
+        columns = [values.get(f"{field}.{name}", np.zeros(count)) for name in names]
+        return np.stack(columns, -1)[:, None] if columns else np.zeros((count, 1, 0))
+
+    def vectors(field: str, names: list[str]) -> Array:
+        rows = [np.stack([values[f"{field}.{name}.{axis}"] for axis in "xyz"], -1) for name in names]
+        return np.stack(rows, 1)[:, None] if rows else np.zeros((count, 1, 0, 3))
+
+    def world(of_bodies: Array, value: Array) -> Array:
+        beyond = np.broadcast_to(value, (count, 1, *value.shape))
+        return np.concatenate([of_bodies, beyond], 1)[:, None]
+
+    connections, names = [item.name for item in m.connections], [joint.name for joint in m.joints]
+    contacts, zero = [contact.name for contact in m.contacts], np.zeros(3)
+    stop = along("stop", names)
+    place, normal = _where_contacts_act(element, values)
+    pieces = Pieces(
+        time=values["time"][:, None],
+        pace=np.ones((count, 1)),
+        p=world(values["p_WB"], zero),
+        R=world(of_quaternion(values["q_WB"]), np.eye(3)),
+        v=world(values["v_WB"], zero),
+        w=world(values["w_WB"], zero),
+        effort=along("effort", [item.name for item in m.actuators]),
+        coupling=along("coupling", [item.name for item in m.couplings]),
+        drive=along("drive", names),
+        loop=np.concatenate([vectors(kind, connections[joints:]) for kind in ("force", "torque")], -1),
+        friction=along("friction", names),
+        # a force along the coordinate is that of the lower stop, one against it of the upper
+        stops=np.stack([np.maximum(stop, 0.0), np.minimum(stop, 0.0)], -1),
+        force=vectors("force", contacts),
+        place=place[:, None],
+        normal=normal[:, None],
+        rolling=_turning(m.contacts, count, "rolling_resistance"),
+        spinning=_turning(m.contacts, count, "spinning_friction"),
+        modes=Modes((), (), (), (), ()),
+    )
+    reactions = np.concatenate([vectors(kind, connections) for kind in ("force", "torque")], -1)
+    changes = [Change(str(e.kind), e.name, e.time, e.time_low, e.time_high) for e in events_of(dataset)]
+    bars = {str(name): float(item.attrs.get("error_bar", 0.0)) for name, item in dataset.data_vars.items()}
+    return Published(pieces=pieces, reactions=reactions, values=values, bars=bars, changes=changes)
+
+
+def _where_contacts_act(element: MechanismElement, values: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Places [m] and normals of contacts, (samples, contacts, 3), which the laws hold against the surfaces."""
+    m, count = element.mechanism, len(values["time"])
+    if not m.contacts:
+        return np.zeros((count, 0, 3)), np.zeros((count, 0, 3))
+    motion = (np.array(values[name], dtype=float) for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB"))
+    followed = follow_contacts(Placed(m, *motion))
+    return followed.place, followed.normal
+
+
+def _turning(contacts: tuple[object, ...], count: int, name: str) -> Array:
+    """Moments of contacts, (samples, 1, contacts, 3): NaN of those that have one."""
+    given = np.array([bool(getattr(contact, name, 0.0)) for contact in contacts], dtype=bool).reshape(-1, 1)
+    return np.broadcast_to(np.where(given, np.nan, 0.0), (count, 1, len(contacts), 3)).copy()

@@ -1,0 +1,112 @@
+"""The check of an answer: what a truth publishes, held against the motion that was followed and against the laws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.truth.check.laws.changes import changes_of
+from proofroll.truth.check.laws.record import Array, Published
+from proofroll.truth.check.laws.residuals import LAWS, LawResiduals
+from proofroll.truth.check.laws.samples import force_laws, kinetic_energy, on_the_motion
+from proofroll.truth.check.laws.scene import LawScene
+from proofroll.truth.check.laws.tiled import Turns, laws_at_all_times, start_of
+from proofroll.truth.check.laws.tiles import Places, Tiles
+from proofroll.truth.check.laws.values import values_follow
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism import Mechanism
+
+_INSTANT = 1e-6  # part of an interval of a controller beside an instant, where forces are those of either side
+_JUMPS = {"impact", "bounce", "settle"}
+
+
+class AnswerCheck:
+    """Laws of a mechanism, to which what a truth publishes is held.
+
+    Attributes:
+        residuals: remainders of the laws.
+        held: number of samples on a piece of the motion.
+    """
+
+    def __init__(self, mechanism: Mechanism, length: float, rate: float) -> None:
+        """Takes a mechanism in SI units with its natural length [m] and rate [1/s]."""
+        self._scene = LawScene(mechanism, length, rate)
+        self.residuals, self.held = LawResiduals(rate=rate, known_alone=True), 0
+
+    def take(self, published: Published, tiles: Tiles, asked: Array, end: float) -> None:
+        """Checks an answer.
+
+        Args:
+            published: the answer.
+            tiles: the motion that was followed.
+            asked: times that were asked for [s].
+            end: time before which the truth ends, or inf [s].
+        """
+        scene, residuals, time = self._scene, self.residuals, published.pieces.time[:, 0]
+        self._times(time, asked, end)
+        if not np.isfinite(published.pieces.p).all():  # a motion that is not unique has no values
+            return
+        last = float(time[-1])
+        turns = laws_at_all_times(scene, tiles, residuals, last)
+        struck = any(item.kind in _JUMPS and item.low <= 0 for item in published.changes)
+        start_of(scene, tiles, residuals, struck)
+        changes_of(scene, tiles, published, residuals, last)
+        reached = time.copy()
+        for item in published.changes:  # within the bracket of an event a sample is that of the later side
+            reached[(item.low <= time) & (time < item.time)] = item.time
+        places = tiles.holding(reached)
+        self.held = int(places.held.sum())
+        rows = np.flatnonzero(places.held)
+        if not rows.size:
+            return
+        published, places = published.of(rows), places.of(rows)
+        published = replace(published, pieces=replace(published.pieces, turns=self._turns(turns, places)))
+        on_the_motion(scene, tiles, places, published, residuals)
+        values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
+        modes = [tiles.modes[tile] for tile in places.tile]
+        between = ~self._at_instants(published.pieces.time[:, 0])
+        for mode in dict.fromkeys(modes):
+            chosen = np.flatnonzero(np.array([item == mode for item in modes]) & between)
+            if chosen.size:
+                part = published.of(chosen)
+                part = replace(part, pieces=replace(part.pieces, modes=mode))
+                force_laws(scene, tiles, places.of(chosen), part, residuals)
+
+    def _times(self, time: Array, asked: Array, end: float) -> None:
+        """Samples are those that were asked for, and none before the end is missing."""
+        residuals, count = self.residuals, min(len(time), len(asked))
+        due = int(np.sum(asked < end * (1 - _INSTANT))) if np.isfinite(end) else len(asked)
+        off = np.abs(time[:count] - asked[:count]) / (1 + np.abs(asked[:count]))
+        residuals.note("times", "", off[:, None], 1.0, time[:count, None])
+        if len(time) < due or len(time) > len(asked):
+            residuals.note("times", "a sample", np.ones((1, 1)), 1.0, time[-1:, None])
+
+    def _turns(self, turns: Turns, places: Places) -> Array:
+        """Coordinates at the samples for their whole turns, (samples, 1, joints, 2)."""
+        values = np.zeros((len(places.tile), 1, len(self._scene.mechanism.joints), 2))
+        for (number, k), coordinates in turns.items():
+            values[:, 0, number, k] = places.at(coordinates)
+        return values
+
+    def _at_instants(self, time: Array) -> NDArray[np.bool_]:
+        """True at instants of a controller, where forces are those of either side."""
+        control = self._scene.mechanism.control
+        if control is None:
+            return np.zeros(len(time), dtype=bool)
+        return np.asarray(np.abs(time * control.rate - np.round(time * control.rate)) < _INSTANT)
+
+
+def answer_sentence(residuals: LawResiduals) -> str:
+    """Sentence of the first violation; empty: there is none."""
+    item = residuals.first
+    if item is None:
+        return ""
+    part = f" for {item.part}" if item.part else ""
+    return (
+        f'what the truth publishes breaks the law "{LAWS[item.law][1]}"{part} by {item.size:.2g} of its natural size '
+        f"(allowed {item.allowed:.1g}): an error of proofroll; please report it"
+    )

@@ -1,0 +1,79 @@
+"""Laws of events: each lies where the motion changes, and each change of the motion has its event."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from proofroll.truth.check.laws.contacts import gap_of
+from proofroll.truth.check.laws.record import Array, Change, Modes, Published
+from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.scene import LawScene
+from proofroll.truth.check.laws.tiled import changed_velocity
+from proofroll.truth.check.laws.tiles import Tiles
+
+_STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
+_JUMPS = {"impact", "bounce", "settle"}
+_OF_EFFORTS = {"saturate", "release"}  # a bound of an effort is no mode of a record
+_ROOM = 1e-11  # accuracy of the time of an event, relative to it and to a second
+_BEFORE_END = 1e-6  # part of the time before the end of a motion in which an event may be left out
+
+
+def changes_of(scene: LawScene, tiles: Tiles, published: Published, residuals: LawResiduals, last: float) -> None:
+    """Checks all events before a ``last`` time [s]."""
+    borders = np.flatnonzero(tiles.stretch[1:] != tiles.stretch[:-1])
+    ends, begins, jumps = tiles.time[borders, -1], tiles.time[borders + 1, 0], changed_velocity(scene, tiles)[borders]
+    for number, end, begin, jump in zip(borders.tolist(), ends.tolist(), begins.tolist(), jumps.tolist(), strict=True):
+        if end >= last * (1 - _BEFORE_END):
+            continue
+        room = _ROOM * (1 + begin)
+        near = [item for item in published.changes if item.low - room <= begin and end <= item.high + room]
+        time = np.array([[begin]])
+        if jump > _STRUCK and not any(item.kind in _JUMPS for item in near):
+            residuals.note("change", "a jump of velocities", np.ones((1, 1)), 1.0, time)
+        changed = _changed(scene, tiles.modes[number], tiles.modes[number + 1])
+        if changed and not any(_of(item.name, name) for item in near for name in changed):
+            residuals.note("change", min(changed), np.ones((1, 1)), 1.0, time)
+        for item in near:
+            _at_impact(scene, tiles, residuals, item, number, jump > _STRUCK)
+    for item in published.changes:
+        if item.kind in _OF_EFFORTS or item.time >= last * (1 - _BEFORE_END):
+            continue
+        apart = np.maximum(np.maximum(ends - item.high, item.low - begins), 0.0)
+        apart = np.append(apart, abs(item.time) if item.time <= 0 else np.inf)
+        off = min(float(apart.min()), 1 + item.time)
+        residuals.note("change", item.name, np.array([[off]]), 1 + abs(item.time), np.array([[item.time]]))
+
+
+def _of(event: str, changed: str) -> bool:
+    """True if an event of a pair or joint is that of what has changed, which may be one of several places."""
+    return changed == event or changed.startswith(f"{event}.")
+
+
+def _changed(scene: LawScene, sooner: Modes, later: Modes) -> set[str]:
+    """Names of contacts and joints whose modes differ."""
+    places = zip(scene.contacts, sooner.contacts, later.contacts, strict=True)
+    changed = {contact.name for contact, mode, next_mode in places if mode != next_mode}
+    for number, joint in enumerate(scene.mechanism.joints):
+        modes = [(item.friction[number], item.stops[number]) for item in (sooner, later)]
+        changed |= {joint.name} if modes[0] != modes[1] else set()
+    return changed
+
+
+def _at_impact(scene: LawScene, tiles: Tiles, residuals: LawResiduals, item: Change, number: int, struck: bool) -> None:
+    """At an impact of a contact its gap is zero."""
+    if item.kind not in {"impact", "bounce"}:
+        return
+    for contact in scene.contacts:
+        if contact.name == item.name and contact.alone:
+            gap = abs(_last_gap(scene, tiles, contact.name, number))
+            far = scene.length + float(np.abs(tiles.p[number, -1]).max())
+            residuals.note("gap", item.name, np.array([[gap]]), far, np.array([[item.time]]))
+            if not struck:
+                residuals.note("change", item.name, np.ones((1, 1)), 1.0, np.array([[item.time]]))
+
+
+def _last_gap(scene: LawScene, tiles: Tiles, name: str, number: int) -> float:
+    """Gap of a contact at the end of a tile [m]."""
+    contact = next(contact for contact in scene.contacts if contact.name == name)
+    gaps: Array = gap_of(contact, tiles.one(number))
+    return float(gaps[0, -1])

@@ -1,0 +1,131 @@
+"""Tiles: poses and velocities of a route in all pieces of its motion, and the laws that need no forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from proofroll.truth.check.laws.integrals import COUNT, TO_SERIES
+from proofroll.truth.check.laws.record import Array, Modes, Pieces
+
+_CORRECTIONS = 6  # of Newton's method for the place of a time in a tile, at most: it converges in three
+_OUTSIDE = 1.05  # place beyond the end of a tile, in which a time within the bracket of an event may lie
+_LATER = 1e-9  # part of a time by which a tile may begin after it and still hold it: what changes at an instant
+_ARRAYS = ("time", "pace", "p", "R", "v", "w", "stretch")
+# Series of a derivative from that of its function.
+_DERIVATIVE: Array = np.vstack([chebyshev.chebder(np.eye(COUNT)), np.zeros(COUNT)])
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """Poses and velocities at the points of all pieces of a motion, in order of time; see :class:`.Pieces`.
+
+    Attributes:
+        time, pace, p, R, v, w: as of pieces, (tiles, points, …); the last body is the world.
+        stretch: number of the stretch of each tile.
+        modes: in each tile.
+    """
+
+    time: Array
+    pace: Array
+    p: Array
+    R: Array
+    v: Array
+    w: Array
+    stretch: NDArray[np.intp]
+    modes: tuple[Modes, ...]
+    turns: None = None  # angles go on from one tile to the next
+
+    @classmethod
+    def of(cls, pieces: Pieces, number: int) -> Tiles:
+        """Tiles of pieces of a stretch."""
+        count = len(pieces.time)
+        return cls(
+            time=pieces.time,
+            pace=pieces.pace,
+            p=pieces.p,
+            R=pieces.R,
+            v=pieces.v,
+            w=pieces.w,
+            stretch=np.full(count, number),
+            modes=(pieces.modes,) * count,
+        )
+
+    def ordered(self, order: NDArray[np.intp]) -> Tiles:
+        """Tiles in another order, or some of them."""
+        arrays: dict[str, Any] = {name: getattr(self, name)[order] for name in _ARRAYS}
+        return Tiles(**arrays, modes=tuple(self.modes[k] for k in order))
+
+    def one(self, number: int) -> Tiles:
+        """One tile."""
+        return self.ordered(np.array([number]))
+
+    def holding(self, times: Array) -> Places:
+        """Places of times [s] in the tiles that hold them; of two that meet there the later."""
+        begins = self.time[:, 0]
+        tile = np.clip(np.searchsorted(begins, times * (1 + _LATER), side="right") - 1, 0, len(begins) - 1)
+        series = self.time[tile] @ TO_SERIES.T
+        span = self.time[tile, -1] - begins[tile]
+        place = np.divide(2 * (times - begins[tile]), span, out=np.zeros_like(times), where=span > 0) - 1
+        for _ in range(_CORRECTIONS):
+            powers = _vandermonde(np.clip(place, -_OUTSIDE, _OUTSIDE))
+            off, rate = _each(powers, series) - times, _each(powers @ _DERIVATIVE, series)
+            place = np.clip(place - np.divide(off, rate, out=np.zeros_like(off), where=rate != 0), -_OUTSIDE, _OUTSIDE)
+        room = _LATER * (1 + np.abs(times))
+        held = (times >= begins[tile] - room) & (times <= self.time[tile, -1] + room)
+        values, slopes = (_vandermonde(place) @ TO_SERIES, _vandermonde(place) @ _DERIVATIVE @ TO_SERIES)
+        pace = _each(values, self.pace[tile])
+        return Places(tile=tile, held=held, values=values, slopes=slopes, pace=pace, half=span / 2)
+
+
+class Places(NamedTuple):
+    """Times in tiles.
+
+    Attributes:
+        tile: number of the tile of each time.
+        held: True where a tile holds the time.
+        values, slopes: weights of the points of its tile for a value and for its slope, (times, points).
+        pace: rate of the time by the variable of its tile [s].
+        half: half the length of its tile [s].
+    """
+
+    tile: NDArray[np.intp]
+    held: NDArray[np.bool_]
+    values: Array
+    slopes: Array
+    pace: Array
+    half: Array
+
+    def of(self, chosen: NDArray[np.intp]) -> Places:
+        """Places of some of the times."""
+        parts: dict[str, Any] = {name: part[chosen] for name, part in self._asdict().items()}
+        return Places(**parts)
+
+    def at(self, of_tiles: Array) -> Array:
+        """Values at the times, (times, …), from those at the points of tiles."""
+        return np.asarray(np.einsum("nk,nk...->n...", self.values, of_tiles[self.tile]))
+
+    def rate(self, of_tiles: Array) -> Array:
+        """Rates in time at the times, (times, …)."""
+        slope = np.einsum("nk,nk...->n...", self.slopes, of_tiles[self.tile])
+        return np.asarray(slope / self.pace.reshape(-1, *(1,) * (slope.ndim - 1)))
+
+
+def _vandermonde(places: Array) -> Array:
+    return np.asarray(chebyshev.chebvander(places, COUNT - 1))
+
+
+def _each(powers: Array, series: Array) -> Array:
+    return np.asarray(np.einsum("nk,nk->n", powers, series))
+
+
+def joined_tiles(parts: Sequence[Tiles]) -> Tiles:
+    """Tiles of all parts, in order of time."""
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
+    whole = Tiles(**arrays, modes=tuple(mode for part in parts for mode in part.modes))
+    return whole.ordered(np.lexsort((whole.time[:, 0], whole.stretch)))

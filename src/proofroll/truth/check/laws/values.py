@@ -1,0 +1,173 @@
+"""Laws of published values that follow from others: energy, points, pulls of springs, and two names of one value."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from proofroll.truth.check.laws.contacts import gap_of, slide_of
+from proofroll.truth.check.laws.integrals import dot, norm, of_angles, of_quaternion, turned
+from proofroll.truth.check.laws.loads import bushing_load, rotation_vector, spring_ends, spring_pull
+from proofroll.truth.check.laws.record import Array, Published
+from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.scene import FREE, LawScene
+
+_PART = 1e-3  # part of a natural size that counts in the size of a value
+
+
+def values_follow(scene: LawScene, published: Published, residuals: LawResiduals, kinetic: tuple[Array, Array]) -> None:
+    """Checks values at samples; ``kinetic``: kinetic energy and that of gravity, and their sizes [J]."""
+    _coordinates(scene, published, residuals)
+    _energies(scene, published, residuals, kinetic)
+    _points(scene, published, residuals)
+    _links(scene, published, residuals)
+    _contacts(scene, published, residuals)
+    _names(scene, published, residuals)
+
+
+def _vector(published: Published, name: str) -> Array:
+    return np.stack([published.values[f"{name}.{axis}"] for axis in "xyz"], -1)
+
+
+def _coordinates(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+    """Coordinates and rates of joints with one are those of the poses."""
+    pieces = published.pieces
+    assert pieces.turns is not None  # of all samples
+    for number, joint in enumerate(scene.mechanism.joints):
+        if joint.nq != 1:
+            continue
+        connection = scene.connections[number]
+        placed, (axes, axis, turns) = scene.placed(connection, pieces), FREE[connection.kind][0]
+        direction = (placed.A if axes == "A" else placed.B)[..., axis]
+        R = placed.A.swapaxes(-1, -2) @ placed.B
+        place = dot(placed.origin_b - placed.origin_a, direction)
+        if turns:
+            angle = np.arctan2(R[..., 1, 0], R[..., 0, 0])
+            place = angle + 2 * np.pi * np.round((pieces.turns[..., number, 0] - angle) / (2 * np.pi))
+        rate, unit = dot(placed.spin if turns else placed.slide, direction), 1.0 if turns else scene.length
+        for name, value, size in (("q", place, unit), ("v", rate, unit * scene.rate)):
+            off = published.values[f"{name}.{joint.name}"][:, None] - value
+            residuals.note("value", f"{name}.{joint.name}", off, size + np.abs(value), pieces.time)
+
+
+def _energies(scene: LawScene, published: Published, residuals: LawResiduals, kinetic: tuple[Array, Array]) -> None:
+    """Energy is kinetic, of gravity, and of springs."""
+    m, pieces, (total, size) = scene.mechanism, published.pieces, kinetic
+    size = size + _PART * scene.mass.sum() * scene.speed**2
+    for spring in m.springs:
+        ends = spring_ends(scene, pieces, spring)
+        part = 0.5 * spring.stiffness * (norm(ends[1] - ends[0]) - spring.length) ** 2
+        total, size = total + part, size + part + _PART * spring.stiffness * scene.length**2
+    for bushing in m.bushings:
+        a, b = scene.index[bushing.body_a], scene.index[bushing.body_b]
+        A = pieces.R[..., a, :, :] @ of_angles(np.array(bushing.orientation_a))
+        B = pieces.R[..., b, :, :] @ of_angles(np.array(bushing.orientation_b))
+        ends = spring_ends(scene, pieces, bushing)
+        bent, stiffness = rotation_vector(A.swapaxes(-1, -2) @ B), np.array(bushing.stiffness)
+        stretched = turned(A.swapaxes(-1, -2), ends[1] - ends[0])
+        part = 0.5 * (stretched**2 @ stiffness[:3] + bent**2 @ stiffness[3:])
+        total = total + part
+        size = size + part + _PART * (stiffness[:3].max() * scene.length**2 + stiffness[3:].max())
+    assert pieces.turns is not None  # of all samples
+    for number, joint in enumerate(m.joints):
+        if not joint.stiffness:
+            continue
+        connection = scene.connections[number]
+        placed = scene.placed(connection, pieces)
+        for k, (axes, axis, turns) in enumerate(FREE[connection.kind]):
+            direction = (placed.A if axes == "A" else placed.B)[..., axis]
+            place = pieces.turns[..., number, k] if turns else dot(placed.origin_b - placed.origin_a, direction)
+            part = 0.5 * joint.stiffness * (place - joint.rest) ** 2
+            unit = 1.0 if turns else scene.length
+            total, size = total + part, size + part + _PART * joint.stiffness * unit**2
+    energy = published.values["energy"][:, None]
+    residuals.note("value", "energy", energy - total, size, pieces.time)
+    for name in ("energy_error", "energy_change"):
+        if name in published.values and pieces.time[0, 0] <= 0:
+            off = published.values[name][:, None] - (energy - energy[:1])
+            residuals.note("value", name, off, size, pieces.time)
+
+
+def _points(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+    """Tracked points are fixed to their bodies."""
+    pieces = published.pieces
+    for k, point in enumerate(scene.mechanism.points):
+        body = scene.index[point.body]
+        place = pieces.p[..., body, :] + turned(pieces.R[..., body, :, :], np.array(point.position))
+        size = scene.length + norm(place)
+        for values in (_vector(published, point.name), published.values["positions"][:, k]):
+            residuals.note("value", point.name, norm(values[:, None] - place), size, pieces.time)
+
+
+def _links(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+    """Pulls of springs and loads of bushings follow from their laws."""
+    pieces = published.pieces
+    for spring in scene.mechanism.springs:
+        pull = spring_pull(scene, pieces, spring)[0]
+        size = np.abs(pull) + spring.stiffness * scene.length + spring.damping * scene.speed + _PART * scene.force
+        off = published.values[f"force.{spring.name}"][:, None] - pull
+        residuals.note("value", f"force.{spring.name}", off, size, pieces.time)
+    for bushing in scene.mechanism.bushings:
+        force, moment, _, _ = bushing_load(scene, pieces, bushing)
+        stiffness, damping = np.array(bushing.stiffness), np.array(bushing.damping)
+        unit = stiffness[:3].max() * scene.length + damping[:3].max() * scene.speed + _PART * scene.force
+        turning = stiffness[3:].max() + damping[3:].max() * scene.rate + _PART * scene.force * scene.length
+        for kind, value, size in (("force", force, unit), ("torque", moment, turning)):
+            off = norm(_vector(published, f"{kind}.{bushing.name}")[:, None] - value)
+            residuals.note("value", f"{kind}.{bushing.name}", off, size + norm(value), pieces.time)
+
+
+def _contacts(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+    """Gaps and slips follow from poses and velocities."""
+    pieces = published.pieces
+    for k, contact in enumerate(scene.contacts):
+        far = scene.length + np.abs(pieces.p[..., [contact.a, contact.b], :]).max((-1, -2))
+        if contact.alone:
+            off = published.values[f"gap.{contact.name}"][:, None] - gap_of(contact, pieces)
+            residuals.note("value", f"gap.{contact.name}", off, far, pieces.time)
+        slide, normal = slide_of(contact, pieces, pieces.place[..., k, :]), pieces.normal[..., k, :]
+        slip = norm(slide - dot(slide, normal)[..., None] * normal)
+        fast = scene.speed + sum(norm(pieces.v[..., body, :]) for body in (contact.a, contact.b))
+        fast = fast + sum(norm(pieces.w[..., body, :]) for body in (contact.a, contact.b)) * far
+        off = published.values[f"slip.{contact.name}"][:, None] - slip
+        residuals.note("value", f"slip.{contact.name}", off, fast, pieces.time)
+
+
+def _names(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+    """Two variables of one quantity are equal."""
+    values, pieces = published.values, published.pieces
+    forces = pieces.force[:, 0]
+    rotations = of_quaternion(values["attitudes"])
+    pairs: list[tuple[str, Array, Array]] = [("attitudes", rotations, pieces.R[:, 0, :-1])]
+    names = [contact.name for contact in scene.contacts]
+    if names:
+        pairs += [
+            ("contact_forces", values["contact_forces"], forces),
+            ("gaps", values["gaps"], np.stack([values[f"gap.{name}"] for name in names], -1)),
+            ("slips", values["slips"], np.stack([values[f"slip.{name}"] for name in names], -1)),
+            ("normal_forces", values["normal_forces"], dot(forces, pieces.normal[:, 0])),
+        ]
+    shared = dict[str, list[int]]()
+    for k, contact in enumerate(scene.contacts):
+        shared.setdefault(contact.pair.name, []).append(k)
+    pairs += [
+        (f"force.{name}", _vector(published, f"force.{name}"), forces[:, numbers].sum(1))
+        for name, numbers in shared.items()
+        if len(numbers) > 1 and f"force.{name}.x" in values
+    ]
+    for body in scene.mechanism.bodies:
+        if f"net_force.{body.name}.x" in values:
+            number = scene.index[body.name]
+            signs = np.array([(contact.a == number) - (contact.b == number) for contact in scene.contacts], float)
+            total = np.einsum("k,tki->ti", signs, forces)
+            pairs.append((f"net_force.{body.name}", _vector(published, f"net_force.{body.name}"), total))
+    for name, first, second in pairs:
+        _same(name, (first, second), published, residuals)
+
+
+def _same(name: str, both: Sequence[Array], published: Published, residuals: LawResiduals) -> None:
+    size = max((float(np.nanmax(np.abs(item), initial=0.0)) for item in both), default=0.0)
+    off = np.abs(both[0] - both[1]).reshape(len(both[0]), -1)
+    known = np.where(np.isnan(off), 0.0, off).max(1, initial=0.0)
+    residuals.note("spelling", name, known[:, None], size, published.pieces.time)
