@@ -71,7 +71,9 @@ class MechanismTruth:
         if text := answer_sentence(check.residuals):
             assert check.residuals.first is not None  # as there is a text
             motion = cut_motion(motion, check.residuals.first.time, text)
-            dataset = MechanismTruth._dataset(element, motion, branching(motion.branches))
+            return MechanismTruth._dataset(element, motion, branching(motion.branches))
+        if motion.laws:
+            dataset.attrs[LAWS] += check.sentence()
         return dataset
 
     @staticmethod
@@ -115,7 +117,7 @@ class MechanismTruth:
         bars = motion.bars | {"gap": place + 2 * element.length * turn}
         bars |= {"slip": velocity + element.length * spin + 2 * element.speed * turn}
         body = element.on_wall
-        local = {} if body is None else local_bars(body, dataset, {key: float(bar[-1]) for key, bar in bars.items()})
+        local = {} if body is None else local_bars(body, dataset, {key: float(bar.max()) for key, bar in bars.items()})
         for name, variable in dataset.data_vars.items():
             field = (
                 fields_of.get(str(name))
@@ -127,7 +129,7 @@ class MechanismTruth:
             size = float(np.nanmax(np.abs(variable.to_numpy()), initial=0.0))
             bar = _bar_of_a_law(str(name), element, motion.bars)
             if field is not None:
-                bar = float(bars[field][-1])
+                bar = float(bars[field].max())
             bar = local.get(str(name), bar)
             variable.attrs["error_bar"] = 4 * np.finfo(float).eps * size if bar is None else bar
         dataset.attrs["route"], *others = motion.routes
@@ -170,7 +172,9 @@ def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr
 def _bar_of_a_law(name: str, element: MechanismElement, bars: Mapping[str, FloatArray]) -> float | None:
     """Error bar of a residual that combines several fields; None for any other variable."""
     mass = element.mechanism.mass
-    place, velocity, force = (float(bars[field][-1]) if field in bars else 0.0 for field in ("p_WB", "v_WB", "pressed"))
+    place, velocity, force = (
+        float(bars[field].max()) if field in bars else 0.0 for field in ("p_WB", "v_WB", "pressed")
+    )
     match name:
         case "friction_direction":  # large for contacts that hardly press or slide
             return force / (PRESSES * element.force) + velocity / (SLIDES * element.speed)

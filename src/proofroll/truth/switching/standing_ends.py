@@ -69,6 +69,7 @@ class StandingEnds:
         return replace(
             motion,
             bars=bars,
+            tiles=None if motion.tiles is None else motion.tiles.of_contacts(self.parts),
             pressed=np.stack(pressed, axis=1),
             events=self._once(motion.events),
             bounces=self._once(motion.bounces),

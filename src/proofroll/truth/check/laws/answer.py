@@ -16,6 +16,7 @@ from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiled import Turns, laws_at_all_times, start_of
 from proofroll.truth.check.laws.tiles import Places, Tiles
 from proofroll.truth.check.laws.values import values_follow
+from proofroll.truth.check.laws.works import works_follow
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism
@@ -29,13 +30,13 @@ class AnswerCheck:
 
     Attributes:
         residuals: remainders of the laws.
-        held: number of samples on a piece of the motion.
+        samples, held: numbers of samples, and of those on a piece of the motion.
     """
 
     def __init__(self, mechanism: Mechanism, length: float, rate: float) -> None:
         """Takes a mechanism in SI units with its natural length [m] and rate [1/s]."""
         self._scene = LawScene(mechanism, length, rate)
-        self.residuals, self.held = LawResiduals(rate=rate, known_alone=True), 0
+        self.residuals, self.samples, self.held = LawResiduals(rate=rate, known_alone=True), 0, 0
 
     def take(self, published: Published, tiles: Tiles, asked: Array, end: float) -> None:
         """Checks an answer.
@@ -47,6 +48,7 @@ class AnswerCheck:
             end: time before which the truth ends, or inf [s].
         """
         scene, residuals, time = self._scene, self.residuals, published.pieces.time[:, 0]
+        self.samples = len(time)
         self._times(time, asked, end)
         if not np.isfinite(published.pieces.p).all():  # a motion that is not unique has no values
             return
@@ -66,6 +68,7 @@ class AnswerCheck:
         published, places = published.of(rows), places.of(rows)
         published = replace(published, pieces=replace(published.pieces, turns=self._turns(turns, places)))
         on_the_motion(scene, tiles, places, published, residuals)
+        works_follow(scene, tiles, turns, places, published, residuals)
         values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
         modes = [tiles.modes[tile] for tile in places.tile]
         between = ~self._at_instants(published.pieces.time[:, 0])
@@ -75,6 +78,11 @@ class AnswerCheck:
                 part = published.of(chosen)
                 part = replace(part, pieces=replace(part.pieces, modes=mode))
                 force_laws(scene, tiles, places.of(chosen), part, residuals)
+
+    def sentence(self) -> str:
+        """Clause on the samples that hold all laws."""
+        laws = sum(law in self.residuals.largest for law in LAWS)
+        return f"; what is published holds {laws} laws at {self.held} of {self.samples} samples"
 
     def _times(self, time: Array, asked: Array, end: float) -> None:
         """Samples are those that were asked for, and none before the end is missing."""

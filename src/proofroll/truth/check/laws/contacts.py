@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.truth.check.laws.integrals import dot, norm
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import Array, Moving, Pieces
+from proofroll.truth.check.laws.record import SPREAD, Array, Moving, Pieces
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene, velocity_at
 from proofroll.truth.check.laws.surfaces import PairContact, gap, near, seen_from
@@ -59,6 +59,9 @@ def contact_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads
             apart(scene, contact, pieces, residuals)
         if pieces.modes.contacts[k] == "open":
             residuals.note("pull", contact.name, norm(pieces.force[..., k, :]), largest, pieces.time)
+            continue
+        if pieces.modes.contacts[k] == SPREAD:
+            loads.works(np.full(pieces.time.shape, np.nan), np.zeros(pieces.time.shape))
             continue
         touch = _touch(scene, pieces, k, contact)
         force, place = pieces.force[..., k, :], pieces.place[..., k, :]

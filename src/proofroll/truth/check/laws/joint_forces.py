@@ -69,12 +69,12 @@ def _effort(
     if control is not None and data.name in control.actuators:
         law = _controlled(control, data, pieces.time, effort, place, rate)
     else:
-        law = _law(data, value_of(data.target, pieces.time), place, rate)
+        law = law_of(data, value_of(data.target, pieces.time), place, rate)
     size = np.abs(effort) + n * n * (data.kp * length + data.kd * fast) + _PART * force
     residuals.note("effort", data.name, effort - law, size, pieces.time)
 
 
-def _law(data: Actuator, target: Array, place: Array, rate: Array) -> Array:
+def law_of(data: Actuator, target: Array, place: Array, rate: Array) -> Array:
     """Effort of an actuator by its law [N, N m]."""
     n, limit = data.gear, np.inf if data.limit is None else data.limit
     law = {
@@ -98,12 +98,12 @@ def _controlled(control: Control, data: Actuator, time: Array, effort: Array, pl
     else:
         target = (effort[:, :1] / n + data.kd * n * rate[:, :1]) / data.kp + n * place[:, :1]
     if control.held == "target":
-        law, limit = _law(data, target, place, rate), np.inf if data.limit is None else data.limit
+        law, limit = law_of(data, target, place, rate), np.inf if data.limit is None else data.limit
         clamped = control.policy is not None and np.abs(effort).max() >= limit
         return effort if clamped else law  # an effort at its limit does not tell the target
     begins = np.abs(time[:, :1] - instant / control.rate) <= _INSTANT / control.rate
     determinate = begins & (control.policy is None)
-    return np.where(determinate, _law(data, target, place[:, :1], rate[:, :1]), effort[:, :1]) + 0.0 * effort
+    return np.where(determinate, law_of(data, target, place[:, :1], rate[:, :1]), effort[:, :1]) + 0.0 * effort
 
 
 def _dry_friction(scene: LawScene, pieces: Pieces, residuals: LawResiduals, number: int, rate: Array) -> None:

@@ -48,8 +48,11 @@ class Turning(Moving, Protocol):
         """See :class:`Pieces`."""
 
 
+SPREAD = "spread"  # mode of a closed contact whose force is the sum of several, so that it has no point of action
+
+
 class Modes(NamedTuple):
-    """Modes during a stretch, each "open", "stick" or "slip".
+    """Modes during a stretch, each "open", "stick" or "slip"; of contacts :data:`SPREAD`, too.
 
     Attributes:
         contacts: of each contact.

@@ -11,7 +11,7 @@ from proofroll.truth.check.laws.contacts import contact_laws
 from proofroll.truth.check.laws.integrals import COUNT, dot, norm, turned
 from proofroll.truth.check.laws.joints import Coordinates, FreeDirection, joint_laws
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import Array, Moving, Published
+from proofroll.truth.check.laws.record import SPREAD, Array, Moving, Published
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import FREE, LawScene
 from proofroll.truth.check.laws.tiles import Places, Tiles
@@ -59,6 +59,7 @@ def _newton_and_euler(
     for k, contact in enumerate(scene.contacts):
         place, force = pieces.place[..., k, :], pieces.force[..., k, :]
         moment = pieces.rolling[..., k, :] + pieces.spinning[..., k, :]
+        moment = moment + (np.nan if pieces.modes.contacts[k] == SPREAD else 0.0)
         loads.between(contact.a, contact.b, place, np.nan_to_num(force), np.nan_to_num(moment))
         pressed = ~(norm(force) <= 0)[..., None]
         unknown.take(contact.a, contact.b, place, np.isnan(force), np.isnan(moment) & pressed)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from proofroll.truth.check.laws.integrals import COUNT, TO_SERIES
-from proofroll.truth.check.laws.record import Array, Modes, Pieces
+from proofroll.truth.check.laws.record import SPREAD, Array, Modes, Pieces
 
 _CORRECTIONS = 6  # of Newton's method for the place of a time in a tile, at most: it converges in three
 _OUTSIDE = 1.05  # place beyond the end of a tile, in which a time within the bracket of an event may lie
@@ -60,6 +60,19 @@ class Tiles:
         """Tiles in another order, or some of them."""
         arrays: dict[str, Any] = {name: getattr(self, name)[order] for name in _ARRAYS}
         return Tiles(**arrays, modes=tuple(self.modes[k] for k in order))
+
+    def of_contacts(self, parts: Sequence[Sequence[int]]) -> Tiles:
+        """The same with contacts that stand for several of these each, by their numbers."""
+
+        def folded(modes: Modes) -> Modes:
+            kinds = [[modes.contacts[k] for k in part] for part in parts]
+            contacts = [kind[0] if len(kind) == 1 else SPREAD if set(kind) - {"open"} else "open" for kind in kinds]
+            turning = (tuple(of[part[0]] for part in parts) for of in (modes.rolling, modes.spinning))
+            rolling, spinning = turning
+            return modes._replace(contacts=tuple(contacts), rolling=rolling, spinning=spinning)
+
+        known: dict[Modes, Modes] = {}
+        return replace(self, modes=tuple(known.setdefault(item, folded(item)) for item in self.modes))
 
     def one(self, number: int) -> Tiles:
         """One tile."""

@@ -1,0 +1,94 @@
+"""Laws of published works: of each effort the integral of its law, and of all drives together what is left of energy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.truth.check.laws.integrals import dot, integral
+from proofroll.truth.check.laws.joint_forces import law_of
+from proofroll.truth.check.laws.loads import BodyLoads
+from proofroll.truth.check.laws.record import SPREAD, Array, Published
+from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.samples import kinetic_energy
+from proofroll.truth.check.laws.scene import FREE, LawScene, value_of
+from proofroll.truth.check.laws.tiled import Turns, changed_velocity
+from proofroll.truth.check.laws.tiles import Places, Tiles
+
+_STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
+
+
+def works_follow(
+    scene: LawScene, tiles: Tiles, turns: Turns, places: Places, published: Published, residuals: LawResiduals
+) -> None:
+    """Checks works of drives at samples, whose places in tiles are given."""
+    names = [name for name in published.values if name.startswith("work.")]
+    if not names:
+        return
+    control, along = scene.mechanism.control, published.bars
+    natural = scene.mass.sum() * scene.speed**2
+    for data in scene.mechanism.actuators:
+        if control is not None and data.name in control.actuators:
+            continue
+        number = scene.mechanism.joint_index[data.joint]
+        rate = _rates(scene, tiles, number)[0]
+        force = law_of(data, value_of(data.target, tiles.time), turns[number, 0], rate)
+        own, size = (_summed(values, tiles) for values in (force * rate, np.abs(force * rate)))
+        name = f"work.effort.{data.name}"
+        _note(
+            name, (published.values[name], places.at(own), natural + places.at(size)), published, residuals, along[name]
+        )
+    if any({"slip", SPREAD} & {*mode.contacts, *mode.rolling, *mode.spinning} for mode in tiles.modes):
+        return
+    if (changed_velocity(scene, tiles) > _STRUCK).any():
+        return
+    energy, parts = kinetic_energy(scene, tiles)
+    loads = BodyLoads(scene, tiles)
+    power, size = loads.power + 0.0, loads.power_size + 0.0
+    for number in range(len(scene.mechanism.joints)):
+        given = _passive_power(scene, tiles, turns, number)
+        power, size = power + given, size + np.abs(given)
+    own = energy - energy[0, 0] - _summed(power, tiles)
+    sizes = natural + places.at(_summed(size, tiles) + parts) + float(parts[0, 0])
+    said = np.sum([published.values[name] for name in names], axis=0)
+    _note("all drives", (said, places.at(own), sizes), published, residuals, sum(along[name] for name in names))
+
+
+def _note(
+    name: str, values: tuple[Array, Array, Array], published: Published, residuals: LawResiduals, bar: float
+) -> None:
+    """Takes what is said and found of a work, and its size [J]."""
+    said, own, size = values
+    residuals.note("work", name, (said - own)[:, None], size[:, None], published.pieces.time, bar)
+
+
+def _summed(values: Array, tiles: Tiles) -> Array:
+    """Integral since the start at the points of tiles."""
+    parts = integral(values, tiles.pace)
+    ends = np.concatenate([[0.0], np.cumsum(parts[:, -1])[:-1]])
+    return np.asarray(parts + ends[:, None])
+
+
+def _rates(scene: LawScene, tiles: Tiles, number: int) -> list[Array]:
+    """Rates along the free directions of a joint."""
+    connection = scene.connections[number]
+    placed = scene.placed(connection, tiles)
+    return [
+        dot(placed.spin if turns else placed.slide, (placed.A if axes == "A" else placed.B)[..., axis])
+        for axes, axis, turns in FREE[connection.kind]
+    ]
+
+
+def _passive_power(scene: LawScene, tiles: Tiles, turns: Turns, number: int) -> Array:
+    """Power of the spring, the damper, the torque and the dry friction of a joint."""
+    joint, total = scene.mechanism.joints[number], np.zeros(tiles.time.shape)
+    if joint.kind == JointKind.FREE:
+        return total
+    for k, rate in enumerate(_rates(scene, tiles, number)):
+        force = -joint.damping * rate
+        if joint.nq in {1, 2}:
+            force = force - joint.stiffness * (turns[number, k] - joint.rest)
+        if joint.nq == 1:
+            force = force + value_of(joint.torque, tiles.time) - joint.friction * np.sign(rate)
+        total = total + force * rate
+    return total
