@@ -15,6 +15,7 @@ _STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an
 _JUMPS = {"impact", "bounce", "settle"}
 _OF_EFFORTS = {"saturate", "release"}  # a bound of an effort is no mode of a record
 _ROOM = 1e-11  # accuracy of the time of an event, relative to it and to a second
+_LAST_REBOUNDS = 1e-4  # natural times that infinitely many rebounds take at most, which are summed
 _BEFORE_END = 1e-6  # part of the time before the end of a motion in which an event may be left out
 
 
@@ -26,7 +27,11 @@ def changes_of(scene: LawScene, tiles: Tiles, published: Published, residuals: L
         if end >= last * (1 - _BEFORE_END):
             continue
         room = _ROOM * (1 + begin)
-        near = [item for item in published.changes if item.low - room <= begin and end <= item.high + room]
+        near = [
+            item
+            for item in published.changes
+            if item.low - room - _summed(scene, item) <= begin and end <= item.high + room
+        ]
         time = np.array([[begin]])
         if jump > _STRUCK and not any(item.kind in _JUMPS for item in near):
             residuals.note("change", "a jump of velocities", np.ones((1, 1)), 1.0, time)
@@ -38,10 +43,15 @@ def changes_of(scene: LawScene, tiles: Tiles, published: Published, residuals: L
     for item in published.changes:
         if item.kind in _OF_EFFORTS or item.time >= last * (1 - _BEFORE_END):
             continue
-        apart = np.maximum(np.maximum(ends - item.high, item.low - begins), 0.0)
+        apart = np.maximum(np.maximum(ends - item.high, item.low - _summed(scene, item) - begins), 0.0)
         apart = np.append(apart, abs(item.time) if item.time <= 0 else np.inf)
         off = min(float(apart.min()), 1 + item.time)
         residuals.note("change", item.name, np.array([[off]]), 1 + abs(item.time), np.array([[item.time]]))
+
+
+def _summed(scene: LawScene, item: Change) -> float:
+    """Time before a settling at which the motion may rest already: that of the rebounds which are summed [s]."""
+    return _LAST_REBOUNDS / scene.rate if item.kind == "settle" else 0.0
 
 
 def _of(event: str, changed: str) -> bool:
