@@ -93,7 +93,7 @@ class HeldMotion(NamedTuple):
     text: str
     laws: str
     works: list[WorkAlong]
-    tiles: Callable[[int, float], Tiles]
+    tiles: Callable[[int, float], Tiles | None]
 
 
 def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[Recorded], most: int | None = None) -> HeldMotion:
@@ -121,7 +121,7 @@ def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[Recorded],
         names = [route.name for route in routes]
         return verdict({name: walk.through(end * (1 - CLOSE), most) for name, walk in zip(names, walks, strict=True)})
 
-    def tiles(number: int, until: float) -> Tiles:
+    def tiles(number: int, until: float) -> Tiles | None:
         return walks[number].tiles(until)
 
     result = outcome(None if works else most or _MOST)
@@ -192,8 +192,8 @@ class _Walk:
         self._take_waiting()
         return judged
 
-    def tiles(self, until: float) -> Tiles:
-        """Poses and velocities in all pieces that begin before a time in natural units."""
+    def tiles(self, until: float) -> Tiles | None:
+        """Poses and velocities in all pieces that begin before a time in natural units; None: there are none."""
         parts = list[Tiles]()
         for number, stretch in enumerate(self._path.stretches):
             if stretch.start >= until and number:
@@ -203,7 +203,7 @@ class _Walk:
             pieces = self._taken[number] if number in self._taken else self._recorder.pieces(stretch, 0)
             part = self._recorder.tiles(number, stretch, pieces)
             parts += [] if part is None else [part]
-        return joined_tiles(parts)
+        return joined_tiles(parts) if parts else None
 
     def _take_waiting(self) -> None:
         if self._waiting:

@@ -55,7 +55,10 @@ class AnswerCheck:
         last = float(time[-1])
         turns = laws_at_all_times(scene, tiles, residuals, last)
         struck = any(item.kind in _JUMPS and item.low <= 0 for item in published.changes)
-        start_of(scene, tiles, residuals, struck)
+        for moving in (published.pieces, tiles):
+            if moving.time[0, 0] == 0:
+                start_of(scene, moving, residuals, struck)
+                break
         changes_of(scene, tiles, published, residuals, last)
         reached = time.copy()
         for item in published.changes:  # within the bracket of an event a sample is that of the later side

@@ -8,7 +8,7 @@ from proofroll.truth.check.laws.contacts import apart
 from proofroll.truth.check.laws.integrals import dot, of_quaternion
 from proofroll.truth.check.laws.joints import Coordinates, closure, sizes_of
 from proofroll.truth.check.laws.motion import joined, jump, kinematics
-from proofroll.truth.check.laws.record import Array
+from proofroll.truth.check.laws.record import Array, Moving
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import FREE, LawScene, PlacedFrames, motion_of
 from proofroll.truth.check.laws.tiles import Tiles
@@ -49,12 +49,12 @@ def _without_holes(scene: LawScene, tiles: Tiles, residuals: LawResiduals, last:
     residuals.note("tiled", "", np.maximum(begins - ends, 0)[:, None], size[:, None], ends[:, None])
 
 
-def start_of(scene: LawScene, tiles: Tiles, residuals: LawResiduals, struck: bool) -> None:
-    """The motion begins at the coordinates and rates of the joints' own fields; ``struck``: rates jump at once."""
+def start_of(scene: LawScene, moving: Moving, residuals: LawResiduals, struck: bool) -> None:
+    """A motion from time 0 begins at coordinates and rates of the joints' own fields; ``struck``: rates jump there."""
     for number, joint in enumerate(scene.mechanism.joints):
         connection = scene.connections[number]
-        placed = PlacedFrames(*(part[:1, :1] for part in scene.placed(connection, tiles)))
-        time, free = tiles.time[:1, :1], FREE[connection.kind]
+        placed = PlacedFrames(*(part[:1, :1] for part in scene.placed(connection, moving)))
+        time, free = moving.time[:1, :1], FREE[connection.kind]
         rates = [
             dot(placed.spin if turns else placed.slide, (placed.A if axes == "A" else placed.B)[..., axis])[0, 0]
             for axes, axis, turns in free
