@@ -36,6 +36,8 @@ _BARS = {
     "contact_pull": "pressed", "cone_excess": "pressed",
     "hop_speed": "slip", "energy_gain": "energy", "bushing_forces": "links", "bushing_torques": "links",
 }  # fmt: skip
+_LEAST = 1e-3  # natural lengths that count as a motion, however little moves
+_PARTED = 1e-3  # part of the motion that a bar exceeds from where routes part
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
 _PREFIXES = {"work.": "work", "net_force.": "sums", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
@@ -64,6 +66,8 @@ class MechanismTruth:
             motion = truth_of(element.mechanism, times)
         except NotUnique as error:
             return _laws_alone(element, times, str(error))
+        if unknown := _unknown_from(element, motion):
+            motion = cut_motion(motion, *unknown)
         dataset = MechanismTruth._dataset(element, motion, branching(motion.branches))
         if motion.tiles is None:
             return dataset
@@ -150,6 +154,25 @@ class MechanismTruth:
         if not element.mechanism.has_events:
             return dataset
         return with_bounces(with_events(dataset, motion.events), motion.bounces)
+
+
+def _unknown_from(element: MechanismElement, motion: TwoRouteMotion) -> tuple[float, str] | None:
+    """Time [s] from which routes part before a horizon, so far that the bar exceeds all motion, with a sentence.
+
+    None: they do not.
+    """
+    moved = np.abs(motion.record.p_WB - element.start.p_WB[:1]).reshape(len(motion.record.time), -1).max(1)
+    size = np.maximum(np.maximum.accumulate(moved), _LEAST * element.length)
+    bar, told = motion.bars["p_WB"], motion.record.time < motion.horizon
+    beyond = np.flatnonzero((bar > size) & told)
+    if not beyond.size:
+        return None
+    first = int(np.flatnonzero((bar > _PARTED * size) & told)[0])
+    text = (
+        f"the two routes part, and the error bar of places grows to {bar[beyond[0]]:.2g} m, more than anything has "
+        "moved; please report it"
+    )
+    return float(motion.record.time[first]), text
 
 
 def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:

@@ -1,4 +1,4 @@
-"""Laws of published works: of each effort the integral of its law, and of all drives together what is left of energy."""
+"""Laws of published works: of an effort the integral of its law, and of all drives together the balance of energy."""
 
 from __future__ import annotations
 
