@@ -9,7 +9,8 @@ import numpy as np
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.record import Array, Pieces
 from proofroll.truth.check.laws.residuals import LAWS, LawResiduals
-from proofroll.truth.check.laws.scene import LawScene, value_of
+from proofroll.truth.check.laws.scene import LawScene
+from proofroll.truth.check.laws.signals import value_of
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.scene.control import Control

@@ -9,7 +9,8 @@ import numpy as np
 from proofroll.truth.check.laws.integrals import dot, norm, of_angles, turned, turned_back
 from proofroll.truth.check.laws.record import Array, Moving
 from proofroll.truth.check.laws.residuals import ROUND
-from proofroll.truth.check.laws.scene import LawScene, value_of, velocity_at
+from proofroll.truth.check.laws.scene import LawScene, velocity_at
+from proofroll.truth.check.laws.signals import pull_by, value_of
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.scene.bushing import Bushing
@@ -136,7 +137,7 @@ def spring_pull(scene: LawScene, pieces: Moving, spring: Spring) -> tuple[Array,
     ]
     rate = dot((ends[1] - ends[0]) / length[..., None], speeds[1] - speeds[0])
     pull = spring.stiffness * (length - spring.length) + spring.damping * rate
-    return pull if spring.force is None else pull + spring.force.in_piece(length, rate), rate, ends
+    return pull if spring.force is None else pull + pull_by(spring.force, length, rate), rate, ends
 
 
 def bushing_load(scene: LawScene, pieces: Moving, bushing: Bushing) -> tuple[Array, Array, Array, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.integrals import frame_of, of_angles, turned
 from proofroll.truth.check.laws.record import Array, Moving
+from proofroll.truth.check.laws.signals import value_of
 from proofroll.truth.check.laws.surfaces import PairContact, contacts_of
 
 if TYPE_CHECKING:
@@ -164,16 +165,6 @@ class LawScene:
 def velocity_at(pieces: Moving, body: int, place: Array) -> Array:
     """Velocity of a body at places [m/s]."""
     return np.asarray(pieces.v[..., body, :] + np.cross(pieces.w[..., body, :], place - pieces.p[..., body, :]))
-
-
-def value_of(signal: Any, time: Array) -> Array:
-    """Values of a signal at the points of pieces; a held value is that of the middle of its piece."""
-    if getattr(signal, "hold", False):
-        value = signal.at((time[:, :1] + time[:, -1:]) / 2)
-    else:
-        value = signal.at(time) if hasattr(signal, "at") else signal
-        value = signal.in_piece(time) if getattr(signal, "kinks", None) else value
-    return np.asarray(np.broadcast_to(np.asarray(value, float), time.shape))
 
 
 def motion_of(signal: Any, time: Array) -> Array:

@@ -11,7 +11,8 @@ from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, Published
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.samples import kinetic_energy
-from proofroll.truth.check.laws.scene import FREE, LawScene, value_of
+from proofroll.truth.check.laws.scene import FREE, LawScene
+from proofroll.truth.check.laws.signals import value_of
 from proofroll.truth.check.laws.tiled import Turns, changed_velocity
 from proofroll.truth.check.laws.tiles import Places, Tiles
 
