@@ -1,0 +1,208 @@
+"""What a truth publishes is held: whatever is wrong behind the path is refused, and an honest answer is not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.typing import NDArray
+
+from proofroll.core.errors import Refused
+from proofroll.core.truth import truth
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.check.answer import held_answer
+from proofroll.truth.early_end import cut_motion
+from proofroll.truth.error_bars import TwoRouteMotion
+from proofroll.truth.plug_in import MechanismTruth
+from proofroll.truth.truth_of_mechanism import truth_of
+
+Array = NDArray[np.float64]
+Change = Callable[[xr.Dataset], xr.Dataset]
+TIMES = np.linspace(0.0, 0.8, 17)
+
+
+@cache
+def answer(scene: str) -> tuple[MechanismElement, TwoRouteMotion, xr.Dataset]:
+    """Element, motion and dataset of the truth of a scene."""
+    (element,) = load_scene(scene).elements
+    assert isinstance(element, MechanismElement)
+    motion = truth_of(element.mechanism, TIMES)
+    return element, motion, MechanismTruth._dataset(element, motion, "")
+
+
+def times(factor: float, *names: str) -> Change:
+    """Values of variables that begin so, times a factor."""
+    return values(lambda item: item * factor, *names)
+
+
+def plus(step: float, *names: str) -> Change:
+    """Values of variables that begin so, plus a step."""
+    return values(lambda item: item + step, *names)
+
+
+def values(change: Callable[[Array], Array], *names: str) -> Change:
+    """Other values of variables that begin so."""
+
+    def changed(dataset: xr.Dataset) -> xr.Dataset:
+        chosen = [name for name in dataset.data_vars if str(name).startswith(names)]
+        assert chosen, names
+        return dataset.assign({name: dataset[name].copy(data=change(dataset[name].to_numpy())) for name in chosen})
+
+    return changed
+
+
+def rows(order: Callable[[list[int]], list[int]]) -> Change:
+    """Samples in another order, at the times that were asked for."""
+
+    def changed(dataset: xr.Dataset) -> xr.Dataset:
+        numbers = order(list(range(dataset.sizes["time"])))
+        return dataset.isel(time=numbers).assign_coords(time=dataset.time.values[: len(numbers)])
+
+    return changed
+
+
+def row(number: int, new: Callable[[Array], Array], *names: str) -> Change:
+    """One sample with values of others."""
+
+    def changed(item: Array) -> Array:
+        item = item.copy()
+        item[number] = new(item)
+        return item
+
+    return values(changed, *names)
+
+
+def of_events(change: Callable[[xr.Dataset], xr.Dataset]) -> Change:
+    """Other events."""
+
+    def changed(dataset: xr.Dataset) -> xr.Dataset:
+        events = change(dataset[[name for name in dataset.data_vars if dataset[name].dims == ("event",)]])
+        return dataset.drop_dims("event").assign(events)
+
+    return changed
+
+
+MOTION = ("p_WB", "v_WB", "w_WB", "q_WB", "attitudes")
+EVENTS = ("event_time", "event_low", "event_high")
+FAULTS: list[tuple[str, str, Change]] = [
+    ("velocities times 1.0001", "bouncing_ball", times(1.0001, "v_WB")),
+    ("places a micrometre too low", "slide_to_roll", plus(-1e-6, "p_WB")),
+    ("angular velocity off in its eighth digit", "heavy_top", times(1 + 1e-7, "w_WB")),
+    ("conjugate quaternions", "heavy_top", values(lambda item: item * [1, -1, -1, -1], "q_WB")),
+    ("attitudes of another turn", "heavy_top", values(lambda item: item[..., [0, 2, 1, 3]], "attitudes")),
+    ("a sample lost", "double_pendulum", rows(lambda order: order[:-1])),
+    ("a sample doubled", "double_pendulum", rows(lambda order: [*order[:6], order[5], *order[7:]])),
+    ("two samples exchanged", "double_pendulum", rows(lambda order: [*order[:5], order[6], order[5], *order[7:]])),
+    ("a sample interpolated", "slide_to_roll", row(6, lambda item: (item[5] + item[7]) / 2, *MOTION)),
+    ("a force of another stretch", "slide_to_roll", row(12, lambda item: item[2], "force.ball", "contact_forces")),
+    ("times in other units", "double_pendulum", lambda dataset: dataset.assign_coords(time=dataset.time * 1.02)),
+    ("kinetic energy off by half", "pendulum", times(1.5, "energy")),
+    ("energy since another start", "pendulum", plus(1e-6, "energy_error")),
+    ("joint force of another sign", "pendulum", times(-1.0, "force.")),
+    ("joint moment sixty times too large", "heavy_top", plus(1e-3, "torque.")),
+    ("force of a slide off by 0.1 %", "servo", times(1.001, "effort.")),
+    ("effort beyond its limit", "saturated_servo", times(1.0001, "effort.")),
+    ("works off by 0.1 %", "servo", times(1.001, "work.")),
+    ("works with five digits", "arm_pd", values(lambda item: np.round(item, 5), "work.")),
+    ("dry friction off by 0.1 %", "pendulum_friction", times(1.001, "friction.")),
+    ("force of a stop off by 0.1 %", "stop", times(1.001, "stop.")),
+    ("contact force off by 0.1 %", "slide_to_roll", times(1.001, "force.ball_on_wall", "contact_forces")),
+    ("normal forces off by 0.1 %", "slide_to_roll", times(1.001, "normal_forces")),
+    ("gaps off by 1e-7 m", "bouncing_ball", plus(1e-7, "gap")),
+    ("slips off in their fifth digit", "slide_to_roll", times(1 + 1e-5, "slip")),
+    ("coordinate off by 1e-6", "double_pendulum", plus(1e-6, "q.")),
+    ("rate off in its fifth digit", "double_pendulum", times(1 + 1e-5, "v.")),
+    ("tracked point off in its fourth digit", "double_pendulum", times(0.9999, "tip.", "positions")),
+    ("events 1e-9 s early", "bouncing_ball", plus(-1e-9, *EVENTS)),
+    ("a change of mode 1e-7 s late", "slide_to_roll", plus(1e-7, *EVENTS)),
+    ("no first event", "stop", of_events(lambda events: events.isel(event=slice(1, None)))),
+    ("an impact told as a stick", "stop", values(lambda item: np.full(item.shape, "stick"), "event_kind")),
+    ("an event at a fifth of its time", "stop", times(0.2, *EVENTS)),
+]
+
+
+@pytest.mark.parametrize(("scene", "fault"), [item[1:] for item in FAULTS], ids=[item[0] for item in FAULTS])
+def test_a_fault_behind_the_path_is_refused(scene: str, fault: Change) -> None:
+    """A wrong value, sample or event breaks a law, by more than ten times its allowance."""
+    element, motion, dataset = answer(scene)
+    assert motion.tiles is not None
+    check = held_answer(element, fault(dataset), motion.tiles, TIMES)
+    assert max(part for part, _, _ in check.residuals.largest.values()) > 10
+
+
+@pytest.mark.parametrize("scene", sorted({item[1] for item in FAULTS}))
+def test_an_honest_answer_holds_all_laws(scene: str) -> None:
+    """Samples all lie on pieces that tile the time, and no residual exceeds a tenth of its allowance."""
+    element, motion, dataset = answer(scene)
+    assert motion.tiles is not None
+    check = held_answer(element, dataset, motion.tiles, TIMES)
+    assert check.held == check.samples == len(TIMES)
+    assert max(part for part, _, _ in check.residuals.largest.values()) < 0.1
+    assert "at 17 of 17 samples" in check.sentence()
+
+
+def test_a_hole_in_the_motion_is_refused() -> None:
+    """A part of the time that no piece covers breaks a law, though all samples hold the others."""
+    element, motion, dataset = answer("double_pendulum")
+    assert motion.tiles is not None
+    tiles = motion.tiles
+    keeps = np.flatnonzero((tiles.time[:, 0] > 0.33) | (tiles.time[:, -1] < 0.22))
+    check = held_answer(element, dataset, tiles.ordered(keeps), TIMES)
+    assert check.residuals.largest["tiled"][0] > 10
+    assert check.held < check.samples
+
+
+def test_a_stop_is_held_whatever_kind_of_truth_was_chosen() -> None:
+    """A joint that swings through a stop which the truth has forgotten is refused by the scene's own limits."""
+    element, motion, dataset = answer("pendulum")
+    (joint,) = element.mechanism.joints
+    assert motion.tiles is not None
+    middle = float(dataset[f"q.{joint.name}"].mean())
+    mechanism = replace(element.mechanism, joints=(replace(joint, limits=(middle, 10.0)),))
+    limited = replace(element, mechanism=mechanism)
+    check = held_answer(limited, dataset, motion.tiles, TIMES)
+    assert check.residuals.largest["stop"][0] > 10
+
+
+def test_a_broken_law_ends_a_truth_and_keeps_what_lies_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The truth has the samples before the fault, and says what breaks which law; from the start it is refused."""
+    plain = MechanismTruth.__dict__["_dataset"].__func__
+
+    def at(number: int) -> Callable[..., xr.Dataset]:
+        def faulty(element: MechanismElement, motion: TwoRouteMotion, branches: str) -> xr.Dataset:
+            dataset = plain(element, motion, branches)
+            count = dataset.sizes["time"]
+            return row(number, lambda item: item[number] + 1e-3, "v_WB")(dataset) if number < count else dataset
+
+        return faulty
+
+    monkeypatch.setattr(MechanismTruth, "_dataset", staticmethod(at(10)))
+    found = truth(load_scene("double_pendulum"), TIMES)
+    assert found.sizes["time"] == 10
+    assert found.attrs["ended"].startswith("what the truth publishes breaks the law")
+    assert "laws" not in found.attrs
+    monkeypatch.setattr(MechanismTruth, "_dataset", staticmethod(at(0)))
+    with pytest.raises(Refused, match="what the truth publishes breaks the law"):
+        truth(load_scene("double_pendulum"), TIMES)
+
+
+def test_a_bar_is_the_largest_over_the_times() -> None:
+    """Forces, whose bars rise and fall, have the largest of all samples, not that of the last."""
+    _, motion, dataset = answer("slide_to_roll")
+    assert dataset["contact_forces"].attrs["error_bar"] == motion.bars["pressed"].max()
+    assert motion.bars["pressed"].max() > motion.bars["pressed"][-1]
+
+
+def test_a_motion_is_cut_with_its_events_and_bars() -> None:
+    """What is left of a motion ends before the time."""
+    _, motion, _ = answer("bouncing_ball")
+    left = cut_motion(motion, 0.3, "so")
+    assert left.record.time[-1] < 0.3
+    assert not left.events
+    assert {len(bar) for bar in left.bars.values()} == {len(left.record.time)}
+    assert (left.end, left.ended) == (0.3, "so")
