@@ -118,6 +118,7 @@ class LawRecorder:
             w=moving["w"],
             stretch=np.full(len(time), number),
             modes=(self._modes(stretch.mode),) * len(time),
+            coarse=any(piece.coarse for piece in cut),
         )
 
     def _poses(self, states: Array) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from proofroll.truth.check.laws.changes import changes_of
 from proofroll.truth.check.laws.record import Array, Published
-from proofroll.truth.check.laws.residuals import LAWS, LawResiduals
+from proofroll.truth.check.laws.residuals import COARSE, LAWS, LawResiduals
 from proofroll.truth.check.laws.samples import force_laws, kinetic_energy, on_the_motion
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiled import Turns, laws_at_all_times, start_of
@@ -48,6 +48,7 @@ class AnswerCheck:
             end: time before which the truth ends, or inf [s].
         """
         scene, residuals, time = self._scene, self.residuals, published.pieces.time[:, 0]
+        residuals.coarse = COARSE if tiles.coarse else 1.0
         self.samples = len(time)
         self._times(time, asked, end)
         if not np.isfinite(published.pieces.p).all():  # a motion that is not unique has no values

@@ -29,6 +29,7 @@ class Tiles:
         time, pace, p, R, v, w: as of pieces, (tiles, points, …); the last body is the world.
         stretch: number of the stretch of each tile.
         modes: in each tile.
+        coarse: True if states inside a tile are known to fewer digits than at its ends; see :class:`.Pieces`.
     """
 
     time: Array
@@ -39,6 +40,7 @@ class Tiles:
     w: Array
     stretch: NDArray[np.intp]
     modes: tuple[Modes, ...]
+    coarse: bool = False
     turns: None = None  # angles go on from one tile to the next
 
     @classmethod
@@ -54,12 +56,13 @@ class Tiles:
             w=pieces.w,
             stretch=np.full(count, number),
             modes=(pieces.modes,) * count,
+            coarse=pieces.coarse,
         )
 
     def ordered(self, order: NDArray[np.intp]) -> Tiles:
         """Tiles in another order, or some of them."""
         arrays: dict[str, Any] = {name: getattr(self, name)[order] for name in _ARRAYS}
-        return Tiles(**arrays, modes=tuple(self.modes[k] for k in order))
+        return Tiles(**arrays, modes=tuple(self.modes[k] for k in order), coarse=self.coarse)
 
     def of_contacts(self, parts: Sequence[Sequence[int]]) -> Tiles:
         """The same with contacts that stand for several of these each, by their numbers."""
@@ -140,5 +143,6 @@ def _each(powers: Array, series: Array) -> Array:
 def joined_tiles(parts: Sequence[Tiles]) -> Tiles:
     """Tiles of all parts, in order of time."""
     arrays: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
-    whole = Tiles(**arrays, modes=tuple(mode for part in parts for mode in part.modes))
+    modes, coarse = (mode for part in parts for mode in part.modes), any(part.coarse for part in parts)
+    whole = Tiles(**arrays, modes=tuple(modes), coarse=coarse)
     return whole.ordered(np.lexsort((whole.time[:, 0], whole.stretch)))
