@@ -34,6 +34,7 @@ _T = TypeVar("_T")
 _TURN = 1.0  # rad, by which bodies turn in a piece at most: more is not resolved by its points
 _HALVINGS = 7  # of a step into pieces at most
 _SHORTER = 20  # halvings of a step at most of which one piece is looked at
+_LOOSER = 10.0  # by how much less rotations are resolved than states: they follow from these
 _TOGETHER = 3  # steps of DOP853 that the points of a piece resolve
 _PARTS = 8  # into which the first instants of a slip are cut: a force that jumps inside is located to one of them
 
@@ -281,10 +282,8 @@ class LawRecorder:
             states = np.asarray(inside(times.ravel()))
             moving = self._poses(states.T).reshape(count, len(POINTS), -1, 18)
             turn = 2 * half * float(np.abs(moving[..., 15:]).max(initial=0.0))
-            values = states.reshape(-1, len(POINTS))
-            if self._mechanism.prescribed:
-                values = np.concatenate([values, np.moveaxis(moving[..., 3:12], 1, -1).reshape(-1, len(POINTS))])
-            if turn <= _TURN and not _unresolved(values):
+            turning = np.moveaxis(moving[..., 3:12], 1, -1).reshape(-1, len(POINTS))
+            if turn <= _TURN and not _unresolved(states.reshape(-1, len(POINTS))) and not _unresolved(turning, _LOOSER):
                 break
             count = max(2 * count, int(np.ceil(count * turn / _TURN)))
         states = states.T.reshape(*times.shape, -1)
@@ -399,10 +398,10 @@ class LawRecorder:
         yield _Piece(time, rate, states.T, record.T if len(record) else None)
 
 
-def _unresolved(values: Array) -> bool:
+def _unresolved(values: Array, looser: float = 1.0) -> bool:
     """True if the points of a piece do not resolve one of the values on it, (values, points)."""
     coefficients = np.abs(TO_SERIES @ values.T)
-    return bool((coefficients[-2:].max(0) > RESOLVED * np.maximum(1.0, coefficients.max(0))).any())
+    return bool((coefficients[-2:].max(0) > looser * RESOLVED * np.maximum(1.0, coefficients.max(0))).any())
 
 
 def _spread(items: Sequence[_T], most: int) -> list[_T]:
