@@ -97,20 +97,20 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         of_tree(mechanism, units, tree, paths[0], held_paths[0] if held_paths else None),
         of_bodies(mechanism, units, bodies, second, paths[1], held_paths[1] if held_paths else None),
     ]
-    held = held_to_laws(mechanism, units, recorded)
-    if np.isfinite(held.end):
-        paths = cut_at(paths[0], held.end, held.text), cut_at(paths[1], held.end, held.text)
+    outcome = held_to_laws(mechanism, units, recorded)
+    if np.isfinite(outcome.end):
+        paths = cut_at(paths[0], outcome.end, outcome.text), cut_at(paths[1], outcome.end, outcome.text)
     reason = _reason(dynamics, paths)
     asked = times_known(paths, times, reason)
     times = held_paths[1].on_instants(held_paths[0].on_instants(asked)) if held_paths else asked
     stretches = stretches_at(paths, times)
     others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
     states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
-    tiles = held.tiles(0, float(times[-1]) * (1 + CLOSE))
+    tiles = outcome.tiles(0, float(times[-1]) * (1 + CLOSE))
     for values in held_paths:
         values.finish()
     seconds, known_until = times * units.time, _works_known(tree, paths[0])
-    unknown, at_samples = times[:, None] > known_until, list(zip(held.works, (stretches, others), strict=True))
+    unknown, at_samples = times[:, None] > known_until, list(zip(outcome.works, (stretches, others), strict=True))
     work_of_tree, work_of_bodies = (work.at(seconds, numbers) for work, numbers in at_samples)
     works = np.where(unknown, np.nan, work_of_tree), work_of_bodies
     unresolved = [work.unresolved(seconds, numbers)[:, np.isinf(known_until)] for work, numbers in at_samples]
@@ -150,7 +150,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
             until=until * units.time,
             cut=left,
         ),
-        laws=held.laws,
+        laws=outcome.laws,
         tiles=tiles,
     )
     if not scaled.contacts:

@@ -66,14 +66,14 @@ class RandomFault(NamedTuple):
 
 
 class FaultOutcome(NamedTuple):
-    """What came of a fault: "refused", "within the bar", "changes nothing" or "silent", and by what."""
+    """Outcome of a fault, "refused", "within the bar", "changes nothing" or "silent", and its reason."""
 
     kind: str
     detail: str
 
 
 def seed_of(text: str) -> int:
-    """Seed that differs altogether from that of another text, such as the date of the day before."""
+    """Seed of a text; that of the next date differs altogether."""
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
 
 
@@ -103,7 +103,7 @@ def functions_of(scene: str) -> frozenset[str]:
 
 
 def outcome(fault: RandomFault) -> FaultOutcome:
-    """What comes of a fault."""
+    """Outcome of a truth with a fault."""
     right = _honest(fault.scene)
     try:
         kind, wrong = _in_child(partial(_faulty, fault))
@@ -189,7 +189,7 @@ def _in_child(task: Callable[[], Any]) -> Any:
     """Result of a task in a process of its own, whose caches are empty.
 
     Raises:
-        TimeoutError: it takes too long.
+        TimeoutError: the task takes too long.
     """
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe(duplex=False)

@@ -9,13 +9,13 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import ENDS
-from proofroll.core.events import events_of
+from proofroll.core.events import IMPACTS, JUMPS, EventKind, events_of
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.truth.check.laws.answer import AnswerCheck
 from proofroll.truth.check.laws.integrals import of_quaternion
-from proofroll.truth.check.laws.record import Array, Change, Modes, Pieces, Published
+from proofroll.truth.check.laws.record import Array, Modes, Pieces, PublishedEvent, PublishedValues
 from proofroll.truth.check.laws.tiles import Tiles
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ def held_answer(element: MechanismElement, dataset: xr.Dataset, tiles: Tiles, as
     return check
 
 
-def _published(element: MechanismElement, dataset: xr.Dataset) -> Published:
-    """What a dataset says."""
+def _published(element: MechanismElement, dataset: xr.Dataset) -> PublishedValues:
+    """Values, forces and events of a dataset."""
     m = element.mechanism
     values = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
     count, joints = len(values["time"]), len(m.joints)
@@ -71,12 +71,24 @@ def _published(element: MechanismElement, dataset: xr.Dataset) -> Published:
         normal=normal[:, None],
         rolling=_turning(m.contacts, count, "rolling_resistance"),
         spinning=_turning(m.contacts, count, "spinning_friction"),
-        modes=Modes((), (), (), (), ()),
+        modes=Modes(contacts=(), rolling=(), spinning=(), friction=(), stops=()),
     )
     reactions = np.concatenate([vectors(kind, connections) for kind in ("force", "torque")], -1)
-    changes = [Change(str(e.kind), e.name, e.time, e.time_low, e.time_high) for e in events_of(dataset)]
+    changes = [
+        PublishedEvent(
+            name=event.name,
+            time=event.time,
+            low=event.time_low,
+            high=event.time_high,
+            jumps=event.kind in JUMPS,
+            strikes=event.kind in IMPACTS,
+            settles=event.kind == EventKind.SETTLE,
+            of_effort=event.kind in {EventKind.SATURATE, EventKind.RELEASE},
+        )
+        for event in events_of(dataset)
+    ]
     bars = {str(name): float(item.attrs.get("error_bar", 0.0)) for name, item in dataset.data_vars.items()}
-    return Published(pieces=pieces, reactions=reactions, values=values, bars=bars, changes=changes)
+    return PublishedValues(pieces=pieces, reactions=reactions, values=values, bars=bars, changes=changes)
 
 
 def _where_contacts_act(element: MechanismElement, values: Mapping[str, Array]) -> tuple[Array, Array]:

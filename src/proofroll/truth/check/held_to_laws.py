@@ -130,10 +130,10 @@ def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[Recorded],
         result = outcome(None)
     text, alongs = sentence(result, len(routes)), [walk.work for walk in walks]
     if result.violation is None:
-        return HeldMotion(np.inf, "", text, alongs, tiles)
+        return HeldMotion(end=np.inf, text="", laws=text, works=alongs, tiles=tiles)
     if not result.violation.time > 0:
         raise Refused(text)
-    return HeldMotion(result.violation.time / units.time, text, "", alongs, tiles)
+    return HeldMotion(end=result.violation.time / units.time, text=text, laws="", works=alongs, tiles=tiles)
 
 
 def work_along(mechanism: Mechanism, units: Units, tree: ContactTree, path: _Path) -> WorkAlong:

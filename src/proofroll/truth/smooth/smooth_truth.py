@@ -149,7 +149,7 @@ class _SmoothTruth:
             count = len(by_the_tree)
             chaotic = chaotic[:count] & (by_the_tree * NUDGE > CHAOS)
         self._check_branch(by_tree.first(count), by_bodies.first(count), chaotic, early, paths)
-        held = self._held_to_laws(paths, early)
+        outcome = self._held_to_laws(paths, early)
         count = len(early.known(self._times))
         by_tree, by_bodies = by_tree.first(count), by_bodies.first(count)
         best, nearby = by_bodies, on_same_turns(self._mechanism, by_bodies, nearby.first(count))
@@ -183,9 +183,9 @@ class _SmoothTruth:
             ended=units.text_in_seconds(self._reason(early.time, early.reason)),
             checked_by=self._checked_by(best),
             branches=branches,
-            laws=held.laws,
+            laws=outcome.laws,
             # the published motion is that of the second route, or of a closed form, which it follows within the bar
-            tiles=held.tiles(-1, float(self._times[count - 1])),
+            tiles=outcome.tiles(-1, float(self._times[count - 1])),
         )
 
     @staticmethod
@@ -203,8 +203,8 @@ class _SmoothTruth:
         witness = self._in_seconds(self._equations.recorded(self._times, states))
         exact = on_same_turns(self._mechanism, witness, self._from_form(form, self._seconds))
         early = EarlyEnd()
-        held = held_to_laws(self._mechanism, self._units, [self._recorded()], most=_PIECES)
-        early.at(held.end, held.text)
+        outcome = held_to_laws(self._mechanism, self._units, [self._recorded()], most=_PIECES)
+        early.at(outcome.end, outcome.text)
         count = len(early.known(self._times))
         path, unknown = self._path_of_form(), np.full((count, len(working(self._mechanism))), np.nan)
         motion = two_route_motion(
@@ -219,8 +219,8 @@ class _SmoothTruth:
             left=dict.fromkeys(_apart_in_fields(self._mechanism, exact, exact), np.zeros(count)),
         )
         end = early.time * self._units.time
-        tiles = held.tiles(0, float(self._times[count - 1]))
-        return replace(motion, end=end, ended=early.reason, branches=self._branches(), laws=held.laws, tiles=tiles)
+        tiles = outcome.tiles(0, float(self._times[count - 1]))
+        return replace(motion, end=end, ended=early.reason, branches=self._branches(), laws=outcome.laws, tiles=tiles)
 
     def _branches(self) -> list[float]:
         """Times of singular poses along the closed form [s]."""
@@ -332,9 +332,9 @@ class _SmoothTruth:
             of_tree(mechanism, units, self._tree, paths[0], turns_at=of_the_tree),
             of_bodies(mechanism, units, self._bodies, self._second, paths[1], turns_at=turns_at),
         ]
-        held = held_to_laws(mechanism, units, routes, most=_PIECES)
-        early.at(held.end, held.text)
-        return held
+        outcome = held_to_laws(mechanism, units, routes, most=_PIECES)
+        early.at(outcome.end, outcome.text)
+        return outcome
 
     def _recorded(self) -> Recorded:
         """The closed form as a route that is held to the laws."""

@@ -1,4 +1,4 @@
-"""What a truth publishes is held: whatever is wrong behind the path is refused, and an honest answer is not."""
+"""Answers are held to the laws: a fault behind the path is refused, and an honest answer is not."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def test_a_bar_is_the_largest_over_the_times() -> None:
 
 
 def test_a_motion_is_cut_with_its_events_and_bars() -> None:
-    """What is left of a motion ends before the time."""
+    """A motion that is cut ends before the time."""
     _, motion, _ = answer("bouncing_ball")
     left = cut_motion(motion, 0.3, "so")
     assert left.record.time[-1] < 0.3

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.truth.check.laws.changes import changes_of
-from proofroll.truth.check.laws.record import Array, Published
+from proofroll.truth.check.laws.record import Array, PublishedValues
 from proofroll.truth.check.laws.residuals import COARSE, LAWS, LawResiduals
 from proofroll.truth.check.laws.samples import force_laws, kinetic_energy, on_the_motion
 from proofroll.truth.check.laws.scene import LawScene
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism
 
 _INSTANT = 1e-6  # part of an interval of a controller beside an instant, where forces are those of either side
-_JUMPS = {"impact", "bounce", "settle"}
 
 
 class AnswerCheck:
@@ -38,7 +37,7 @@ class AnswerCheck:
         self._scene = LawScene(mechanism, length, rate)
         self.residuals, self.samples, self.held = LawResiduals(rate=rate, known_alone=True), 0, 0
 
-    def take(self, published: Published, tiles: Tiles, asked: Array, end: float) -> None:
+    def take(self, published: PublishedValues, tiles: Tiles, asked: Array, end: float) -> None:
         """Checks an answer.
 
         Args:
@@ -55,7 +54,7 @@ class AnswerCheck:
             return
         last = float(time[-1])
         turns = laws_at_all_times(scene, tiles, residuals, last)
-        struck = any(item.kind in _JUMPS and item.low <= 0 for item in published.changes)
+        struck = any(item.jumps and item.low <= 0 for item in published.changes)
         for moving in (published.pieces, tiles):
             if moving.time[0, 0] == 0:
                 start_of(scene, moving, residuals, struck)

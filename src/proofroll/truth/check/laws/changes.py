@@ -5,21 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from proofroll.truth.check.laws.contacts import gap_of
-from proofroll.truth.check.laws.record import Array, Change, Modes, Published
+from proofroll.truth.check.laws.record import Array, Modes, PublishedEvent, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiled import changed_velocity
 from proofroll.truth.check.laws.tiles import Tiles
 
 _STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
-_JUMPS = {"impact", "bounce", "settle"}
-_OF_EFFORTS = {"saturate", "release"}  # a bound of an effort is no mode of a record
 _ROOM = 1e-11  # accuracy of the time of an event, relative to it and to a second
 _LAST_REBOUNDS = 1e-4  # natural times that infinitely many rebounds take at most, which are summed
 _BEFORE_END = 1e-6  # part of the time before the end of a motion in which an event may be left out
 
 
-def changes_of(scene: LawScene, tiles: Tiles, published: Published, residuals: LawResiduals, last: float) -> None:
+def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residuals: LawResiduals, last: float) -> None:
     """Checks all events before a ``last`` time [s]."""
     borders = np.flatnonzero(tiles.stretch[1:] != tiles.stretch[:-1])
     ends, begins, jumps = tiles.time[borders, -1], tiles.time[borders + 1, 0], changed_velocity(scene, tiles)[borders]
@@ -33,7 +31,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: Published, residuals: L
             if item.low - room - _summed(scene, item) <= begin and end <= item.high + room
         ]
         time = np.array([[begin]])
-        if jump > _STRUCK and not any(item.kind in _JUMPS for item in near):
+        if jump > _STRUCK and not any(item.jumps for item in near):
             residuals.note("change", "a jump of velocities", np.ones((1, 1)), 1.0, time)
         changed = _changed(scene, tiles.modes[number], tiles.modes[number + 1])
         if changed and not any(_of(item.name, name) for item in near for name in changed):
@@ -41,7 +39,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: Published, residuals: L
         for item in near:
             _at_impact(scene, tiles, residuals, item, number, jump > _STRUCK)
     for item in published.changes:
-        if item.kind in _OF_EFFORTS or item.time >= last * (1 - _BEFORE_END):
+        if item.of_effort or item.time >= last * (1 - _BEFORE_END):
             continue
         apart = np.maximum(np.maximum(ends - item.high, item.low - _summed(scene, item) - begins), 0.0)
         apart = np.append(apart, abs(item.time) if item.time <= 0 else np.inf)
@@ -49,9 +47,9 @@ def changes_of(scene: LawScene, tiles: Tiles, published: Published, residuals: L
         residuals.note("change", item.name, np.array([[off]]), 1 + abs(item.time), np.array([[item.time]]))
 
 
-def _summed(scene: LawScene, item: Change) -> float:
+def _summed(scene: LawScene, item: PublishedEvent) -> float:
     """Time before a settling at which the motion may rest already: that of the rebounds which are summed [s]."""
-    return _LAST_REBOUNDS / scene.rate if item.kind == "settle" else 0.0
+    return _LAST_REBOUNDS / scene.rate if item.settles else 0.0
 
 
 def _of(event: str, changed: str) -> bool:
@@ -69,9 +67,11 @@ def _changed(scene: LawScene, sooner: Modes, later: Modes) -> set[str]:
     return changed
 
 
-def _at_impact(scene: LawScene, tiles: Tiles, residuals: LawResiduals, item: Change, number: int, struck: bool) -> None:
-    """At an impact of a contact its gap is zero."""
-    if item.kind not in {"impact", "bounce"}:
+def _at_impact(
+    scene: LawScene, tiles: Tiles, residuals: LawResiduals, item: PublishedEvent, number: int, struck: bool
+) -> None:
+    """A contact that is struck has no gap, and velocities jump."""
+    if not item.strikes:
         return
     for contact in scene.contacts:
         if contact.name == item.name and contact.alone:

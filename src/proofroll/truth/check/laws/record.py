@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class Moving(Protocol):
+class MovingBodies(Protocol):
     """Poses and velocities of all bodies and the world at points of pieces, see :class:`Pieces`."""
 
     @property
@@ -40,7 +40,7 @@ class Moving(Protocol):
         """Angular velocities [rad/s]."""
 
 
-class Turning(Moving, Protocol):
+class TurningBodies(MovingBodies, Protocol):
     """The same, with coordinates for their whole turns."""
 
     @property
@@ -159,19 +159,31 @@ class Passage:
 
 
 @dataclass(frozen=True)
-class Change:
-    """An event as it is published: kind, name of a contact or joint, time and bracket [s]."""
+class PublishedEvent:
+    """An event as it is published.
 
-    kind: str
+    Attributes:
+        name: of a contact, joint or actuator.
+        time, low, high: its time and bracket [s].
+        jumps: True if velocities jump there.
+        strikes: True if surfaces meet, or a joint and its stop.
+        settles: True if it is the last of infinitely many impacts.
+        of_effort: True if an effort reaches its limit or leaves it, which is no mode of a record.
+    """
+
     name: str
     time: float
     low: float
     high: float
+    jumps: bool
+    strikes: bool
+    settles: bool
+    of_effort: bool
 
 
 @dataclass(frozen=True)
-class Published:
-    """What a truth publishes, SI units.
+class PublishedValues:
+    """Answer of a truth, SI units.
 
     Attributes:
         pieces: motion, contacts and forces along coordinates at each sample, a piece of one point each; NaN: not
@@ -187,9 +199,9 @@ class Published:
     reactions: Array
     values: Mapping[str, Array]
     bars: Mapping[str, float]
-    changes: Sequence[Change]
+    changes: Sequence[PublishedEvent]
 
-    def of(self, chosen: NDArray[np.intp]) -> Published:
+    def of(self, chosen: NDArray[np.intp]) -> PublishedValues:
         """Some of the samples."""
         arrays = {item.name: getattr(self.pieces, item.name) for item in fields(Pieces)}
         taken: dict[str, Any] = {name: value[chosen] for name, value in arrays.items() if isinstance(value, np.ndarray)}

@@ -95,7 +95,7 @@ class LawResiduals:
         events: number of transitions.
         coarse: factor on all allowances, now.
         rate: natural rate of the scene [1/s].
-        known_alone: True if NaN is a value that is not determined, of which no law says anything.
+        known_alone: True if no law holds for a value of NaN, which is not determined.
     """
 
     largest: dict[str, tuple[float, float, str]] = field(default_factory=dict)

@@ -11,7 +11,7 @@ from proofroll.truth.check.laws.contacts import contact_laws
 from proofroll.truth.check.laws.integrals import COUNT, dot, norm, turned
 from proofroll.truth.check.laws.joints import Coordinates, FreeDirection, joint_laws
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import SPREAD, Array, Moving, Published
+from proofroll.truth.check.laws.record import SPREAD, Array, MovingBodies, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import FREE, LawScene
 from proofroll.truth.check.laws.tiles import Places, Tiles
@@ -22,7 +22,9 @@ _RANK = 1e-9  # relative singular value below which unknown forces are one
 _IN_PLANE = 1e-12  # component of a direction that is round-off
 
 
-def on_the_motion(scene: LawScene, tiles: Tiles, places: Places, published: Published, residuals: LawResiduals) -> None:
+def on_the_motion(
+    scene: LawScene, tiles: Tiles, places: Places, published: PublishedValues, residuals: LawResiduals
+) -> None:
     """A sample is the motion at its time."""
     pieces = published.pieces
     sizes = {"p": scene.length, "v": scene.speed, "R": 1.0, "w": scene.rate}
@@ -33,7 +35,9 @@ def on_the_motion(scene: LawScene, tiles: Tiles, places: Places, published: Publ
         residuals.note("sample", "", off[:, None], size + float(np.abs(values).max()), pieces.time, bars[name])
 
 
-def force_laws(scene: LawScene, tiles: Tiles, places: Places, published: Published, residuals: LawResiduals) -> None:
+def force_laws(
+    scene: LawScene, tiles: Tiles, places: Places, published: PublishedValues, residuals: LawResiduals
+) -> None:
     """Checks samples of one mode: joints, contacts, Newton's and Euler's laws of each body, and power."""
     pieces = published.pieces
     loads = BodyLoads(scene, pieces)
@@ -45,7 +49,7 @@ def force_laws(scene: LawScene, tiles: Tiles, places: Places, published: Publish
 
 
 def _newton_and_euler(
-    scene: LawScene, tiles: Tiles, places: Places, published: Published, residuals: LawResiduals
+    scene: LawScene, tiles: Tiles, places: Places, published: PublishedValues, residuals: LawResiduals
 ) -> None:
     """Mass times acceleration, and the rate of angular momentum, of each body; what is unknown explains a rest."""
     pieces, bodies = published.pieces, len(scene.mechanism.bodies)
@@ -85,7 +89,7 @@ def _newton_and_euler(
         residuals.note("euler", body.name, norm(left[..., k, 3:]), turning[..., k], pieces.time, digits[1][..., k])
 
 
-def _momenta(scene: LawScene, moving: Moving) -> tuple[Array, Array]:
+def _momenta(scene: LawScene, moving: MovingBodies) -> tuple[Array, Array]:
     """Velocities of centres of mass, and angular momenta about them."""
     inertia = moving.R @ scene.inertia @ moving.R.swapaxes(-1, -2)
     return scene.centres(moving)[1], turned(inertia, moving.w)
@@ -94,7 +98,7 @@ def _momenta(scene: LawScene, moving: Moving) -> tuple[Array, Array]:
 class _Unknown:
     """Forces and moments that are not determined: whatever they are, they explain a part of what laws leave."""
 
-    def __init__(self, scene: LawScene, pieces: Moving) -> None:
+    def __init__(self, scene: LawScene, pieces: MovingBodies) -> None:
         self._bodies, self._shape = len(scene.mechanism.bodies), pieces.time.shape
         self._centres, self._columns = scene.centres(pieces)[0], list[Array]()
 
@@ -112,7 +116,7 @@ class _Unknown:
                 self._columns.append(column)
 
     def explained(self, left: Array, sizes: Array) -> Array:
-        """What no unknown force explains, in sizes of force and moment (samples, 1, bodies, 2)."""
+        """Remainder that no unknown force explains; ``sizes``: of force and moment, (samples, 1, bodies, 2)."""
         if not self._columns:
             return left
         scale = np.repeat(1 / sizes, 3, -1)
@@ -129,11 +133,11 @@ def _along(
     scene: LawScene,
     tiles: Tiles,
     places: Places,
-    published: Published,
+    published: PublishedValues,
     residuals: LawResiduals,
     axes: Sequence[FreeDirection],
 ) -> None:
-    """What a joint transmits along a free direction is what its springs, drives, friction and stops give."""
+    """A joint transmits along a free direction the forces of its springs, drives, friction and stops."""
     pieces, numbers = published.pieces, [axis.joint for axis in axes]
     for place, axis in enumerate(axes):
         joint, connection = scene.mechanism.joints[axis.joint], scene.connections[axis.joint]
@@ -162,7 +166,7 @@ def _along(
         residuals.note("along", joint.name, said - given, size, pieces.time, digits)
 
 
-def kinetic_energy(scene: LawScene, moving: Moving) -> tuple[Array, Array]:
+def kinetic_energy(scene: LawScene, moving: MovingBodies) -> tuple[Array, Array]:
     """Kinetic energy with armatures, and that of gravity, and the sizes of its parts [J]."""
     gravity = np.array(scene.mechanism.gravity)
     centres, velocities = scene.centres(moving)
@@ -185,7 +189,7 @@ def _power(
     scene: LawScene,
     tiles: Tiles,
     places: Places,
-    published: Published,
+    published: PublishedValues,
     residuals: LawResiduals,
     loads: BodyLoads,
 ) -> None:

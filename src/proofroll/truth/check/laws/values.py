@@ -9,14 +9,16 @@ import numpy as np
 from proofroll.truth.check.laws.contacts import gap_of, slide_of
 from proofroll.truth.check.laws.integrals import dot, norm, of_angles, of_quaternion, turned
 from proofroll.truth.check.laws.loads import bushing_load, rotation_vector, spring_ends, spring_pull
-from proofroll.truth.check.laws.record import Array, Published
+from proofroll.truth.check.laws.record import Array, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import FREE, LawScene
 
 _PART = 1e-3  # part of a natural size that counts in the size of a value
 
 
-def values_follow(scene: LawScene, published: Published, residuals: LawResiduals, kinetic: tuple[Array, Array]) -> None:
+def values_follow(
+    scene: LawScene, published: PublishedValues, residuals: LawResiduals, kinetic: tuple[Array, Array]
+) -> None:
     """Checks values at samples; ``kinetic``: kinetic energy and that of gravity, and their sizes [J]."""
     _coordinates(scene, published, residuals)
     _energies(scene, published, residuals, kinetic)
@@ -26,11 +28,11 @@ def values_follow(scene: LawScene, published: Published, residuals: LawResiduals
     _names(scene, published, residuals)
 
 
-def _vector(published: Published, name: str) -> Array:
+def _vector(published: PublishedValues, name: str) -> Array:
     return np.stack([published.values[f"{name}.{axis}"] for axis in "xyz"], -1)
 
 
-def _coordinates(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+def _coordinates(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
     """Coordinates and rates of joints with one are those of the poses."""
     pieces = published.pieces
     assert pieces.turns is not None  # of all samples
@@ -51,7 +53,9 @@ def _coordinates(scene: LawScene, published: Published, residuals: LawResiduals)
             residuals.note("value", f"{name}.{joint.name}", off, size + np.abs(value), pieces.time)
 
 
-def _energies(scene: LawScene, published: Published, residuals: LawResiduals, kinetic: tuple[Array, Array]) -> None:
+def _energies(
+    scene: LawScene, published: PublishedValues, residuals: LawResiduals, kinetic: tuple[Array, Array]
+) -> None:
     """Energy is kinetic, of gravity, and of springs."""
     m, pieces, (total, size) = scene.mechanism, published.pieces, kinetic
     size = size + _PART * scene.mass.sum() * scene.speed**2
@@ -89,7 +93,7 @@ def _energies(scene: LawScene, published: Published, residuals: LawResiduals, ki
             residuals.note("value", name, off, size, pieces.time)
 
 
-def _points(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+def _points(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
     """Tracked points are fixed to their bodies."""
     pieces = published.pieces
     for k, point in enumerate(scene.mechanism.points):
@@ -100,7 +104,7 @@ def _points(scene: LawScene, published: Published, residuals: LawResiduals) -> N
             residuals.note("value", point.name, norm(values[:, None] - place), size, pieces.time)
 
 
-def _links(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+def _links(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
     """Pulls of springs and loads of bushings follow from their laws."""
     pieces = published.pieces
     for spring in scene.mechanism.springs:
@@ -118,7 +122,7 @@ def _links(scene: LawScene, published: Published, residuals: LawResiduals) -> No
             residuals.note("value", f"{kind}.{bushing.name}", off, size + norm(value), pieces.time)
 
 
-def _contacts(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+def _contacts(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
     """Gaps and slips follow from poses and velocities."""
     pieces = published.pieces
     for k, contact in enumerate(scene.contacts):
@@ -134,7 +138,7 @@ def _contacts(scene: LawScene, published: Published, residuals: LawResiduals) ->
         residuals.note("value", f"slip.{contact.name}", off, fast, pieces.time)
 
 
-def _names(scene: LawScene, published: Published, residuals: LawResiduals) -> None:
+def _names(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
     """Two variables of one quantity are equal."""
     values, pieces = published.values, published.pieces
     forces = pieces.force[:, 0]
@@ -166,7 +170,7 @@ def _names(scene: LawScene, published: Published, residuals: LawResiduals) -> No
         _same(name, (first, second), published, residuals)
 
 
-def _same(name: str, both: Sequence[Array], published: Published, residuals: LawResiduals) -> None:
+def _same(name: str, both: Sequence[Array], published: PublishedValues, residuals: LawResiduals) -> None:
     size = max((float(np.nanmax(np.abs(item), initial=0.0)) for item in both), default=0.0)
     off = np.abs(both[0] - both[1]).reshape(len(both[0]), -1)
     known = np.where(np.isnan(off), 0.0, off).max(1, initial=0.0)

@@ -8,7 +8,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.integrals import dot, integral
 from proofroll.truth.check.laws.joint_forces import law_of
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import SPREAD, Array, Published
+from proofroll.truth.check.laws.record import SPREAD, Array, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.samples import kinetic_energy
 from proofroll.truth.check.laws.scene import FREE, LawScene
@@ -20,7 +20,7 @@ _STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an
 
 
 def works_follow(
-    scene: LawScene, tiles: Tiles, turns: Turns, places: Places, published: Published, residuals: LawResiduals
+    scene: LawScene, tiles: Tiles, turns: Turns, places: Places, published: PublishedValues, residuals: LawResiduals
 ) -> None:
     """Checks works of drives at samples, whose places in tiles are given."""
     names = [name for name in published.values if name.startswith("work.")]
@@ -56,7 +56,7 @@ def works_follow(
 
 
 def _note(
-    name: str, values: tuple[Array, Array, Array], published: Published, residuals: LawResiduals, bar: float
+    name: str, values: tuple[Array, Array, Array], published: PublishedValues, residuals: LawResiduals, bar: float
 ) -> None:
     """Takes what is said and found of a work, and its size [J]."""
     said, own, size = values
