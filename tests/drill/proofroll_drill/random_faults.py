@@ -5,7 +5,6 @@ import __future__
 
 import ast
 import copy
-import hashlib
 import importlib
 import inspect
 import multiprocessing
@@ -70,11 +69,6 @@ class FaultOutcome(NamedTuple):
 
     kind: str
     detail: str
-
-
-def seed_of(text: str) -> int:
-    """Seed of a text; that of the next date differs altogether."""
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
 
 
 def drawn_faults(seed: int, count: int) -> list[RandomFault]:

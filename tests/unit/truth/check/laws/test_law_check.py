@@ -157,3 +157,31 @@ def test_laws_take_no_code_of_the_routes() -> None:
             ):
                 allowed = ("proofroll.truth.check.laws", "proofroll.elements.mechanism.scene.joint_kinds")
                 assert (node.module or "").startswith(allowed), f"{file.name} imports {node.module}"
+
+
+def test_the_check_of_an_answer_takes_what_its_method_says() -> None:
+    """Beside the laws its module imports the dataset's words for events and ends, and where contacts act."""
+    import ast
+    from pathlib import Path
+
+    import proofroll.truth.check.answer as module
+
+    tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
+    taken = {
+        f"{node.module}.{alias.name}"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("proofroll")
+        for alias in node.names
+        if not (node.module or "").startswith("proofroll.truth.check.laws")
+    }
+    assert taken == {
+        "proofroll.core.arrays.FloatArray",
+        "proofroll.core.dataset.ENDS",
+        "proofroll.core.events.EventKind",
+        "proofroll.core.events.IMPACTS",
+        "proofroll.core.events.JUMPS",
+        "proofroll.core.events.events_of",
+        "proofroll.elements.mechanism.dynamics.placed.Placed",
+        "proofroll.elements.mechanism.run.contacts.observables.follow_contacts",
+        "proofroll.elements.mechanism.run.element.MechanismElement",
+    }
