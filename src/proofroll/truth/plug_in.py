@@ -76,8 +76,7 @@ class MechanismTruth:
             assert check.residuals.first is not None  # as there is a text
             motion = cut_motion(motion, check.residuals.first.time, text)
             return MechanismTruth._dataset(element, motion, branching(motion.branches))
-        if motion.laws:
-            dataset.attrs[LAWS] += check.sentence()
+        dataset.attrs[LAWS] = "; ".join(filter(None, [motion.laws, check.sentence()]))
         return dataset
 
     @staticmethod

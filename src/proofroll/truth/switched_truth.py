@@ -26,7 +26,7 @@ from proofroll.elements.mechanism.scene.signal import breaks
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, work_along
+from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, tiles_of, work_along
 from proofroll.truth.contact_bounces import contact_bounces
 from proofroll.truth.early_end import cut_at
 from proofroll.truth.error_bars import TwoRouteMotion, check_start, on_same_turns
@@ -106,7 +106,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     stretches = stretches_at(paths, times)
     others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
     states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
-    tiles = outcome.tiles(0, float(times[-1]) * (1 + CLOSE))
+    tiles = tiles_of(recorded[0], float(times[-1]) * (1 + CLOSE), outcome.pieces)
     for values in held_paths:
         values.finish()
     seconds, known_until = times * units.time, _works_known(tree, paths[0])

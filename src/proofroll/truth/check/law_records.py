@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -24,16 +24,14 @@ from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES, of
 from proofroll.truth.check.laws.record import Modes, Passage, Pieces
 from proofroll.truth.check.laws.tiles import Tiles, joined_tiles
 from proofroll.truth.natural_units import Units
-from proofroll.truth.numerics.hybrid import DenseStep, HybridPath, Stretch, states_inside
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch, states_inside
 from proofroll.truth.switching.contact_taylor import CompiledStretch
 from proofroll.truth.switching.planar_slip import BegunSlip
 from proofroll.truth.switching.stopping_slip import StoppingSlip
 from proofroll.truth.tree.contact_tree import ContactTree
 
-_T = TypeVar("_T")
 _TURN = 1.0  # rad, by which bodies turn in a piece at most: more is not resolved by its points
 _HALVINGS = 7  # of a step into pieces at most
-_SHORTER = 20  # halvings of a step at most of which one piece is looked at
 _LOOSER = 10.0  # by how much less rotations are resolved than states: they follow from these
 _TOGETHER = 3  # steps of DOP853 that the points of a piece resolve
 _PARTS = 8  # into which the first instants of a slip are cut: a force that jumps inside is located to one of them
@@ -55,9 +53,6 @@ class LawRecorder:
     A record at a state is a flat array: of each body place, rotation by rows, velocity, angular velocity; of each
     contact force, place, normal; efforts, drives, couplings; force and moment of each loop. Compiled modes give it by
     :func:`.stated_symbols`; ``state_of`` gives it at a state in a mode, in numbers.
-
-    ``turns_at``: times -> coordinates of joints for their whole turns, (times, joints, 2); None: angles go on from one
-    point to the next.
     """
 
     def __init__(
@@ -66,25 +61,16 @@ class LawRecorder:
         units: Units,
         route: ContactTree | ContactBodies,
         state_of: Callable[[Array, ContactMode], Array],
-        turns_at: Callable[[Array], Array] | None = None,
     ) -> None:
         self._mechanism, self._units, self._route, self._state_of = mechanism, units, route, state_of
-        self._turns_at = turns_at
         named, moment = named_forces(mechanism), units.force * units.length
         self._named_units = stated_named(
             mechanism, np.array([units.force if item.unit == "N" else moment for item in named])
         )
 
-    def pieces(self, stretch: Stretch[ContactMode], most: int | None = None) -> list[Pieces]:
-        """Pieces of a stretch: of steps and of dense output apart.
-
-        ``most``: number of pieces whose forces are found in numbers, the first and last among them; None: all.
-        """
-        cut, stated = list(self._cut(stretch, most)), []
-        numeric = [piece for piece in cut if piece.record is None]
-        if most is not None and len(numeric) > most:
-            kept = set(map(id, _spread(numeric, most)))
-            cut = [piece for piece in cut if piece.record is not None or id(piece) in kept]
+    def pieces(self, stretch: Stretch[ContactMode], *, numeric: bool) -> list[Pieces]:
+        """Pieces of a stretch: of steps and of dense output apart; ``numeric``: those with forces in numbers, too."""
+        cut, stated = [piece for piece in self._cut(stretch) if numeric or piece.record is not None], []
         for coarse in (False, True):
             pieces = [piece for piece in cut if piece.coarse is coarse]
             if pieces:
@@ -98,13 +84,14 @@ class LawRecorder:
                 stated.append(self._stated(time, pace, np.array(records), stretch.mode, coarse=coarse))
         return stated
 
-    def tiles(self, number: int, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Tiles | None:
+    def tiles(self, number: int, stretch: Stretch[ContactMode], pieces: Sequence[Pieces] | None) -> Tiles | None:
         """Poses and velocities in all pieces of the stretch of a number; None: it has none.
 
-        ``pieces``: of :meth:`pieces`, which are all of a compiled stretch.
+        ``pieces``: of :meth:`pieces`, which are all of a compiled stretch; None: not known.
         """
-        if isinstance(stretch, CompiledStretch) and stretch.by is not None and pieces:
-            return joined_tiles([Tiles.of(part, number) for part in pieces])
+        if isinstance(stretch, CompiledStretch) and stretch.by is not None:
+            known = self.pieces(stretch, numeric=False) if pieces is None else pieces
+            return joined_tiles([Tiles.of(part, number) for part in known]) if known else None
         cut = list(self._whole(stretch))
         if not cut:
             return None
@@ -234,7 +221,6 @@ class LawRecorder:
             spinning=turning[True],
             modes=self._modes(mode),
             coarse=coarse,
-            turns=None if self._turns_at is None else self._turns_at(time.ravel()).reshape(*shape, joints, 2),
         )
 
     def _modes(self, mode: ContactMode) -> Modes:
@@ -270,7 +256,7 @@ class LawRecorder:
                 if min(end, stretch.end) > start:
                     yield from self._equal_parts(start, min(end, stretch.end), inside)
         else:
-            yield from self._cut(stretch, None)
+            yield from self._cut(stretch)
 
     def _equal_parts(self, start: float, end: float, inside: Callable[[Array], Any]) -> Iterator[_Piece]:
         """Equal pieces of a step, so many that their points resolve states and turns."""
@@ -289,8 +275,8 @@ class LawRecorder:
         states = states.T.reshape(*times.shape, -1)
         yield from (_Piece(time, np.full(len(POINTS), half), part) for time, part in zip(times, states, strict=True))
 
-    def _cut(self, stretch: Stretch[ContactMode], most: int | None) -> Iterator[_Piece]:
-        """Pieces of a stretch; ``most``: see :meth:`pieces`."""
+    def _cut(self, stretch: Stretch[ContactMode]) -> Iterator[_Piece]:
+        """Pieces of a stretch."""
         if isinstance(stretch, BegunSlip):
             edges = np.linspace(stretch.start, stretch.end, _PARTS + 1)
             for start, end in pairwise(edges):
@@ -306,12 +292,9 @@ class LawRecorder:
             recorded = stretch.by.record_of(stretch.mode, stretch.start)
             for start, end, inside_step in stretch.by.steps_of(stretch):
                 yield from self._parts(start, end, inside_step, recorded, paced=True)
-        elif stretch.exact:
-            steps_apart = [[step] for step in stretch.dense if min(step[1], stretch.end) > step[0]]
-            yield from (self._window(step) for (step,) in self._looked_at(steps_apart, most))
         elif stretch.dense:
             groups = [stretch.dense[begin : begin + _TOGETHER] for begin in range(0, len(stretch.dense), _TOGETHER)]
-            for steps in self._looked_at(groups, most):
+            for steps in groups:
                 start, last = steps[0][0], min(steps[-1][1], stretch.end)
                 inside = steps[0][2] if len(steps) == 1 else partial(states_inside, steps)
                 if last > start:
@@ -320,32 +303,6 @@ class LawRecorder:
             half = (stretch.end - stretch.start) / 2
             states = np.repeat(stretch.first[None], len(POINTS), 0)
             yield _Piece((stretch.start + stretch.end) / 2 + half * POINTS, np.full(len(POINTS), half), states)
-
-    def _looked_at(self, groups: Sequence[Sequence[DenseStep]], most: int | None) -> Sequence[Sequence[DenseStep]]:
-        """Groups of steps to take pieces from; where whole turns are known, at even times, and not at the end.
-
-        Before an end at a singular pose forces grow, and steps crowd.
-        """
-        if most is None or self._turns_at is None or not groups:
-            return groups if most is None else _spread(groups, most)
-        starts = [group[0][0] for group in groups]
-        times = np.linspace(starts[0], groups[-1][-1][1], most, endpoint=False)
-        return [groups[number] for number in np.unique(np.searchsorted(starts, times, side="right") - 1)]
-
-    def _window(self, step: DenseStep) -> _Piece:
-        """Piece at the start of a step that is as exact inside as at its ends, short enough that its points resolve it.
-
-        A law that is wrong is wrong at all times: what a long step has behind is not looked at.
-        """
-        start, end, inside = step
-        length = end - start
-        for halvings in range(_SHORTER):
-            length = (end - start) / 2**halvings
-            times = start + length * (POINTS + 1) / 2
-            states = inside(times)
-            if not self._rough(states, length):
-                break
-        return _Piece(times, np.full(len(POINTS), length / 2), states.T)
 
     def _rough(self, states: Array, span: float, record: Array | None = None) -> bool:
         """True if points do not resolve the states, (state, points), and turns of a piece, which takes a ``span``."""
@@ -402,9 +359,3 @@ def _unresolved(values: Array, looser: float = 1.0) -> bool:
     """True if the points of a piece do not resolve one of the values on it, (values, points)."""
     coefficients = np.abs(TO_SERIES @ values.T)
     return bool((coefficients[-2:].max(0) > looser * RESOLVED * np.maximum(1.0, coefficients.max(0))).any())
-
-
-def _spread(items: Sequence[_T], most: int) -> list[_T]:
-    """Items, or so many of them in even places, the first and last among them."""
-    chosen = sorted({int(k) for k in np.linspace(0, len(items) - 1, most)})
-    return list(items) if len(items) <= most else [items[k] for k in chosen]

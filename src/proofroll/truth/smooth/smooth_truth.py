@@ -7,7 +7,7 @@ truth, the others give its error bar. If in both routes a start displaced by :da
 conservative mechanism has failed, and shows no chaos.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -28,7 +28,11 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
-from proofroll.truth.check.held_to_laws import HeldMotion, Recorded, held_to_laws, of_bodies, of_tree
+from proofroll.truth.check.held_to_laws import of_bodies, of_tree, tiles_of
+from proofroll.truth.check.laws.law_check import sentence, verdict
+from proofroll.truth.check.laws.motion import kinematics
+from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.early_end import EarlyEnd
 from proofroll.truth.error_bars import (
     NUDGE,
@@ -41,19 +45,17 @@ from proofroll.truth.error_bars import (
 )
 from proofroll.truth.followed_paths import FollowedPath, before_first, end_of, followed, time_accuracy, two_route_motion
 from proofroll.truth.natural_units import Units, natural_units
-from proofroll.truth.numerics.hybrid import HybridPath, Stretch, states_inside
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch
 from proofroll.truth.smooth.singular_poses import BRANCHING, singular_poses, singular_poses_of
 from proofroll.truth.smooth.smooth_routes import SmoothBodies, SmoothTree, stiff
-from proofroll.truth.switching.contact_taylor import CompiledStretch
 from proofroll.truth.witnesses.closed_forms import ClosedForm, closed_form
 from proofroll.truth.work_of_drives import works_of_steps
 
 CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indistinguishable starts is chaos
 BRANCH = 1e-3  # natural lengths, 1: distance between routes that chaos causes only long after the horizon
 ENERGY = 1e-8  # change of energy relative to its parts, a thousand times that of routes through chaos, 1e-11
-_PIECES = 2  # of a route that are held to the laws: they cost a tenth of a truth of few samples
-_FORM_STEPS = 4  # parts of a run, at least, at which a closed form is held to the laws
-_FORM_STEP = 1.0  # length of each at most, in natural units
+_FORM_STEP = 1.0  # length of parts of a closed form at most, in natural units
+_FORM_SPAN = 0.1  # length of its parts whose velocities are held to its places beside its routes
 _WITNESS_STEP = 2.0**-7  # length of the equal steps of a closed form's witness at most, in natural units
 _POSE_STEP = 2.0**-6  # length of steps that look for singular poses at most, in natural units
 _SINGULAR = 1e-3  # least singular value of rows relative to the largest, below which a pose counts as singular
@@ -149,7 +151,8 @@ class _SmoothTruth:
             count = len(by_the_tree)
             chaotic = chaotic[:count] & (by_the_tree * NUDGE > CHAOS)
         self._check_branch(by_tree.first(count), by_bodies.first(count), chaotic, early, paths)
-        outcome = self._held_to_laws(paths, early)
+        if form is not None:
+            self._check_form(form, early)
         count = len(early.known(self._times))
         by_tree, by_bodies = by_tree.first(count), by_bodies.first(count)
         best, nearby = by_bodies, on_same_turns(self._mechanism, by_bodies, nearby.first(count))
@@ -183,9 +186,10 @@ class _SmoothTruth:
             ended=units.text_in_seconds(self._reason(early.time, early.reason)),
             checked_by=self._checked_by(best),
             branches=branches,
-            laws=outcome.laws,
             # the published motion is that of the second route, or of a closed form, which it follows within the bar
-            tiles=outcome.tiles(-1, float(self._times[count - 1])),
+            tiles=tiles_of(
+                of_bodies(self._mechanism, units, self._bodies, self._second, paths[1]), float(self._times[count - 1])
+            ),
         )
 
     @staticmethod
@@ -202,25 +206,22 @@ class _SmoothTruth:
         states = self._equations.rk4_states(self._times, step)
         witness = self._in_seconds(self._equations.recorded(self._times, states))
         exact = on_same_turns(self._mechanism, witness, self._from_form(form, self._seconds))
-        early = EarlyEnd()
-        outcome = held_to_laws(self._mechanism, self._units, [self._recorded()], most=_PIECES)
-        early.at(outcome.end, outcome.text)
-        count = len(early.known(self._times))
-        path, unknown = self._path_of_form(), np.full((count, len(working(self._mechanism))), np.nan)
+        count = len(self._times)
+        edges = np.linspace(0.0, self._until, int(np.ceil(self._until / _FORM_STEP)) + 1).tolist()
+        path, unknown = self._path_of_form([*pairwise(edges)]), np.full((count, len(working(self._mechanism))), np.nan)
         motion = two_route_motion(
             self._mechanism,
             (path, path),
-            exact.first(count),
-            witness.first(count),
+            exact,
+            witness,
             (f"closed form: {form.title}", "joint coordinates, RK4"),
             TwoRouteMotion.reason,
             self._units,
             (unknown, unknown),
             left=dict.fromkeys(_apart_in_fields(self._mechanism, exact, exact), np.zeros(count)),
         )
-        end = early.time * self._units.time
-        tiles = outcome.tiles(0, float(self._times[count - 1]))
-        return replace(motion, end=end, ended=early.reason, branches=self._branches(), laws=outcome.laws, tiles=tiles)
+        tiles = tiles_of(of_tree(self._mechanism, self._units, self._tree, path), self._until)
+        return replace(motion, branches=self._branches(), tiles=tiles)
 
     def _branches(self) -> list[float]:
         """Times of singular poses along the closed form [s]."""
@@ -316,42 +317,19 @@ class _SmoothTruth:
         moved, record = (equations.recorded(times, tree.within(item, times)[:, :-1]) for item in (nearby, stretch))
         return _apart(moved, record) / BESIDE
 
-    def _held_to_laws(self, paths: tuple[FollowedPath, FollowedPath], early: EarlyEnd) -> HeldMotion:
-        """Outcome of the law check; a violation ends the truth."""
-        mechanism, units, stretch = self._mechanism, self._units, paths[0].stretches[0]
+    def _check_form(self, form: ClosedForm, early: EarlyEnd) -> None:
+        """Ends the truth where velocities of a closed form are not the rates of its places."""
+        residuals = LawResiduals(rate=1 / self._units.time)
+        spans = [(start, start + _FORM_SPAN) for start in (0.0, self._until / 2)]
+        tiles = tiles_of(of_tree(self._mechanism, self._units, self._tree, self._path_of_form(spans)), self._until)
+        if tiles is not None:
+            kinematics(LawScene(self._mechanism, self._units.length, residuals.rate), tiles, residuals)
+        outcome = verdict({f"closed form: {form.title}": residuals})
+        if outcome.violation is not None:
+            early.at(outcome.violation.time / self._units.time, sentence(outcome, 1))
 
-        def turns_at(times: Array) -> Array:
-            times = np.clip(times, 0.0, stretch.end)
-            inside = states_inside(stretch.dense, times).T if stretch.dense else self._tree.within(stretch, times)
-            return self._turns(inside)
-
-        # all pieces of a compiled stretch are looked at, from one to the next
-        of_the_tree = None if isinstance(stretch, CompiledStretch) else turns_at
-        routes = [] if self._exact is None else [self._recorded()]
-        routes += [
-            of_tree(mechanism, units, self._tree, paths[0], turns_at=of_the_tree),
-            of_bodies(mechanism, units, self._bodies, self._second, paths[1], turns_at=turns_at),
-        ]
-        outcome = held_to_laws(mechanism, units, routes, most=_PIECES)
-        early.at(outcome.end, outcome.text)
-        return outcome
-
-    def _recorded(self) -> Recorded:
-        """The closed form as a route that is held to the laws."""
-        assert self._form is not None
-        path = self._path_of_form()
-        (stretch,) = path.stretches
-        return of_tree(
-            self._mechanism,
-            self._units,
-            self._tree,
-            path,
-            turns_at=lambda times: self._turns(stretch.dense[0][2](times).T),
-            name=f"closed form: {self._form.title}",
-        )
-
-    def _path_of_form(self) -> FollowedPath:
-        """The closed form as a path in joint coordinates, which has parts of the run as its steps."""
+    def _path_of_form(self, spans: Sequence[tuple[float, float]]) -> FollowedPath:
+        """The closed form as a path in joint coordinates, which has these spans as its steps."""
         assert self._scaled_form is not None
         assert self._scaled_form.motion is not None
         motion = self._scaled_form.motion
@@ -359,7 +337,6 @@ class _SmoothTruth:
         def inside(times: Array) -> Array:
             return np.column_stack([*motion(times), times]).T
 
-        edges = np.linspace(0.0, self._until, max(_FORM_STEPS, int(np.ceil(self._until / _FORM_STEP))) + 1).tolist()
         first, last = inside(np.array([0.0, self._until])).T
         stretch = Stretch[tuple[()]](
             start=0.0,
@@ -368,19 +345,10 @@ class _SmoothTruth:
             first=first,
             last=last,
             guard=None,
-            dense=[(start, end, inside) for start, end in pairwise(edges)],
+            dense=[(start, end, inside) for start, end in spans],
             exact=True,
         )
         return HybridPath(stretches=(stretch,), happenings=(), margins=())
-
-    def _turns(self, states: Array) -> Array:
-        """Coordinates of joints with one or two of them, for their whole turns, from those of the tree."""
-        mechanism = self._mechanism
-        turns = np.zeros((len(states), len(mechanism.joints), 2))
-        for number, (joint, columns) in enumerate(zip(mechanism.joints, mechanism.q_slices, strict=True)):
-            if joint.nq in {1, 2}:
-                turns[:, number, : joint.nq] = states[:, columns]
-        return turns
 
     def _works(self, path: FollowedPath, records: list[Record]) -> tuple[Array, Array]:
         """Work of drives [J], (times, drives), and what is not known of it, at each time.

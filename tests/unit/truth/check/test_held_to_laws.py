@@ -80,11 +80,11 @@ def test_what_a_controller_sets_follows_its_law(held: str, delay: int, monkeypat
 
 
 def test_a_closed_form_is_held_to_the_laws(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Velocities of a closed form that are a millionth off break a law, and the form is named."""
+    """Velocities of a closed form that are a millionth off are no rates of its places, and the form is named."""
     bob = Body("bob", 1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01))
     pendulum = Mechanism((bob,), (Joint("pivot", "revolute", "world", "bob", axis=(0.0, 1.0, 0.0), q0=(1.0,)),))
     times = np.linspace(0.0, 0.5, 3)
-    assert "in 3 routes" in truth_of(pendulum, times).laws
+    assert not truth_of(pendulum, times).ended
     form = smooth_truth.closed_form(pendulum)
     assert form is not None
     assert form.motion is not None
@@ -95,5 +95,4 @@ def test_a_closed_form_is_held_to_the_laws(monkeypatch: pytest.MonkeyPatch) -> N
         return q, v * (1.0 + 1e-6)
 
     monkeypatch.setattr(smooth_truth, "closed_form", lambda _: replace(form, motion=faulty))
-    with pytest.raises(Refused, match="closed form: pendulum, Jacobi elliptic functions"):
-        truth_of(pendulum, times)
+    assert "closed form: pendulum, Jacobi elliptic functions" in truth_of(pendulum, times).ended

@@ -85,7 +85,7 @@ class AnswerCheck:
     def sentence(self) -> str:
         """Clause on the samples that hold all laws."""
         laws = sum(law in self.residuals.largest for law in LAWS)
-        return f"; what is published holds {laws} laws at {self.held} of {self.samples} samples"
+        return f"what is published holds {laws} laws at {self.held} of {self.samples} samples"
 
     def _times(self, time: Array, asked: Array, end: float) -> None:
         """Samples are those that were asked for, and none before the end is missing."""
