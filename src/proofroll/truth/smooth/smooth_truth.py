@@ -318,7 +318,11 @@ class _SmoothTruth:
         return _apart(moved, record) / BESIDE
 
     def _check_form(self, form: ClosedForm, early: EarlyEnd) -> None:
-        """Ends the truth where velocities of a closed form are not the rates of its places."""
+        """Ends the truth where velocities of a closed form are not the rates of its places.
+
+        Raises:
+            Refused: they are not from the start.
+        """
         residuals = LawResiduals(rate=1 / self._units.time)
         spans = [(start, start + _FORM_SPAN) for start in (0.0, self._until / 2)]
         tiles = tiles_of(of_tree(self._mechanism, self._units, self._tree, self._path_of_form(spans)), self._until)
@@ -326,6 +330,8 @@ class _SmoothTruth:
             kinematics(LawScene(self._mechanism, self._units.length, residuals.rate), tiles, residuals)
         outcome = verdict({f"closed form: {form.title}": residuals})
         if outcome.violation is not None:
+            if not outcome.violation.time > 0:
+                raise Refused(sentence(outcome, 1))
             early.at(outcome.violation.time / self._units.time, sentence(outcome, 1))
 
     def _path_of_form(self, spans: Sequence[tuple[float, float]]) -> FollowedPath:
