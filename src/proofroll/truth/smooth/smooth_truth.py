@@ -327,6 +327,7 @@ class _SmoothTruth:
         spans = [(start, start + _FORM_SPAN) for start in (0.0, self._until / 2)]
         tiles = tiles_of(of_tree(self._mechanism, self._units, self._tree, self._path_of_form(spans)), self._until)
         if tiles is not None:
+            residuals.points = tiles.time.size
             kinematics(LawScene(self._mechanism, self._units.length, residuals.rate), tiles, residuals)
         outcome = verdict({f"closed form: {form.title}": residuals})
         if outcome.violation is not None:
