@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.truth.check.laws.integrals import dot, norm
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import SPREAD, Array, MovingBodies, Pieces
+from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Pieces
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene, velocity_at
 from proofroll.truth.check.laws.surfaces import PairContact, gap, near, seen_from
@@ -30,13 +30,13 @@ class ClosedContact(NamedTuple):
     fast: Array
 
 
-def gap_of(contact: PairContact, pieces: MovingBodies) -> Array:
+def gap_of(contact: PairContact, pieces: BodyPoses) -> Array:
     """Gap of a contact from poses alone [m]; of one of several places of two solids that of the solids."""
     A, B = ((pieces.p[..., body, :], pieces.R[..., body, :, :]) for body in (contact.a, contact.b))
     return gap(contact.shape_a, contact.shape_b, A, B)
 
 
-def apart(scene: LawScene, contact: PairContact, pieces: MovingBodies, residuals: LawResiduals) -> None:
+def apart(scene: LawScene, contact: PairContact, pieces: BodyPoses, residuals: LawResiduals) -> None:
     """No body passes into another."""
     far = scene.length + np.abs(pieces.p[..., [contact.a, contact.b], :]).max((-1, -2))
     residuals.note("gap", contact.name, np.maximum(-gap_of(contact, pieces), 0), far, pieces.time)

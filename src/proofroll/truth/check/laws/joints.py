@@ -11,7 +11,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.check.laws.integrals import dot, norm
 from proofroll.truth.check.laws.joint_forces import forces_along
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import Array, MovingBodies, Pieces, TurningBodies
+from proofroll.truth.check.laws.record import Array, BodyPoses, Pieces
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
 from proofroll.truth.check.laws.scene import (
     FREE,
@@ -62,7 +62,7 @@ class Coordinates:
         joints = enumerate(scene.mechanism.joints)
         self._last = {(number, k): (0.0, float(q), 0.0) for number, joint in joints for k, q in enumerate(joint.q0)}
 
-    def at(self, number: int, k: int, pieces: TurningBodies, placed: PlacedFrames, kind: str) -> Array:
+    def at(self, number: int, k: int, pieces: BodyPoses, placed: PlacedFrames, kind: str) -> Array:
         """Coordinate k of a joint at the points of pieces [m, rad]."""
         axes, axis, turns = FREE[kind][k]
         if not turns:
@@ -110,7 +110,7 @@ def joint_laws(
     return axes
 
 
-def sizes_of(scene: LawScene, pieces: MovingBodies, connection: JointFrames, placed: PlacedFrames) -> Sizes:
+def sizes_of(scene: LawScene, pieces: BodyPoses, connection: JointFrames, placed: PlacedFrames) -> Sizes:
     """Natural sizes of a connection."""
     ends = connection.a, connection.b
     spin = sum(norm(pieces.w[..., body, :]) for body in ends)
@@ -119,7 +119,7 @@ def sizes_of(scene: LawScene, pieces: MovingBodies, connection: JointFrames, pla
 
 
 def closure(
-    pieces: MovingBodies, residuals: LawResiduals, connection: JointFrames, placed: PlacedFrames, sizes: Sizes
+    pieces: BodyPoses, residuals: LawResiduals, connection: JointFrames, placed: PlacedFrames, sizes: Sizes
 ) -> None:
     """Checks that a connection holds its bodies together, at place and rate."""
     time, name, A, B = pieces.time, connection.name, placed.A, placed.B

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.truth.check.laws.integrals import dot, norm, of_angles, turned, turned_back
-from proofroll.truth.check.laws.record import Array, MovingBodies
+from proofroll.truth.check.laws.record import Array, BodyPoses
 from proofroll.truth.check.laws.residuals import ROUND
 from proofroll.truth.check.laws.scene import LawScene, velocity_at
 from proofroll.truth.check.laws.signals import pull_by, value_of
@@ -31,7 +31,7 @@ class BodyLoads:
         power_size: sum of the sizes of its parts.
     """
 
-    def __init__(self, scene: LawScene, pieces: MovingBodies) -> None:
+    def __init__(self, scene: LawScene, pieces: BodyPoses) -> None:
         self._scene, self._pieces = scene, pieces
         self._centres = scene.centres(pieces)[0]
         self.force, self.moment = np.zeros_like(pieces.p), np.zeros_like(pieces.p)
@@ -115,7 +115,7 @@ class BodyLoads:
             self.works(power, norm(value) * scene.speed)
 
 
-def spring_ends(scene: LawScene, pieces: MovingBodies, link: Spring | Bushing) -> tuple[Array, Array]:
+def spring_ends(scene: LawScene, pieces: BodyPoses, link: Spring | Bushing) -> tuple[Array, Array]:
     """Ends of a spring or bushing on its bodies [m]."""
     a, b = (
         pieces.p[..., body, :] + turned(pieces.R[..., body, :, :], np.array(position))
@@ -127,7 +127,7 @@ def spring_ends(scene: LawScene, pieces: MovingBodies, link: Spring | Bushing) -
     return a, b
 
 
-def spring_pull(scene: LawScene, pieces: MovingBodies, spring: Spring) -> tuple[Array, Array, tuple[Array, Array]]:
+def spring_pull(scene: LawScene, pieces: BodyPoses, spring: Spring) -> tuple[Array, Array, tuple[Array, Array]]:
     """Pull of a spring [N], the rate of its length [m/s], and its ends [m]."""
     ends = spring_ends(scene, pieces, spring)
     length = norm(ends[1] - ends[0])
@@ -140,7 +140,7 @@ def spring_pull(scene: LawScene, pieces: MovingBodies, spring: Spring) -> tuple[
     return pull if spring.force is None else pull + pull_by(spring.force, length, rate), rate, ends
 
 
-def bushing_load(scene: LawScene, pieces: MovingBodies, bushing: Bushing) -> tuple[Array, Array, Array, Array]:
+def bushing_load(scene: LawScene, pieces: BodyPoses, bushing: Bushing) -> tuple[Array, Array, Array, Array]:
     """Force and moment of a bushing on its second body [N, N m], velocity and spin of that seen from the first."""
     a, b = scene.index[bushing.body_a], scene.index[bushing.body_b]
     A = pieces.R[..., a, :, :] @ of_angles(np.array(bushing.orientation_a))

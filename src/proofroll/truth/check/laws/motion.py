@@ -10,7 +10,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.integrals import dot, integral, norm, since_start, tail, turned
 from proofroll.truth.check.laws.joints import FreeDirection
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import Array, MovingBodies, Pieces
+from proofroll.truth.check.laws.record import Array, BodyPoses, Pieces
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 
@@ -18,7 +18,7 @@ _ARM = 1e-2  # part of the natural length that a body extends at least, for the 
 _MEETS = 1e-13  # difference of times, relative to them, up to which a piece begins where the last one ended
 
 
-def kinematics(scene: LawScene, pieces: MovingBodies, residuals: LawResiduals) -> None:
+def kinematics(scene: LawScene, pieces: BodyPoses, residuals: LawResiduals) -> None:
     """Place = integral of the velocity, rotation = integral of [w] R, for each body."""
     time, pace = pieces.time, pieces.pace
     for k, body in enumerate(scene.mechanism.bodies):
@@ -31,7 +31,7 @@ def kinematics(scene: LawScene, pieces: MovingBodies, residuals: LawResiduals) -
         residuals.note("turn", body.name, np.abs(apart).max((-1, -2)), 1.0, time, tail=unresolved)
 
 
-def joined(scene: LawScene, pieces: MovingBodies, residuals: LawResiduals, evenly: Array | bool = True) -> None:
+def joined(scene: LawScene, pieces: BodyPoses, residuals: LawResiduals, evenly: Array | bool = True) -> None:
     """Each piece begins where the one before has ended; ``evenly``: where its velocities do, too."""
     begins, ends = pieces.time[1:, 0], pieces.time[:-1, -1]
     meets = np.abs(begins - ends) <= _MEETS * (1.0 + np.abs(begins))
@@ -41,9 +41,7 @@ def joined(scene: LawScene, pieces: MovingBodies, residuals: LawResiduals, evenl
         residuals.note("joined", "", np.where(meets, apart, 0.0)[:, None], 1.0, pieces.time[1:, :1])
 
 
-def jump(
-    scene: LawScene, later: MovingBodies, sooner: MovingBodies, starts: slice, ends: slice, rates: bool = True
-) -> Array:
+def jump(scene: LawScene, later: BodyPoses, sooner: BodyPoses, starts: slice, ends: slice, rates: bool = True) -> Array:
     """Largest difference of the first points of pieces from the last points of others, in natural sizes."""
     sizes = {"p": scene.length, "R": 0.0} | ({"v": scene.speed, "w": scene.rate} if rates else {})
     parts = []

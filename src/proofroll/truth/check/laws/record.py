@@ -4,48 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-
-
-class MovingBodies(Protocol):
-    """Poses and velocities of all bodies and the world at points of pieces, see :class:`Pieces`."""
-
-    @property
-    def time(self) -> Array:
-        """[s]."""
-
-    @property
-    def pace(self) -> Array:
-        """Rate of the time by the variable of a piece [s]."""
-
-    @property
-    def p(self) -> Array:
-        """Origins [m]."""
-
-    @property
-    def R(self) -> Array:
-        """Rotations."""
-
-    @property
-    def v(self) -> Array:
-        """Velocities [m/s]."""
-
-    @property
-    def w(self) -> Array:
-        """Angular velocities [rad/s]."""
-
-
-class TurningBodies(MovingBodies, Protocol):
-    """The same, with coordinates for their whole turns."""
-
-    @property
-    def turns(self) -> Array | None:
-        """See :class:`Pieces`."""
 
 
 SPREAD = "spread"  # mode of a closed contact whose force is the sum of several, so that it has no point of action
@@ -68,9 +32,9 @@ class Modes(NamedTuple):
     stops: tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True)
-class Pieces:
-    """Statements of one route at the points of pieces of one stretch, SI units, world axes.
+@dataclass(frozen=True, kw_only=True)
+class BodyPoses:
+    """Poses and velocities of all bodies at the points of pieces of a motion, SI units, world axes.
 
     A piece is a part of a step in which all quantities are polynomials of a variable x from -1 to 1; its points are
     Chebyshev's, :data:`.integrals.POINTS`, both ends among them. Arrays have the shape (pieces, points, …).
@@ -83,17 +47,6 @@ class Pieces:
         R: rotation of each body, (bodies + 1, 3, 3).
         v: velocity of each origin [m/s], (bodies + 1, 3).
         w: angular velocity of each body [rad/s], (bodies + 1, 3).
-        effort: of each actuator along its joint [N, N m], (actuators).
-        coupling: multiplier of each coupling: force along its first joint [N, N m], (couplings).
-        drive: force that imposes the motion of each joint [N, N m], (joints); 0 where none is prescribed.
-        loop: force and moment of each loop on its second body, at its place there [N, N m], (loops, 6).
-        friction: dry friction along each joint [N, N m], (joints).
-        stops: force of each stop along its joint [N, N m], (joints, 2).
-        force: on the first body of each contact [N], (contacts, 3).
-        place: point of action [m], (contacts, 3).
-        normal: from the second body to the first, unit vector, (contacts, 3).
-        rolling, spinning: moment on the first body of each contact against rolling and spin [N m], (contacts, 3).
-        modes: during the stretch.
         coarse: True if states inside a piece are known to fewer digits than at its ends (dense output of DOP853).
         turns: coordinates of joints with one or two coordinates, for their whole turns, (joints, 2); None: angles
             go on from the last point.
@@ -105,6 +58,28 @@ class Pieces:
     R: Array
     v: Array
     w: Array
+    coarse: bool = False
+    turns: Array | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pieces(BodyPoses):
+    """Statements of one route at the points of pieces of one stretch.
+
+    Attributes:
+        effort: of each actuator along its joint [N, N m], (actuators).
+        coupling: multiplier of each coupling: force along its first joint [N, N m], (couplings).
+        drive: force that imposes the motion of each joint [N, N m], (joints); 0 where none is prescribed.
+        loop: force and moment of each loop on its second body, at its place there [N, N m], (loops, 6).
+        friction: dry friction along each joint [N, N m], (joints).
+        stops: force of each stop along its joint [N, N m], (joints, 2).
+        force: on the first body of each contact [N], (contacts, 3).
+        place: point of action [m], (contacts, 3).
+        normal: from the second body to the first, unit vector, (contacts, 3).
+        rolling, spinning: moment on the first body of each contact against rolling and spin [N m], (contacts, 3).
+        modes: during the stretch.
+    """
+
     effort: Array
     coupling: Array
     drive: Array
@@ -117,8 +92,6 @@ class Pieces:
     rolling: Array
     spinning: Array
     modes: Modes
-    coarse: bool = False
-    turns: Array | None = None
 
     def points(self, piece: int, point: int) -> Pieces:
         """One point as pieces of one point."""

@@ -11,7 +11,7 @@ from proofroll.truth.check.laws.contacts import contact_laws
 from proofroll.truth.check.laws.integrals import COUNT, dot, norm, turned
 from proofroll.truth.check.laws.joints import Coordinates, FreeDirection, joint_laws
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import SPREAD, Array, MovingBodies, PublishedValues
+from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import FREE, LawScene
 from proofroll.truth.check.laws.tiles import Places, Tiles
@@ -89,7 +89,7 @@ def _newton_and_euler(
         residuals.note("euler", body.name, norm(left[..., k, 3:]), turning[..., k], pieces.time, digits[1][..., k])
 
 
-def _momenta(scene: LawScene, moving: MovingBodies) -> tuple[Array, Array]:
+def _momenta(scene: LawScene, moving: BodyPoses) -> tuple[Array, Array]:
     """Velocities of centres of mass, and angular momenta about them."""
     inertia = moving.R @ scene.inertia @ moving.R.swapaxes(-1, -2)
     return scene.centres(moving)[1], turned(inertia, moving.w)
@@ -98,7 +98,7 @@ def _momenta(scene: LawScene, moving: MovingBodies) -> tuple[Array, Array]:
 class _Unknown:
     """Forces and moments that are not determined: whatever they are, they explain a part of what laws leave."""
 
-    def __init__(self, scene: LawScene, pieces: MovingBodies) -> None:
+    def __init__(self, scene: LawScene, pieces: BodyPoses) -> None:
         self._bodies, self._shape = len(scene.mechanism.bodies), pieces.time.shape
         self._centres, self._columns = scene.centres(pieces)[0], list[Array]()
 
@@ -166,7 +166,7 @@ def _along(
         residuals.note("along", joint.name, said - given, size, pieces.time, digits)
 
 
-def kinetic_energy(scene: LawScene, moving: MovingBodies) -> tuple[Array, Array]:
+def kinetic_energy(scene: LawScene, moving: BodyPoses) -> tuple[Array, Array]:
     """Kinetic energy with armatures, and that of gravity, and the sizes of its parts [J]."""
     gravity = np.array(scene.mechanism.gravity)
     centres, velocities = scene.centres(moving)

@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.integrals import frame_of, of_angles, turned
-from proofroll.truth.check.laws.record import Array, MovingBodies
+from proofroll.truth.check.laws.record import Array, BodyPoses
 from proofroll.truth.check.laws.signals import value_of
 from proofroll.truth.check.laws.surfaces import PairContact, contacts_of
 
@@ -132,7 +132,7 @@ class LawScene:
             )
         return connections
 
-    def placed(self, connection: JointFrames, pieces: MovingBodies) -> PlacedFrames:
+    def placed(self, connection: JointFrames, pieces: BodyPoses) -> PlacedFrames:
         """A connection at the points of pieces."""
         a, b = connection.a, connection.b
         origin_a = pieces.p[..., a, :] + turned(pieces.R[..., a, :, :], connection.position_a)
@@ -156,13 +156,13 @@ class LawScene:
             return [(name, factor / scale) for name, factor in pairs], coupling.offset / scale
         return [(coupling.joint_b, 1.0), (coupling.joint_a, -coupling.ratio)], coupling.offset
 
-    def centres(self, pieces: MovingBodies) -> tuple[Array, Array]:
+    def centres(self, pieces: BodyPoses) -> tuple[Array, Array]:
         """Centres of mass [m] and their velocities [m/s]."""
         arm = turned(pieces.R, self.com)
         return pieces.p + arm, pieces.v + np.cross(pieces.w, arm)
 
 
-def velocity_at(pieces: MovingBodies, body: int, place: Array) -> Array:
+def velocity_at(pieces: BodyPoses, body: int, place: Array) -> Array:
     """Velocity of a body at places [m/s]."""
     return np.asarray(pieces.v[..., body, :] + np.cross(pieces.w[..., body, :], place - pieces.p[..., body, :]))
 

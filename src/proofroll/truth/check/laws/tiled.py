@@ -8,7 +8,7 @@ from proofroll.truth.check.laws.contacts import apart
 from proofroll.truth.check.laws.integrals import dot, of_quaternion
 from proofroll.truth.check.laws.joints import Coordinates, closure, sizes_of
 from proofroll.truth.check.laws.motion import joined, jump, kinematics
-from proofroll.truth.check.laws.record import Array, MovingBodies
+from proofroll.truth.check.laws.record import Array, BodyPoses
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import FREE, LawScene, PlacedFrames, motion_of
 from proofroll.truth.check.laws.tiles import Tiles
@@ -49,7 +49,7 @@ def _without_holes(scene: LawScene, tiles: Tiles, residuals: LawResiduals, last:
     residuals.note("tiled", "", np.maximum(begins - ends, 0)[:, None], size[:, None], ends[:, None])
 
 
-def start_of(scene: LawScene, moving: MovingBodies, residuals: LawResiduals, struck: bool) -> None:
+def start_of(scene: LawScene, moving: BodyPoses, residuals: LawResiduals, struck: bool) -> None:
     """A motion from time 0 begins at coordinates and rates of the joints' own fields; ``struck``: rates jump there."""
     for number, joint in enumerate(scene.mechanism.joints):
         connection = scene.connections[number]

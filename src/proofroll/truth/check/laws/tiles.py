@@ -11,7 +11,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from proofroll.truth.check.laws.integrals import COUNT, TO_SERIES
-from proofroll.truth.check.laws.record import SPREAD, Array, Modes, Pieces
+from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Modes, Pieces
 
 _CORRECTIONS = 6  # of Newton's method for the place of a time in a tile, at most: it converges in three
 _OUTSIDE = 1.05  # place beyond the end of a tile, in which a time within the bracket of an event may lie
@@ -21,27 +21,17 @@ _ARRAYS = ("time", "pace", "p", "R", "v", "w", "stretch")
 _DERIVATIVE: Array = np.vstack([chebyshev.chebder(np.eye(COUNT)), np.zeros(COUNT)])
 
 
-@dataclass(frozen=True)
-class Tiles:
-    """Poses and velocities at the points of all pieces of a motion, in order of time; see :class:`.Pieces`.
+@dataclass(frozen=True, kw_only=True)
+class Tiles(BodyPoses):
+    """Poses and velocities in all pieces of a motion, in order of time.
 
     Attributes:
-        time, pace, p, R, v, w: as of pieces, (tiles, points, …); the last body is the world.
         stretch: number of the stretch of each tile.
         modes: in each tile.
-        coarse: True if states inside a tile are known to fewer digits than at its ends; see :class:`.Pieces`.
     """
 
-    time: Array
-    pace: Array
-    p: Array
-    R: Array
-    v: Array
-    w: Array
     stretch: NDArray[np.intp]
     modes: tuple[Modes, ...]
-    coarse: bool = False
-    turns: None = None  # angles go on from one tile to the next
 
     @classmethod
     def of(cls, pieces: Pieces, number: int) -> Tiles:
