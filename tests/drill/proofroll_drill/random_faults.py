@@ -56,12 +56,13 @@ _NAMES = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum"
 
 
 class RandomFault(NamedTuple):
-    """A fault: address of the function, number of its place there, what was and is, the line, and a scene."""
+    """A fault: address of the function, number of its place there, what was and is, a scene, and if it reads that."""
 
     function: str
     place: int
     words: str
     scene: str
+    reads: bool
 
 
 class FaultOutcome(NamedTuple):
@@ -76,6 +77,7 @@ def drawn_faults(seed: int, count: int) -> list[RandomFault]:
     choices, faults, seen = random.Random(seed), list[RandomFault](), set[tuple[str, int]]()
     runs = {scene: functions_of(scene) for scene in SCENES}
     functions = sorted(set().union(*runs.values()))
+    reading = set[str]().union(*(reading_functions(scene) for scene in SCENES))
     while len(faults) < count:
         function = choices.choice(functions)
         places = _places(_tree(function))
@@ -86,14 +88,21 @@ def drawn_faults(seed: int, count: int) -> list[RandomFault]:
             continue
         seen.add((function, place))
         scene = choices.choice([scene for scene in SCENES if function in runs[scene]])
-        faults.append(RandomFault(function, place, _words(function, place), scene))
+        words = _words(function, place)
+        faults.append(RandomFault(function=function, place=place, words=words, scene=scene, reads=function in reading))
     return faults
 
 
 @cache
 def functions_of(scene: str) -> frozenset[str]:
     """Addresses of the functions that run between a scene file and its truth."""
-    return frozenset(_in_child(partial(_traced, scene)))
+    return frozenset(_in_child(partial(_traced, partial(_run, scene))))
+
+
+@cache
+def reading_functions(scene: str) -> frozenset[str]:
+    """Addresses of those that run before the scene is read: checks take its numbers from them."""
+    return frozenset(_in_child(partial(_traced, partial(load_scene, scene))))
 
 
 def outcome(fault: RandomFault) -> FaultOutcome:
@@ -205,7 +214,8 @@ def _in_child(task: Callable[[], Any]) -> Any:
         process.join()
 
 
-def _traced(scene: str) -> set[str]:
+def _traced(task: Callable[[], Any]) -> set[str]:
+    """Addresses of the functions that a task calls."""
     codes = set[types.CodeType]()
 
     def profile(frame: types.FrameType, event: str, _: Any) -> None:
@@ -214,7 +224,7 @@ def _traced(scene: str) -> set[str]:
 
     sys.setprofile(profile)
     try:
-        _run(scene)
+        task()
     finally:
         sys.setprofile(None)
     known = _addresses()
