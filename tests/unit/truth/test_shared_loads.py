@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.truth.plug_in import MechanismTruth
 from proofroll.truth.truth_of_mechanism import truth_of
 
 
@@ -83,10 +85,9 @@ def test_a_leg_that_rubs_in_its_joints_rests_on_its_tip(lean: float, bend: float
         Geometry("tip", "lower", "sphere", position=(0.0, 0.0, -1.0), radius=0.0),
     )
     pairs = (Pair("touch", ("tip", "floor"), friction=0.1),)
-    found = truth_of(
-        Mechanism(links, joints, gravity=(0.0, 0.0, -9.81), geometries=shapes, pairs=pairs), np.array([0.0, 0.1])
-    )
-    assert found.laws
+    leg = Mechanism(links, joints, gravity=(0.0, 0.0, -9.81), geometries=shapes, pairs=pairs)
+    found = truth_of(leg, np.array([0.0, 0.1]))
+    assert "2 of 2 samples" in MechanismTruth.truth(MechanismElement(leg), np.array([0.0, 0.1]), ()).attrs["laws"]
     assert not found.ended
     assert found.record.v[-1] == pytest.approx([0.0, 0.0], abs=0.0)
     assert np.isnan(found.record.named).all()
@@ -103,6 +104,6 @@ def test_a_box_rests_on_one_that_is_far_lighter(ratio: float) -> None:
     pairs = (Pair("ground", ("light_box", "floor"), 0.5), Pair("stack", ("heavy_box", "light_box"), 0.5))
     stack = Mechanism(tuple(bodies), tuple(joints), gravity=(0.0, 0.0, -9.81), geometries=tuple(shapes), pairs=pairs)
     found = truth_of(stack, np.array([0.0, 0.1]))
-    assert found.laws
+    assert "2 of 2 samples" in MechanismTruth.truth(MechanismElement(stack), np.array([0.0, 0.1]), ()).attrs["laws"]
     assert found.record.p_WB[-1] == pytest.approx(np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.3]]), abs=1e-14)
     assert found.bars["p_WB"][-1] < 1e-14

@@ -12,13 +12,13 @@ from proofroll.truth.check.laws.integrals import COUNT, dot, norm, turned
 from proofroll.truth.check.laws.joints import Coordinates, FreeDirection, joint_laws
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, PublishedValues
-from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
 from proofroll.truth.check.laws.scene import FREE, LawScene
 from proofroll.truth.check.laws.tiles import Places, Tiles
 
 _ARM = 1e-2  # part of the natural length by which a force turns at least, for sizes of moments
 _NOISE = 20 * COUNT * 3e-14  # of a derivative at the end of a tile of unit half length, relative to the values
-_RANK = 1e-9  # relative singular value below which unknown forces are one
+_RANK = 1e-12  # relative singular value below which unknown forces are one
 _IN_PLANE = 1e-12  # component of a direction that is round-off
 
 
@@ -83,10 +83,11 @@ def _newton_and_euler(
     size = loads.force_size[..., :bodies] + mass * (scene.speed * scene.rate + norm(acceleration))
     turning = trace * (scene.rate**2 + norm(pieces.w[..., :bodies, :]) ** 2) + size * _ARM * scene.length
     turning = turning + loads.moment_size[..., :bodies]
-    left = unknown.explained(left, np.stack([size + digits[0], turning + digits[1]], -1))
+    left, cancelled = unknown.explained(left, np.stack([size + digits[0], turning + digits[1]], -1))
     for k, body in enumerate(scene.mechanism.bodies):
-        residuals.note("newton", body.name, norm(left[..., k, :3]), size[..., k], pieces.time, digits[0][..., k])
-        residuals.note("euler", body.name, norm(left[..., k, 3:]), turning[..., k], pieces.time, digits[1][..., k])
+        rooms = (digits[part][..., k] + ROUND * norm(cancelled[..., k, 3 * part : 3 * part + 3]) for part in (0, 1))
+        residuals.note("newton", body.name, norm(left[..., k, :3]), size[..., k], pieces.time, next(rooms))
+        residuals.note("euler", body.name, norm(left[..., k, 3:]), turning[..., k], pieces.time, next(rooms))
 
 
 def _momenta(scene: LawScene, moving: BodyPoses) -> tuple[Array, Array]:
@@ -115,18 +116,23 @@ class _Unknown:
                         column[..., body, 3:] += sign * (unit if turns else np.cross(arm, unit))
                 self._columns.append(column)
 
-    def explained(self, left: Array, sizes: Array) -> Array:
-        """Remainder that no unknown force explains; ``sizes``: of force and moment, (samples, 1, bodies, 2)."""
+    def explained(self, left: Array, sizes: Array) -> tuple[Array, Array]:
+        """Remainder that no unknown force explains, and the sizes of all that cancel in what they explain.
+
+        ``sizes``: of force and moment, (samples, 1, bodies, 2).
+        """
         if not self._columns:
-            return left
+            return left, np.zeros_like(left)
         scale = np.repeat(1 / sizes, 3, -1)
         flat = (left * scale).reshape(len(left), -1)
         columns = (np.stack(self._columns, -1) * scale[..., None]).reshape(*flat.shape, -1)
         reaches = np.maximum(norm(columns.swapaxes(-1, -2)), np.finfo(float).tiny)
-        rests = []
+        parts = []
         for row, matrix in zip(flat, columns / reaches[:, None], strict=True):
-            rests.append(row - matrix @ np.linalg.lstsq(matrix, row, rcond=_RANK)[0])
-        return np.asarray(np.array(rests).reshape(left.shape) / scale)
+            forces = np.linalg.lstsq(matrix, row, rcond=_RANK)[0]
+            parts.append((row - matrix @ forces, np.abs(matrix) @ np.abs(forces)))
+        rests, cancelled = (np.array(values).reshape(left.shape) / scale for values in zip(*parts, strict=True))
+        return rests, cancelled
 
 
 def _along(
