@@ -53,6 +53,7 @@ class AnswerCheck:
         if not np.isfinite(published.pieces.p).all():  # a motion that is not unique has no values
             return
         last = float(time[-1])
+        tiles = tiles.ordered(np.flatnonzero(tiles.time[:, 0] <= max(last, tiles.time[0, 0])))
         turns = laws_at_all_times(scene, tiles, residuals, last)
         struck = any(item.jumps and item.low <= 0 for item in published.changes)
         for moving in (published.pieces, tiles):

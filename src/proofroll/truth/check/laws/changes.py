@@ -12,6 +12,7 @@ from proofroll.truth.check.laws.tiled import changed_velocity
 from proofroll.truth.check.laws.tiles import Tiles
 
 _STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
+_GROWTH = 1e3  # natural accelerations by which velocities may grow in the instant before a slip has a direction
 _ROOM = 1e-11  # accuracy of the time of an event, relative to it and to a second
 _LAST_REBOUNDS = 1e-4  # natural times that infinitely many rebounds take at most, which are summed
 _BEFORE_END = 1e-6  # part of the time before the end of a motion in which an event may be left out
@@ -31,13 +32,14 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
             if item.low - room - _summed(scene, item) <= begin and end <= item.high + room
         ]
         time = np.array([[begin]])
-        if jump > _STRUCK and not any(item.jumps for item in near):
+        least = _STRUCK + _GROWTH * scene.rate * max(begin - end, 0.0)
+        if jump > least and not any(item.jumps for item in near):
             residuals.note("change", "a jump of velocities", np.ones((1, 1)), 1.0, time)
         changed = _changed(scene, tiles.modes[number], tiles.modes[number + 1])
         if changed and not any(_of(item.name, name) for item in near for name in changed):
             residuals.note("change", min(changed), np.ones((1, 1)), 1.0, time)
         for item in near:
-            _at_impact(scene, tiles, residuals, item, number, jump > _STRUCK)
+            _at_impact(scene, tiles, residuals, item, number, jump > least)
     for item in published.changes:
         if item.of_effort or item.time >= last * (1 - _BEFORE_END):
             continue
