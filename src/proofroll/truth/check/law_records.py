@@ -107,6 +107,7 @@ class LawRecorder:
             stretch=np.full(len(time), number),
             modes=(self._modes(stretch.mode),) * len(time),
             coarse=any(piece.coarse for piece in cut),
+            resolved=np.full(len(time), not isinstance(stretch, StoppingSlip)),
         )
 
     def _poses(self, states: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from proofroll.truth.check.laws.contacts import gap_of
@@ -14,7 +16,7 @@ from proofroll.truth.check.laws.tiles import Tiles
 _STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
 _GROWTH = 1e3  # natural accelerations by which velocities may grow in the instant before a slip has a direction
 _ROOM = 1e-11  # accuracy of the time of an event, relative to it and to a second
-_LAST_REBOUNDS = 1e-4  # natural times that infinitely many rebounds take at most, which are summed
+_LAST_REBOUNDS = 1e-4  # natural times that rebounds take which are summed, where their ratio is not known
 _BEFORE_END = 1e-6  # part of the time before the end of a motion in which an event may be left out
 
 
@@ -29,7 +31,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
         near = [
             item
             for item in published.changes
-            if item.low - room - _summed(scene, item) <= begin and end <= item.high + room
+            if item.low - room - _summed(scene, published.changes, item) <= begin and end <= item.high + room
         ]
         time = np.array([[begin]])
         least = _STRUCK + _GROWTH * scene.rate * max(begin - end, 0.0)
@@ -43,15 +45,24 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
     for item in published.changes:
         if item.of_effort or item.time >= last * (1 - _BEFORE_END):
             continue
-        apart = np.maximum(np.maximum(ends - item.high, item.low - _summed(scene, item) - begins), 0.0)
+        apart = np.maximum(
+            np.maximum(ends - item.high, item.low - _summed(scene, published.changes, item) - begins), 0.0
+        )
         apart = np.append(apart, abs(item.time) if item.time <= 0 else np.inf)
         off = min(float(apart.min()), 1 + item.time)
         residuals.note("change", item.name, np.array([[off]]), 1 + abs(item.time), np.array([[item.time]]))
 
 
-def _summed(scene: LawScene, item: PublishedEvent) -> float:
-    """Time before a settling at which the motion may rest already: that of the rebounds which are summed [s]."""
-    return _LAST_REBOUNDS / scene.rate if item.settles else 0.0
+def _summed(scene: LawScene, changes: Sequence[PublishedEvent], item: PublishedEvent) -> float:
+    """Time before a settling at which the motion may rest already: twice that of rebounds in the last ratio [s]."""
+    if not item.settles:
+        return 0.0
+    hits = [other.time for other in changes if other.strikes and other.name == item.name and other.time < item.time]
+    spans = np.diff(hits[-3:])
+    if len(spans) < 2 or not 0 < spans[1] < spans[0]:
+        return _LAST_REBOUNDS / scene.rate
+    ratio = float(spans[1] / spans[0])
+    return 2 * float(spans[1]) * ratio / (1 - ratio)
 
 
 def _of(event: str, changed: str) -> bool:

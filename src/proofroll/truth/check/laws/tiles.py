@@ -16,7 +16,7 @@ from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Modes, P
 _CORRECTIONS = 6  # of Newton's method for the place of a time in a tile, at most: it converges in three
 _OUTSIDE = 1.05  # place beyond the end of a tile, in which a time within the bracket of an event may lie
 _LATER = 1e-9  # part of a time by which a tile may begin after it and still hold it: what changes at an instant
-_ARRAYS = ("time", "pace", "p", "R", "v", "w", "stretch")
+_ARRAYS = ("time", "pace", "p", "R", "v", "w", "stretch", "resolved")
 # Series of a derivative from that of its function.
 _DERIVATIVE: Array = np.vstack([chebyshev.chebder(np.eye(COUNT)), np.zeros(COUNT)])
 
@@ -28,10 +28,12 @@ class Tiles(BodyPoses):
     Attributes:
         stretch: number of the stretch of each tile.
         modes: in each tile.
+        resolved: False of a tile in which no polynomial follows the states, as in the last instants of a slip.
     """
 
     stretch: NDArray[np.intp]
     modes: tuple[Modes, ...]
+    resolved: NDArray[np.bool_]
 
     @classmethod
     def of(cls, pieces: Pieces, number: int) -> Tiles:
@@ -46,6 +48,7 @@ class Tiles(BodyPoses):
             w=pieces.w,
             stretch=np.full(count, number),
             modes=(pieces.modes,) * count,
+            resolved=np.ones(count, dtype=bool),
             coarse=pieces.coarse,
         )
 
@@ -76,7 +79,7 @@ class Tiles(BodyPoses):
         begins = self.time[:, 0]
         tile = np.clip(np.searchsorted(begins, times * (1 + _LATER), side="right") - 1, 0, len(begins) - 1)
         room = _LATER * (1 + np.abs(times))
-        held = (times >= begins[tile] - room) & (times <= self.time[tile, -1] + room)
+        held = self.resolved[tile] & (times >= begins[tile] - room) & (times <= self.time[tile, -1] + room)
         series = self.time[tile] @ TO_SERIES.T
         span = self.time[tile, -1] - begins[tile]
         place = np.divide(2 * (times - begins[tile]), span, out=np.zeros_like(times), where=span > 0) - 1
