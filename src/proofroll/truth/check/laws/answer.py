@@ -21,6 +21,7 @@ from proofroll.truth.check.laws.works import works_follow
 if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism
 
+_BESIDE = 1e-9  # time beside the end of a stretch, relative to it and to a second, that counts as that end
 _INSTANT = 1e-6  # part of an interval of a controller beside an instant, where forces are those of either side
 
 
@@ -75,7 +76,7 @@ class AnswerCheck:
         works_follow(scene, tiles, turns, places, published, residuals)
         values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
         modes = [tiles.modes[tile] for tile in places.tile]
-        between = ~self._at_instants(published.pieces.time[:, 0])
+        between = ~(self._at_instants(published.pieces.time[:, 0]) | self._at_kinks(published.pieces.time, tiles))
         for mode in dict.fromkeys(modes):
             chosen = np.flatnonzero(np.array([item == mode for item in modes]) & between)
             if chosen.size:
@@ -103,6 +104,14 @@ class AnswerCheck:
         for (number, k), coordinates in turns.items():
             values[:, 0, number, k] = places.at(coordinates)
         return values
+
+    def _at_kinks(self, time: Array, tiles: Tiles) -> NDArray[np.bool_]:
+        """True where a stretch of a scene with kinks begins or ends: their sides are those of the motion there."""
+        if not self._scene.mechanism.kinks:
+            return np.zeros(len(time), dtype=bool)
+        borders = np.flatnonzero(tiles.stretch[1:] != tiles.stretch[:-1])
+        ends = np.concatenate([tiles.time[[0, *(borders + 1)], 0], tiles.time[[*borders, -1], -1]])
+        return np.asarray((np.abs(time - ends) <= _BESIDE * (1 + np.abs(ends))).any(1))
 
     def _at_instants(self, time: Array) -> NDArray[np.bool_]:
         """True at instants of a controller, where forces are those of either side."""
