@@ -75,10 +75,14 @@ def _newton_and_euler(
         ],
         -1,
     )
-    noise = _NOISE / np.maximum(places.half, np.finfo(float).tiny)[:, None, None]
+    half, bars = np.maximum(places.half, np.finfo(float).tiny)[:, None, None], published.bars
+    off = (
+        _NOISE * (scene.speed + np.abs(pieces.v).max()) + bars["v_WB"],
+        _NOISE * (scene.rate + np.abs(pieces.w).max()) + bars["w_WB"],
+    )
     digits = (
-        loads.force_digits[..., :bodies] + mass * noise * (scene.speed + np.abs(pieces.v).max()),
-        loads.moment_digits[..., :bodies] + trace * noise * (scene.rate + np.abs(pieces.w).max()),
+        loads.force_digits[..., :bodies] + mass * off[0] / half,
+        loads.moment_digits[..., :bodies] + trace * off[1] / half,
     )
     size = loads.force_size[..., :bodies] + mass * (scene.speed * scene.rate + norm(acceleration))
     turning = trace * (scene.rate**2 + norm(pieces.w[..., :bodies, :]) ** 2) + size * _ARM * scene.length
@@ -204,5 +208,6 @@ def _power(
     rate, natural = places.rate(total)[:, None], scene.mass.sum() * scene.speed**2
     sizes = np.nan_to_num(loads.power_size) + (natural + places.at(size)[:, None]) * scene.rate
     sizes = sizes + scene.force * norm(published.pieces.v).max(-1)
-    noise = _NOISE / np.maximum(places.half, np.finfo(float).tiny)[:, None] * (natural + places.at(size)[:, None])
+    noise = _NOISE * (natural + places.at(size)[:, None]) + published.bars["energy"]
+    noise = noise / np.maximum(places.half, np.finfo(float).tiny)[:, None]
     residuals.note("power", "", rate - loads.power, sizes, published.pieces.time, noise)
