@@ -11,6 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import ENDS
 from proofroll.core.events import IMPACTS, JUMPS, EventKind, events_of
 from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.dynamics.switches import with_stops_at_start
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.truth.check.laws.answer import AnswerCheck
@@ -24,9 +25,11 @@ if TYPE_CHECKING:
 
 def held_answer(element: MechanismElement, dataset: xr.Dataset, tiles: Tiles, asked: FloatArray) -> AnswerCheck:
     """Check of a dataset, whose samples were asked for at these times [s], along the motion that was followed."""
-    check = AnswerCheck(element.mechanism, element.length, element.speed / element.length)
+    mechanism = with_stops_at_start(element.mechanism)
+    check = AnswerCheck(mechanism, element.length, element.speed / element.length)
+    end, horizon = (float(dataset.attrs.get(name, np.inf)) for name in (ENDS, "horizon"))
     with np.errstate(all="ignore"):
-        check.take(_published(element, dataset), tiles, asked, float(dataset.attrs.get(ENDS, np.inf)))
+        check.take(_published(element, dataset), tiles, asked, end, horizon)
     return check
 
 

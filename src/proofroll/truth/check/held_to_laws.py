@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -128,7 +129,8 @@ def tiles_of(route: Recorded, until: float, taken: Mapping[int, Sequence[Pieces]
             route.held.recall(stretch.start)
         part = route.recorder.tiles(number, stretch, (taken or {}).get(number))
         parts += [] if part is None else [part]
-    return joined_tiles(parts) if parts else None
+    borders = np.array([stretch.start for stretch in route.path.stretches[1:]]) * route.recorder.second
+    return replace(joined_tiles(parts), borders=borders) if parts else None
 
 
 def work_along(mechanism: Mechanism, units: Units, tree: ContactTree, path: _Path) -> WorkAlong:

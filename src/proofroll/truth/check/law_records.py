@@ -53,6 +53,9 @@ class LawRecorder:
     A record at a state is a flat array: of each body place, rotation by rows, velocity, angular velocity; of each
     contact force, place, normal; efforts, drives, couplings; force and moment of each loop. Compiled modes give it by
     :func:`.stated_symbols`; ``state_of`` gives it at a state in a mode, in numbers.
+
+    Attributes:
+        second: natural unit of time [s].
     """
 
     def __init__(
@@ -63,6 +66,7 @@ class LawRecorder:
         state_of: Callable[[Array, ContactMode], Array],
     ) -> None:
         self._mechanism, self._units, self._route, self._state_of = mechanism, units, route, state_of
+        self.second = units.time
         named, moment = named_forces(mechanism), units.force * units.length
         self._named_units = stated_named(
             mechanism, np.array([units.force if item.unit == "N" else moment for item in named])

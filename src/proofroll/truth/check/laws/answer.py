@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism
 
 _BESIDE = 1e-9  # time beside the end of a stretch, relative to it and to a second, that counts as that end
+_UNCERTAIN = 4e-5  # part of the time before a horizon in which what it hangs on may happen, and is no event
 _INSTANT = 1e-6  # part of an interval of a controller beside an instant, where forces are those of either side
 
 
@@ -38,7 +39,7 @@ class AnswerCheck:
         self._scene = LawScene(mechanism, length, rate)
         self.residuals, self.samples, self.held = LawResiduals(rate=rate, known_alone=True), 0, 0
 
-    def take(self, published: PublishedValues, tiles: Tiles, asked: Array, end: float) -> None:
+    def take(self, published: PublishedValues, tiles: Tiles, asked: Array, end: float, horizon: float) -> None:
         """Checks an answer.
 
         Args:
@@ -46,6 +47,7 @@ class AnswerCheck:
             tiles: the motion that was followed.
             asked: times that were asked for [s].
             end: time before which the truth ends, or inf [s].
+            horizon: time from which the question is ill-posed, or inf [s]: from there on nothing is held.
         """
         scene, residuals, time = self._scene, self.residuals, published.pieces.time[:, 0]
         residuals.coarse = COARSE if tiles.coarse else 1.0
@@ -53,21 +55,24 @@ class AnswerCheck:
         self._times(time, asked, end)
         if not np.isfinite(published.pieces.p).all():  # a motion that is not unique has no values
             return
-        last = float(time[-1])
-        tiles = tiles.ordered(np.flatnonzero(tiles.time[:, 0] <= max(last, tiles.time[0, 0])))
+        last, sure = float(time[-1]), horizon * (1 - _BESIDE)
+        if not sure > 0:
+            return
+        tiles = tiles.ordered(np.flatnonzero(tiles.time[:, 0] <= min(sure, max(last, tiles.time[0, 0]))))
+        last = min(last, sure)
         turns = laws_at_all_times(scene, tiles, residuals, last)
         struck = any(item.jumps and item.low <= 0 for item in published.changes)
         for moving in (published.pieces, tiles):
             if moving.time[0, 0] == 0:
                 start_of(scene, moving, residuals, struck)
                 break
-        changes_of(scene, tiles, published, residuals, last)
+        changes_of(scene, tiles, published, residuals, min(last, horizon - _UNCERTAIN * max(1 / scene.rate, horizon)))
         reached = time.copy()
         for item in published.changes:  # within the bracket of an event a sample is that of the later side
             reached[(item.low <= time) & (time < item.time)] = item.time
         places = tiles.holding(reached)
-        self.held = int(places.held.sum())
-        rows = np.flatnonzero(places.held)
+        rows = np.flatnonzero(places.held & (time < sure))
+        self.held = len(rows)
         if not rows.size:
             return
         published, places = published.of(rows), places.of(rows)
@@ -76,7 +81,7 @@ class AnswerCheck:
         works_follow(scene, tiles, turns, places, published, residuals)
         values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
         modes = [tiles.modes[tile] for tile in places.tile]
-        between = ~(self._at_instants(published.pieces.time[:, 0]) | self._at_kinks(published.pieces.time, tiles))
+        between = ~(self._at_instants(published.pieces.time[:, 0]) | self._at_borders(published.pieces.time, tiles))
         for mode in dict.fromkeys(modes):
             chosen = np.flatnonzero(np.array([item == mode for item in modes]) & between)
             if chosen.size:
@@ -105,12 +110,11 @@ class AnswerCheck:
             values[:, 0, number, k] = places.at(coordinates)
         return values
 
-    def _at_kinks(self, time: Array, tiles: Tiles) -> NDArray[np.bool_]:
-        """True where a stretch of a scene with kinks begins or ends: their sides are those of the motion there."""
-        if not self._scene.mechanism.kinks:
-            return np.zeros(len(time), dtype=bool)
-        borders = np.flatnonzero(tiles.stretch[1:] != tiles.stretch[:-1])
-        ends = np.concatenate([tiles.time[[0, *(borders + 1)], 0], tiles.time[[*borders, -1], -1]])
+    def _at_borders(self, time: Array, tiles: Tiles) -> NDArray[np.bool_]:
+        """True where stretches meet, and forces are those of either side; of a scene with kinks also at both ends."""
+        ends = tiles.borders
+        if self._scene.mechanism.kinks:
+            ends = np.append(ends, [tiles.time[0, 0], tiles.time[-1, -1]])
         return np.asarray((np.abs(time - ends) <= _BESIDE * (1 + np.abs(ends))).any(1))
 
     def _at_instants(self, time: Array) -> NDArray[np.bool_]:

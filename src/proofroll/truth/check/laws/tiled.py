@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.contacts import apart
 from proofroll.truth.check.laws.integrals import dot, of_quaternion
 from proofroll.truth.check.laws.joints import Coordinates, closure, sizes_of
@@ -33,7 +34,8 @@ def laws_at_all_times(scene: LawScene, tiles: Tiles, residuals: LawResiduals, la
         if joint.limits is not None:
             q, (low, high) = turns[number, 0], joint.limits
             passed = np.maximum(np.maximum(low - q, q - high), 0)
-            residuals.note("stop", joint.name, passed, scene.length + np.abs(q), tiles.time)
+            unit = 1.0 if joint.kind == JointKind.REVOLUTE else scene.length
+            residuals.note("stop", joint.name, passed, unit + np.abs(q), tiles.time)
     seen = set[str]()
     for contact in scene.contacts:
         if contact.alone or contact.pair.name not in seen:

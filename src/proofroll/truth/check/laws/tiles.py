@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,12 +28,14 @@ class Tiles(BodyPoses):
     Attributes:
         stretch: number of the stretch of each tile.
         modes: in each tile.
+        borders: times at which stretches meet, those without a tile included [s].
         resolved: False of a tile in which no polynomial follows the states, as in the last instants of a slip.
     """
 
     stretch: NDArray[np.intp]
     modes: tuple[Modes, ...]
     resolved: NDArray[np.bool_]
+    borders: Array = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, pieces: Pieces, number: int) -> Tiles:
@@ -55,7 +57,7 @@ class Tiles(BodyPoses):
     def ordered(self, order: NDArray[np.intp]) -> Tiles:
         """Tiles in another order, or some of them."""
         arrays: dict[str, Any] = {name: getattr(self, name)[order] for name in _ARRAYS}
-        return Tiles(**arrays, modes=tuple(self.modes[k] for k in order), coarse=self.coarse)
+        return replace(self, **arrays, modes=tuple(self.modes[k] for k in order))
 
     def of_contacts(self, parts: Sequence[Sequence[int]]) -> Tiles:
         """The same with contacts that stand for several of these each, by their numbers."""

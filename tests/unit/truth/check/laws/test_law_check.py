@@ -182,6 +182,7 @@ def test_the_check_of_an_answer_takes_what_its_method_says() -> None:
         "proofroll.core.events.JUMPS",
         "proofroll.core.events.events_of",
         "proofroll.elements.mechanism.dynamics.placed.Placed",
+        "proofroll.elements.mechanism.dynamics.switches.with_stops_at_start",
         "proofroll.elements.mechanism.run.contacts.observables.follow_contacts",
         "proofroll.elements.mechanism.run.element.MechanismElement",
     }
