@@ -1,5 +1,6 @@
 """Route 2 of a mechanism that switches: separate bodies, modes of contacts and laws of joints found by trial."""
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -29,7 +30,13 @@ from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.truth.bodies.body_impacts import ImpactLaw, impulses_in_turn
 from proofroll.truth.bodies.contact_body_symbols import BodySymbols
-from proofroll.truth.bodies.contact_equations import BodiesSolution, BodiesState, ContactEquations, slides_of
+from proofroll.truth.bodies.contact_equations import (
+    BodiesSolution,
+    BodiesState,
+    ContactEquations,
+    accelerated_by,
+    slides_of,
+)
 from proofroll.truth.bodies.contact_trials import SLACK, all_held, consistent, follow, next_trial, provisional
 from proofroll.truth.numerics.hybrid import Transition
 from proofroll.truth.switching.contact_guards import SolvedContacts, pressing, sharing
@@ -98,7 +105,8 @@ class ContactBodies(ContactStretches):
             ]
             return self.equations.accelerated(bodies, tuple(directed))
 
-        free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
+        free_motion = accelerated_by(bodies.mass, bodies.force, bodies.C, -bodies.of_joints)
+        free = float(np.abs(bodies.J @ free_motion + bodies.bias).max())
         if any(sticks) and not leaving and not ways:
             resting = self._resting(bodies, closed_mask, sticks)
             if all_held(self.equations, bodies, resting, free):
@@ -346,9 +354,12 @@ class ContactBodies(ContactStretches):
             return None  # whatever the directions are
         if not unknown:
             return initial, mode
-        loose = initial.slide
-        start = np.array([float(np.arctan2(frames[k][:, 1] @ loose[k], frames[k][:, 0] @ loose[k])) for k in unknown])
-        for turn in (0.0, 1.0, -1.0, 2.0, -2.0):
+        # near the way without friction, or with a friction of any direction
+        starts = [
+            np.array([float(np.arctan2(frames[k][:, 1] @ slide[k], frames[k][:, 0] @ slide[k])) for k in unknown])
+            for slide in (slides_of(bodies).rates, initial.slide)
+        ]
+        for start, turn in itertools.product(starts, (0.0, 1.0, -1.0, 2.0, -2.0)):
             answer = root(sideways, start + turn, tol=1e-15)
             solution, ways = tried(answer.x), dict(zip(unknown, directions(answer.x), strict=True))
             size = float(np.abs(solution.slide).max()) or 1.0
