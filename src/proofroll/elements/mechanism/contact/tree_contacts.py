@@ -409,12 +409,19 @@ class ContactDynamics:
 
         fields, pressed = record(solution.force), solution.force[:count]
         for shift in np.moveaxis(solution.undetermined, 2, 0):  # what another distribution changes is not determinate
-            others = record(solution.force + shift)
+            others = record(solution.force + self._borne(solution.state, shift))
             for name in ("wrench", "named"):
                 fields[name] = np.where(np.abs(others[name] - fields[name]) > RANK, np.nan, fields[name])
         moved = np.abs(np.einsum("pk,kiw->piw", self.sums, solution.undetermined)).max(axis=2, initial=0.0)
         sums = np.where(moved <= RANK, self.sums[:, :count] @ pressed, np.nan)
         return fields, np.where(solution.determinate[:count], pressed, np.nan), sums
+
+    def _borne(self, state: ContactsNow, shift: Array) -> Array:
+        """Part of a change of all forces, (contacts, 3), that friction against turning can bear, each about its axes."""
+        borne = shift.copy()
+        for k, friction in enumerate(self.turning, len(self._bodies) + len(self._of_joints)):
+            borne[k] = friction.resisted(state.touching[friction.pressed_by].normal, shift[k][:, None])[:, 0]
+        return borne
 
     def _loads(self, state: ContactsNow, force: Array) -> tuple[Array, Array]:
         """Loads by contacts of bodies: along the velocities, and about the world's origin, (bodies + 1, 6)."""
