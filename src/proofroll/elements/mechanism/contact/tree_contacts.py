@@ -417,7 +417,7 @@ class ContactDynamics:
         return fields, np.where(solution.determinate[:count], pressed, np.nan), sums
 
     def _borne(self, state: ContactsNow, shift: Array) -> Array:
-        """Part of a change of all forces, (contacts, 3), that friction against turning can bear, each about its axes."""
+        """Part of a change of all forces, (contacts, 3), that friction against turning can bear about its axes."""
         borne = shift.copy()
         for k, friction in enumerate(self.turning, len(self._bodies) + len(self._of_joints)):
             borne[k] = friction.resisted(state.touching[friction.pressed_by].normal, shift[k][:, None])[:, 0]
