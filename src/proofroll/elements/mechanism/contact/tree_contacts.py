@@ -50,7 +50,7 @@ from proofroll.elements.mechanism.contact.sequences import groups_of, left_by, o
 from proofroll.elements.mechanism.contact.slide_rows import slide_row, turning_row
 from proofroll.elements.mechanism.contact.start import TOUCHING, at_start, touches
 from proofroll.elements.mechanism.contact.states import ContactsNow, ContactSolution
-from proofroll.elements.mechanism.contact.touching import Touching, lying
+from proofroll.elements.mechanism.contact.touching import Touching, guided, lying
 from proofroll.elements.mechanism.dynamics.analysis import NO_RESPONSE, RANK
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.point_loads import kink_arguments
@@ -282,6 +282,7 @@ class ContactDynamics:
         closed_mask = acting_ones(self.contacts, rough, state.free_slides)
         which = [k for k, shut in enumerate(closed_mask) if shut]
         self._refuse_flat(state, which, time)
+        self._refuse_guided(state, which, time)
         if not which:
             return rough, np.inf
         frames = {k: frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which}
@@ -395,6 +396,14 @@ class ContactDynamics:
         for k in closed_contacts:
             if state.touching[k].flat:
                 raise lying(self.mechanism.contacts[k], time)
+
+    def _refuse_guided(self, state: ContactsNow, closed_contacts: Sequence[int], time: float) -> None:
+        """Raises NotUnique if joints keep one of these contacts with friction from opening at a time [s]."""
+        for k in closed_contacts:
+            if k < len(self._bodies) and self.friction[k]:
+                normal, J = state.touching[k].normal @ state.J[k], state.J[k]
+                if normal @ state.W @ normal <= NO_RESPONSE * np.trace(J @ state.loose @ J.T):
+                    raise guided(self.mechanism.contacts[k].name, time)
 
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array, Array]:
         """Fields of a record at one time [s], contact forces between bodies, and their sums.
