@@ -7,6 +7,8 @@ from typing import Any
 from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.engines.exudyn.native import Output, exu, items
 
+_Vector = tuple[float, float, float]
+
 
 def add_turning(
     system: Any,
@@ -20,12 +22,27 @@ def add_turning(
     Args:
         system: Exudyn's system.
         friction: its law.
-        markers: of the contact's bodies a and b.
-        pressing: gives the present normal force [N] and normal of the contact.
+        markers: of the contact's bodies a and b; of a ball whose motion is resisted at its centre.
+        pressing: gives the present normal force [N] and normal of the contact, from b to a.
         zone: angular velocity up to which the moment is proportional to it [rad/s].
     """
     kind, velocity, rotation = exu.ConfigurationType.Current, Output.AngularVelocity, Output.RotationMatrix
     body_a, body_b = markers
+
+    def moving(normal: _Vector, w_a: _Vector, w_b: _Vector) -> _Vector:
+        """Angular velocity with which a ball would roll as its centre moves over the wall [rad/s]."""
+        va, vb, pa, pb = (
+            system.GetMarkerOutput(marker, output, kind).tolist()
+            for output in (Output.Velocity, Output.Position)
+            for marker in markers
+        )
+        x, y, z = (a - b for a, b in zip(pa, pb, strict=True))
+        wx, wy, wz = w_b if friction.bend > 0 else w_a  # of the wall
+        ux, uy, uz = va[0] - vb[0], va[1] - vb[1], va[2] - vb[2]
+        ux, uy, uz = ux - (wy * z - wz * y), uy - (wz * x - wx * z), uz - (wx * y - wy * x)
+        nx, ny, nz = normal
+        bend = friction.bend
+        return bend * (ny * uz - nz * uy), bend * (nz * ux - nx * uz), bend * (nx * uy - ny * ux)
 
     def wrench(system: Any, *_state: Any) -> list[float]:
         """Force and moment on the first marker, in its axes; plain floats, for each residual calls it."""
@@ -34,6 +51,8 @@ def add_turning(
         R = system.GetMarkerOutput(body_a, rotation, kind).tolist()
         N, (nx, ny, nz) = pressing()
         x, y, z = xa - xb, ya - yb, za - zb
+        if friction.bend:
+            x, y, z = moving((nx, ny, nz), (xa, ya, za), (xb, yb, zb))
         spin = nx * x + ny * y + nz * z
         sx, sy, sz = spin * nx, spin * ny, spin * nz
         x, y, z = (sx, sy, sz) if friction.spins else (x - sx, y - sy, z - sz)

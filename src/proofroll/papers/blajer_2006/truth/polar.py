@@ -22,7 +22,6 @@ from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates, s
 from proofroll.papers.blajer_2006.truth.explicit import ExplicitRun, Rates
 from proofroll.papers.blajer_2006.truth.sliding import End, Sliding
 from proofroll.papers.blajer_2006.truth.taylor import SlidingTaylor
-from proofroll.papers.blajer_2006.truth.taylor_model import HALT
 
 _Stop = tuple[End, Callable[[FloatArray], float]]
 
@@ -98,7 +97,6 @@ class Polar(Sliding):
         stops: tuple[_Stop, ...] = (
             (End.TIME, lambda y: y[7] - until),
             (End.STILL, lambda y: floor - y[5]),
-            *([(End.HALT, self._halting)] if self._body.contact.rolling_resistance else []),
         )
 
         def ended(solver: Any) -> tuple[float, FloatArray, End] | None:
@@ -106,12 +104,6 @@ class Polar(Sliding):
             return _first(solver, [(end, g) for end, g in stops if g(solver.y) > 0])
 
         return ExplicitRun(self._slipping, 0.0, start_state, np.inf, atol=self._atol, ended=ended)
-
-    def _halting(self, y: FloatArray) -> float:
-        """Rises through zero where a ball that slips all but stops rolling [m²/s²]."""
-        v = self._body.surface.frame(y[:2]).T[1:] @ (self._body.surface.tangents(y[:2]) @ y[2:4])
-        rolling = v - np.exp(y[5]) * np.array([np.cos(y[6]), np.sin(y[6])])
-        return float(HALT**2 * (v @ v) - rolling @ rolling)
 
     def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
         """Drive b along e2, e3 [m/s²], shape (2,), and normal force N [N]."""
@@ -155,11 +147,10 @@ class Polar(Sliding):
         N = m * (turn2 * v2 + turn3 * v3 + g1)
         spin = a * float(y[4])
         c, s = math.cos(phi), math.sin(phi)
-        rolling2, rolling3 = v2 - size * c, v3 - size * s
-        speed, grip = math.hypot(rolling2, rolling3), self._mu_k * N / m
+        speed, grip = math.hypot(v2, v3), self._mu_k * N / m
         ahead = f * N / (kappa * m * a * speed) if f and speed > 0 else 0.0
         # e1 × (x, y) = (-y, x)
-        b = np.array([g2 - spin * turn3 + ahead * rolling2, g3 + spin * turn2 + ahead * rolling3])
+        b = np.array([g2 - spin * turn3 + ahead * v2, g3 + spin * turn2 + ahead * v3])
         u_second = inverse @ (np.array([g2 - grip * c, g3 - grip * s]) - across @ (bending @ y[2:4]))
         w2, w3 = (v3 - size * s) / a, (size * c - v2) / a  # e1 × (u - v) / a
         rates = np.array([du2, du3, *u_second.tolist(), w2 * turn2 + w3 * turn3])
@@ -180,21 +171,17 @@ class Polar(Sliding):
         return self._following(state)[1]
 
     def _following(self, y: FloatArray) -> tuple[FloatArray, float]:
-        """Rates of (u, u̇, ω1, |u|) and φ of the slaved slip, where φ - φ_b = -(|u| φ̇_b - b'·n) / (|b| + d|u|/dt).
-
-        b': the drive of that slip, whose resistance is against the rolling alone; n: across b.
-        """
+        """Rates of (u, u̇, ω1, |u|) and φ of the slaved slip, where φ - φ_b = -|u| φ̇_b / (|b| + d|u|/dt)."""
         b, N = self._drive(y)
         grip = self._A * self._body.contact.mu_kinetic * N
         phi, size, strength = float(np.arctan2(b[1], b[0])), float(y[5]), float(np.linalg.norm(b))
-        leading, slipping, _, turning = self._with_slip(y, size, phi)
-        across = float(slipping[1] * np.cos(phi) - slipping[0] * np.sin(phi))
+        leading, _, _, turning = self._with_slip(y, size, phi)
         span = self._span(y)
         change = (self._drive(y[:5] + span * leading)[0] - self._drive(y[:5] - span * leading)[0]) / (2 * span)
         rotation = float(b[0] * change[1] - b[1] * change[0]) / strength**2 + turning
-        phi -= (size * rotation - across) / (2 * strength - grip)
-        rates, slipping, _, _ = self._with_slip(y, size, phi)
-        return np.append(rates, slipping @ (np.cos(phi), np.sin(phi)) - grip), phi
+        delta = -size * rotation / (2 * strength - grip)
+        rates = self._with_slip(y, size, phi + delta)[0]
+        return np.append(rates, strength * np.cos(delta) - grip), phi + delta
 
     def _stood_still(self, last: FloatArray) -> FloatArray:
         rates = self._slipping(last)

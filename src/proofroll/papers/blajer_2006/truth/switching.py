@@ -43,8 +43,10 @@ def follow(body: RollingBall, route: Sliding, until: float) -> Path:
     """Path from time 0 to ``until`` [s], or to an earlier time from which the motion is not known.
 
     Raises:
-        Refused, Diverged: no motion is known from time 0 on.
+        Refused, Diverged: no motion is known from time 0 on, or rolling resistance is against turning.
     """
+    if body.contact.rolling_resistance and body.contact.against == "turning":
+        raise Refused('the article has its resistance against the motion of the centre; set against = "motion"')
     path = hybrid.follow(SwitchedBall(body, route), until)
     return Path(list(path.stretches), [(event.kind, event.time) for event in path.happenings], path.ended)
 
@@ -72,8 +74,6 @@ class SwitchedBall:
     def change(self, stretch: BallStretch) -> Transition[bool]:
         """See the protocol."""
         state = stretch.state
-        if stretch.why is End.HALT:
-            raise Refused(f"at {stretch.end:.6g} s the ball slips and all but stops rolling: resistance turns round")
         last_span, span = self._spans
         hastens = stretch.why is End.STILL and not stretch.sticking and span < (1 - _SHORTER) * last_span
         self._reversals = self._reversals + 1 if hastens else 0
