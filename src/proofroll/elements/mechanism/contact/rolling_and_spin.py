@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.contact.modes import OPEN, ROUND_OFF, Acting, ContactMode
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
@@ -66,15 +66,9 @@ class TurningFriction:
         return _without_round_off(part, np.linalg.norm(turning, axis=0))
 
     def opposed(self, normal: Array, turning: Array, slide: Array) -> Array:
-        """Angular velocity that the moment opposes [rad/s], (3,).
+        """Angular velocity that the moment opposes [rad/s], (3,), at those of a relative to b and a slide [m/s].
 
-        Of resistance against motion it is that with which a ball would roll as fast as its centre moves relative to
-        the wall's body, v: n × v / a. In rolling both are one; with the slide u of the contact, n × u / a is between.
-
-        Args:
-            normal: of the contact that presses.
-            turning: angular velocity of a relative to b [rad/s].
-            slide: of that contact [m/s].
+        Against motion: of a ball that rolls as fast as its centre moves as the wall's body sees it, n × v / a.
         """
         resisted = self.resisted(normal, turning)
         return resisted + self.bend * cross(normal, slide) if self.bend else resisted
@@ -147,10 +141,10 @@ def moved_by_slip(contact: Any, mode: Sequence[Acting]) -> bool:
 
 
 def require_moving(contacts: Sequence[Any], mode: ContactMode, time: float) -> None:
-    """Raises Refused if a ball that stands begins to slip in a mode, where its resistance has no direction yet."""
+    """Raises Diverged if a ball that stands begins to slip in a mode, where its resistance has no direction yet."""
     for contact, acting in zip(contacts, mode, strict=True):
         if acting.kind == "stick" and moved_by_slip(contact, mode):
-            raise Refused(
+            raise Diverged(
                 f"{contact.name} begins to slip from rest at t = {time:.6g} s while its rolling resistance holds the "
                 "ball: it is against the motion of a centre that does not move yet; take less of it, or more friction"
             )

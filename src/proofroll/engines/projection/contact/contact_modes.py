@@ -39,6 +39,7 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import (
     moments_by_pressing,
     opposed_rates,
     pressed_by,
+    require_moving,
     shut_by_pressing,
     turning_frictions,
 )
@@ -400,8 +401,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             slips = self._slips(instant)
             resting = [stuck or number == k or slips[number] <= self._faint for number, stuck in enumerate(resting)]
         if kind == EventKind.SLIP:
-            friction = self.forces(instant, old_mode)[k]
-            mode = leaving(self.contacts, old_mode, k, friction, instant.touching[k].normal, self.t)
+            mode = leaving(old_mode, k, self.forces(instant, old_mode)[k], instant.touching[k].normal)
+            require_moving(self.contacts, mode, self.t)
         else:
             mode = self._decided(instant, closed_mask, resting)
         if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped

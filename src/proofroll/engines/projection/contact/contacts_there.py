@@ -5,9 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contact.modes import REST, Acting, ContactMode, slip_velocity
-from proofroll.elements.mechanism.contact.rolling_and_spin import require_moving
 from proofroll.elements.mechanism.contact.touching import Touching, lying
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
@@ -80,31 +79,19 @@ def landing_together(
     return [hit, *corners]
 
 
-def leaving(
-    contacts: Sequence[object], mode: ContactMode, k: int, force: Array, normal: Array, time: float
-) -> ContactMode:
+def leaving(mode: ContactMode, k: int, force: Array, normal: Array) -> ContactMode:
     """Mode in which a contact starts to slip, opposite to the friction that held it.
 
     Args:
-        contacts: all of them.
         mode: before.
         k: the contact.
         force: on its body a while it sticks [N].
         normal: of the contact.
-        time: for messages [s].
-
-    Raises:
-        Diverged: its rolling resistance holds a ball.
     """
     friction = force - normal * (normal @ force)
     x, y, z = (-friction / np.linalg.norm(friction)).tolist()
     line = None if mode[k].along is None else (x, y, z)
-    mode = (*mode[:k], Acting("slip", line, (x, y, z)), *mode[k + 1 :])
-    try:
-        require_moving(contacts, mode, time)
-    except Refused as error:
-        raise Diverged(str(error)) from None
-    return mode
+    return (*mode[:k], Acting("slip", line, (x, y, z)), *mode[k + 1 :])
 
 
 def refuse_lying(

@@ -23,6 +23,8 @@ from proofroll.papers.blajer_2006.truth.explicit import ExplicitRun, Rates
 from proofroll.papers.blajer_2006.truth.sliding import End, Sliding
 from proofroll.papers.blajer_2006.truth.taylor import SlidingTaylor
 
+# Span of the central differences of the drive, in natural times.
+_SPAN = 1e-4
 _Stop = tuple[End, Callable[[FloatArray], float]]
 
 
@@ -78,7 +80,7 @@ class Polar(Sliding):
 
     def _grown(self, time: float, state: FloatArray, until: float) -> float:
         strength, change = self._pull(state)
-        pace = min(strength / change if change > 0 else np.inf, until - time, self._turning_back(state))
+        pace = min(strength / change if change > 0 else np.inf, until - time)
         # A slip must grow by more than the round-off of the time resolves.
         return float(max(self._handover * strength * pace, 64 * strength * np.spacing(time), np.finfo(float).tiny))
 
@@ -112,25 +114,9 @@ class Polar(Sliding):
     def _pull(self, y: FloatArray) -> tuple[float, float]:
         """Magnitudes of the drive b and of ḃ while sticking; ḃ by a central difference, as it only sets a scale."""
         rates = self.rates(y)
-        span = self._span(y)
+        span = _SPAN * self._pace
         b_rate = (self._drive(y + span * rates)[0] - self._drive(y - span * rates)[0]) / (2 * span)
         return float(np.linalg.norm(self._drive(y)[0])), float(np.linalg.norm(b_rate))
-
-    def _turning_back(self, y: FloatArray) -> float:
-        """Time in which gravity and friction would stop the centre [s], where rolling resistance reverses."""
-        contact, body = self._body.contact, self._body
-        if not contact.rolling_resistance:
-            return np.inf
-        frame, tangents = body.surface.frame(y[:2]), body.surface.tangents(y[:2])
-        speed = float(np.linalg.norm(tangents @ y[2:4]))
-        strength = float(np.linalg.norm(frame.T[1:] @ body.gravity)) + contact.mu_kinetic * abs(self._drive(y)[1]) / (
-            body.ball.mass
-        )
-        return speed / strength if speed > 0 and strength > 0 else np.inf
-
-    def _span(self, y: FloatArray) -> float:
-        """Time span of the central differences of the drive [s]: short if the centre is about to stop."""
-        return min(1e-4 * self._pace, 0.1 * self._turning_back(y))
 
     def _with_slip(self, y: FloatArray, size: float, phi: float) -> tuple[FloatArray, FloatArray, float, float]:
         """Rates of (u, u̇, ω1), drive b, N and ė2 · e3 for a slip of ``size`` [m/s] in the direction ``phi`` [rad]."""
@@ -176,7 +162,7 @@ class Polar(Sliding):
         grip = self._A * self._body.contact.mu_kinetic * N
         phi, size, strength = float(np.arctan2(b[1], b[0])), float(y[5]), float(np.linalg.norm(b))
         leading, _, _, turning = self._with_slip(y, size, phi)
-        span = self._span(y)
+        span = _SPAN * self._pace
         change = (self._drive(y[:5] + span * leading)[0] - self._drive(y[:5] - span * leading)[0]) / (2 * span)
         rotation = float(b[0] * change[1] - b[1] * change[0]) / strength**2 + turning
         delta = -size * rotation / (2 * strength - grip)
