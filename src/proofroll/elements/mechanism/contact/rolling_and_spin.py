@@ -76,8 +76,6 @@ class TurningFriction:
     def resisted_rate(self, touch: Touching, turning: Array, rate: Array, fastest: float) -> Array:
         """Rate of the resisted part of an angular velocity with its ``rate``; 0 where it is round-off.
 
-        Of resistance against motion :func:`opposed_rates` adds the rate of the slide.
-
         ``fastest``: largest angular velocity of a body [rad/s], of whose products rates are the sums.
         """
         by_normal = self._part_rate(touch) @ turning

@@ -4,10 +4,11 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
-from proofroll.engines.exudyn.native import Output, exu, items
+import numpy as np
 
-_Vector = tuple[float, float, float]
+from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
+from proofroll.elements.mechanism.scene.rotations import cross
+from proofroll.engines.exudyn.native import Output, exu, items
 
 
 def add_turning(
@@ -29,20 +30,12 @@ def add_turning(
     kind, velocity, rotation = exu.ConfigurationType.Current, Output.AngularVelocity, Output.RotationMatrix
     body_a, body_b = markers
 
-    def moving(normal: _Vector, w_a: _Vector, w_b: _Vector) -> _Vector:
+    def moving(normal: Sequence[float], w_a: Sequence[float], w_b: Sequence[float]) -> Any:
         """Angular velocity with which a ball would roll as its centre moves over the wall [rad/s]."""
-        va, vb, pa, pb = (
-            system.GetMarkerOutput(marker, output, kind).tolist()
-            for output in (Output.Velocity, Output.Position)
-            for marker in markers
-        )
-        x, y, z = (a - b for a, b in zip(pa, pb, strict=True))
-        wx, wy, wz = w_b if friction.bend > 0 else w_a  # of the wall
-        ux, uy, uz = va[0] - vb[0], va[1] - vb[1], va[2] - vb[2]
-        ux, uy, uz = ux - (wy * z - wz * y), uy - (wz * x - wx * z), uz - (wx * y - wy * x)
-        nx, ny, nz = normal
-        bend = friction.bend
-        return bend * (ny * uz - nz * uy), bend * (nz * ux - nx * uz), bend * (nx * uy - ny * ux)
+        outputs = ((marker, output) for output in (Output.Velocity, Output.Position) for marker in markers)
+        va, vb, pa, pb = (np.array(system.GetMarkerOutput(*item, kind)) for item in outputs)
+        of_wall = np.array(w_b if friction.bend > 0 else w_a)
+        return (friction.bend * cross(np.array(normal), va - vb - cross(of_wall, pa - pb))).tolist()
 
     def wrench(system: Any, *_state: Any) -> list[float]:
         """Force and moment on the first marker, in its axes; plain floats, for each residual calls it."""

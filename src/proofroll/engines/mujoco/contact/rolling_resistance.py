@@ -159,8 +159,7 @@ class RollingResistance:
     def _moving(self, data: Any) -> Array:
         """Motion of each contact, first body against second, as :meth:`.TurningFriction.opposed` takes it, (n, 2, 3).
 
-        Angular velocity [rad/s] and no slide; of a ball whose motion is resisted the velocity of its centre [m/s], as
-        the slide of a ball that does not turn.
+        Angular velocity [rad/s], or of a ball whose motion is resisted the slide of one that does not turn [m/s].
         """
         moving = np.zeros((len(self._frictions), 2, 3))
         for place, (friction, (a, b), ball) in enumerate(zip(self._frictions, self._bodies, self._balls, strict=True)):
@@ -173,9 +172,8 @@ class RollingResistance:
 
     def _velocity(self, data: Any, body: int, place: Array) -> Array:
         """Velocity of a body's material at a place [m/s]."""
-        spin_and_velocity = np.zeros(6)
-        mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, spin_and_velocity, 0)
-        return np.asarray(spin_and_velocity[3:] + cross(spin_and_velocity[:3], place - data.xpos[body]))
+        arm = place - data.subtree_com[self._model.body_rootid[body]]
+        return np.asarray(data.cvel[body, 3:] + cross(data.cvel[body, :3], arm))
 
     def _directions(self, data: Any) -> dict[int, Array]:
         """Normals, from b to a, of the contacts with resistance that MuJoCo has found, by their places among these."""

@@ -116,8 +116,7 @@ class BodyOnWall:
         """Moment of the rolling resistance, of a ball that slips, too [N m]; both motions are relative to the wall."""
         rate = np.zeros(3) if self.wall_rate is None else self.wall_rate
         # Turned by a right angle, turning is the velocity with which a ball that rolls moves relative to its wall.
-        against_turning = self.contact.against == "turning"
-        moving = cross(e1, w_WB - rate) if against_turning else v_WB - cross(rate, p_WB)
+        moving = cross(e1, w_WB - rate) if self.contact.against == "turning" else v_WB - cross(rate, p_WB)
         return resistance_moment(self.contact.rolling_resistance, N, e1, moving)
 
 
