@@ -37,10 +37,8 @@ class RollingResistance:
         self.levers = rolling_levers(self._frictions, len(mechanism.contacts))
         pairs = [mechanism.contacts[friction.pressed_by] for friction in self._frictions]
         self._bodies = [(model.body(contact.body_a).id, model.body(contact.body_b).id) for contact in pairs]
-        self._balls = [
-            model.geom(f"contact{friction.pressed_by}{'a' if friction.bend > 0 else 'b'}").id
-            for friction in self._frictions
-        ]
+        names = [f"contact{law.pressed_by}{'a' if law.bend > 0 else 'b'}" for law in self._frictions]
+        self._balls = [model.geom(name).id for name in names]
         self._dt, self._lag = settings.dt, settings.velocity_lag
         count = len(self._frictions)
         self.applied, self.of_step = np.zeros((2, count, 3))
