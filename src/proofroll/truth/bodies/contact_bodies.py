@@ -22,7 +22,7 @@ from proofroll.elements.mechanism.contact.modes import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.rolling_and_spin import shut_by_pressing
+from proofroll.elements.mechanism.contact.rolling_and_spin import moved_by_slip, shut_by_pressing, standing
 from proofroll.elements.mechanism.contact.sequences import groups_of
 from proofroll.elements.mechanism.contact.start import closed_and_still, start_digits
 from proofroll.elements.mechanism.contact.touching import Touching
@@ -127,7 +127,7 @@ class ContactBodies(ContactStretches):
                 slip = slip_velocity(touch)
                 way = direction_of(slip / (float(np.linalg.norm(slip)) or 1.0))
                 mode.append(Acting("slip", None if acting.along is None else way, way))
-        return tuple(mode)
+        return standing(self.contacts, tuple(mode))
 
     def _completed(
         self,
@@ -266,6 +266,7 @@ class ContactBodies(ContactStretches):
         The first mode has all contacts closed, those that may stick sticking.
         """
         mode = [next((option for option in options if option.kind != "open"), OPEN) for options in choices]
+        follow(self.contacts, mode, choices)
         for _ in range(_PIVOTS * (1 + len(mode))):
             attempt = self._headed(bodies, tuple(mode), resting_mask, trial)
             if attempt is None:
@@ -354,11 +355,13 @@ class ContactBodies(ContactStretches):
             return None  # whatever the directions are
         if not unknown:
             return initial, mode
+
+        def toward(slide: Array) -> Array:
+            return np.array([np.arctan2(frames[k][:, 1] @ slide[k], frames[k][:, 0] @ slide[k]) for k in unknown])
+
         # near the way without friction, or with a friction of any direction
-        starts = [
-            np.array([float(np.arctan2(frames[k][:, 1] @ slide[k], frames[k][:, 0] @ slide[k])) for k in unknown])
-            for slide in (slides_of(bodies).rates, initial.slide)
-        ]
+        starts = [toward(slides_of(bodies).rates), toward(initial.slide)]
+        starts.append(toward(tried(starts[1]).slide))  # as a moment against motion turns the slip, and not the motion
         for start, turn in itertools.product(starts, (0.0, 1.0, -1.0, 2.0, -2.0)):
             answer = root(sideways, start + turn, tol=1e-15)
             solution, ways = tried(answer.x), dict(zip(unknown, directions(answer.x), strict=True))
@@ -386,7 +389,9 @@ class ContactBodies(ContactStretches):
         touch, mu, bound = bodies.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
         size_f, size_s = float(np.abs(solution.force).max()), max(float(np.abs(solution.slide).max()), free) or 1.0
         if acting.kind == "open":
-            return float(solution.parting[k]) / size_s if self.contacts[k].pressed_by is None else np.inf
+            moves = float(np.linalg.norm(solution.slide[k])) * moved_by_slip(self.contacts[k], solution.mode)
+            resists = self.contacts[k].pressed_by is not None and moves <= SLACK * size_s
+            return np.inf if resists else (float(solution.parting[k]) - moves) / size_s
         normal = np.inf if bound else normal
         if not size_f:
             return np.inf

@@ -44,6 +44,7 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import (
     TurningFriction,
     moments_by_pressing,
     pressed_by,
+    standing,
     turning_frictions,
 )
 from proofroll.elements.mechanism.contact.sequences import groups_of, left_by, ordered, refuse_spread, sequences
@@ -122,7 +123,9 @@ class ContactDynamics:
             parts.append((friction.resisted(touch.normal, J), friction.resisted_rate(touch, turning, rate, fastest)))
         J = np.array([row for row, _ in parts]).reshape(-1, 3, len(v))
         bias = np.array([rate for _, rate in parts]).reshape(-1, 3)
-        return ContactsNow(solution=solution, mass=mass, W=W, loose=loose, touching=touching, J=J, bias=bias)
+        return ContactsNow(
+            contacts=self.contacts, solution=solution, mass=mass, W=W, loose=loose, touching=touching, J=J, bias=bias
+        )
 
     def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
         """Accelerations and forces while each contact keeps the given mode, at a time [s].
@@ -231,6 +234,7 @@ class ContactDynamics:
 
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""
+        mode = standing(self.contacts, mode)
         (q, v, time), presses = self.parts(y), [contact.presses for contact in self.contacts]
         closed_contacts = [k for k, acting in enumerate(mode) if acting.kind != "open" and presses[k]]
         unit = self.equations.tree.normalised(q)
