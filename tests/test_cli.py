@@ -457,7 +457,7 @@ def test_run_lists_events(proofroll: Proofroll) -> None:
     events = json.loads(out)["events"]
     assert [set(event) for event in events] == [{"kind", "time", "time_low", "time_high", "name"}] * 2
     assert [event["kind"] for event in events] == ["slip", "stick"]
-    for event, expected in zip(events, (1.720183172, 2.00809167), strict=True):
+    for event, expected in zip(events, (1.720183172, 2.00812799), strict=True):
         assert event["time"] == pytest.approx(expected, abs=1e-3)
         assert event["time_low"] <= event["time"] <= event["time_high"] < event["time_low"] + 1.1e-3
 

@@ -236,6 +236,39 @@ def test_the_nightly_workflow_parses_and_runs_what_there_is() -> None:
 GIVEN_BACK = (Sample, MechanismSample, BallSample, MechanismBuilt, BallBuilt)
 
 
+# Beginnings of names of modules; entry points and files have names with dots, too.
+_ROOMS = "core|elements|engines|files|running|studies|truth|conformance|mechanism_studies|papers|robots|cli"
+_FILES = ("csv", "json", "html", "md", "py", "toml")
+
+
+def modules_named(text: str) -> list[str]:
+    """Names of modules of the package, or of what is in one, that a page has in code."""
+    found = re.findall(rf"`(?:proofroll\.)?((?:{_ROOMS})\.[\w.]+)`", text)
+    return [name for name in found if name.rpartition(".")[2] not in _FILES]
+
+
+@pytest.mark.parametrize("page", [*(f"docs/{page}.md" for page in PAGES), "README.md", "CONTRIBUTING.md"])
+def test_modules_that_a_page_names_are_there(page: str) -> None:
+    """Each module, or class or function of one, that prose names in code can be imported by that name."""
+    missing = []
+    for name in modules_named((ROOT / page).read_text(encoding="utf-8")):
+        place, _, member = f"proofroll.{name}".rpartition(".")
+        try:
+            importlib.import_module(f"{place}.{member}")
+        except ImportError:
+            try:
+                getattr(importlib.import_module(place), member)
+            except (ImportError, AttributeError):
+                missing.append(name)
+    assert missing == []
+
+
+def test_a_module_that_is_gone_is_seen() -> None:
+    """Names of modules are read with the package's name and without it; files are none."""
+    text = "`elements.mechanism.commands`, `proofroll.core.engine`, `report.json`, `truth.html`"
+    assert modules_named(text) == ["elements.mechanism.commands", "core.engine"]
+
+
 @pytest.mark.parametrize("kind", [Mechanism, Body, Joint, Loop, Spring, Point, *GIVEN_BACK])
 def test_authors_of_engines_find_each_field(kind: type) -> None:
     """The tables of fields have all that an engine is given and gives back, and nothing that these have not."""

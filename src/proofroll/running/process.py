@@ -73,7 +73,7 @@ def end_all() -> None:
 
 
 def processor_seconds() -> float:
-    """Processor time of this process and of its workers up to their last answers [s]."""
+    """Processor time of this process and of its workers, up to their last answers, or to their end [s]."""
     return time.process_time() + _used_by_workers
 
 
@@ -285,6 +285,8 @@ class Worker:
     def kill(self) -> int:
         """Kills the process with all that it started, and returns its exit code."""
         with self._ending:
+            if self._process.returncode is None:
+                _count(self, _spent(self._process.pid))
             self.shoot()
             _living.discard(self)
             return self._process.wait()
@@ -318,6 +320,16 @@ def _starved(process: int) -> float:
             for task in Path(f"/proc/{member}/task").iterdir():
                 longest = max(longest, int((task / "schedstat").read_text(encoding="ascii").split()[1]))
     return longest * 1e-9
+
+
+def _spent(process: int) -> float:
+    """Processor time of a process, its descendants and those of them that have ended [s]; 0 without ``/proc``."""
+    ticks = 0
+    for member in (process, *descendants(process)):
+        with contextlib.suppress(OSError, ValueError):  # it has just ended, or there is no such file
+            numbers = Path(f"/proc/{member}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+            ticks += sum(map(int, numbers[11:15]))
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 def _how(code: int) -> str:

@@ -292,15 +292,16 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
     """Result of a case whose processor time is charged to the budget; beyond its share the case is left out."""
     if budget is None:
         return _ask(worker, case, limit, out)
-    used_before = worker.used
+    used_before, ended = worker.used, False
     try:
         return _ask(worker, case, limit, out)
     except WorkerDied as error:
+        ended = True
         if error.status is Status.TIMEOUT and limit < case.time_limit:
             raise WorkerDied(Status.LEFT_OUT, budget.sentence) from None
         raise
     finally:
-        budget.end(case.key, worker.used - used_before, lost=worker.used == used_before)
+        budget.end(case.key, worker.used - used_before, ended=ended)
 
 
 def result_without_answer(case: Case, error: ProofrollError) -> Result:

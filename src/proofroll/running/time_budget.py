@@ -89,20 +89,21 @@ class TimeBudget:
             self._allowed[case] = max(seconds, self._allowed[case])
             return seconds
 
-    def end(self, case: str, used: float = 0.0, *, lost: bool = False) -> None:
+    def end(self, case: str, used: float = 0.0, *, ended: bool = False) -> None:
         """Registers the end of a case.
 
         Args:
             case: its key.
             used: its processor time [s].
-            lost: True if its processor time is unknown; its wall time counts, but at most the allowed time.
+            ended: True if its process was ended, which may have slept or hung on others: its wall time counts where it
+                is longer, but at most the allowed time.
         """
         group = self._group.get(case, 0)
         with self._lock:
-            passed = self._passed(case) if lost else 0.0
+            passed = self._passed(case) if ended else 0.0
             del self._begun[case]
-            self._lost += passed
-            self._used[group] += passed or used
+            self._lost += max(0.0, passed - used)
+            self._used[group] += max(passed, used)
             self._unfinished[group] -= 1
             if not self._unfinished[group]:
                 del self._unfinished[group], self._shares[group], self._used[group]

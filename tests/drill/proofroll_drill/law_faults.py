@@ -85,7 +85,7 @@ def _ball(height: float, speed: tuple[float, ...], **pair: float) -> Mechanism:
     body = Body("ball", 1.3, com=(0.0, 0.0, 0.01), inertia=_inertia(0.006, 0.007, 0.008))
     joint = Joint("flight", JointKind.FREE, "world", "ball", q0=(0.0, 0.0, 0.1 + height, 1.0, 0.0, 0.0, 0.0), v0=speed)
     geometries = Geometry("skin", "ball", "sphere", radius=0.1), Geometry("floor", "world", "plane")
-    law = {"friction": 0.2} | pair
+    law: dict[str, Any] = {"friction": 0.2} | pair
     return Mechanism((body,), (joint,), geometries=geometries, pairs=(Pair("contact", ("skin", "floor"), **law),))
 
 

@@ -286,3 +286,11 @@ def test_modules_of_the_working_folder_are_not_imported(tmp_path: Path, monkeypa
         answer = worker.request({"do": "hello", "place": ""}, 60)
     assert answer["proofroll"]
     assert not (tmp_path / "executed").exists()
+
+
+def test_the_time_of_a_worker_that_is_ended_counts(pretend: Pretend) -> None:
+    """What a worker computed before it was ended at its limit is processor time of this process, too."""
+    pretend("while True: pass")
+    before, own = processor_seconds(), time.process_time()
+    assert died(time_limit=0.4).status is Status.TIMEOUT
+    assert processor_seconds() - before - (time.process_time() - own) > 0.2

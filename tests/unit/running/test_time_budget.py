@@ -30,11 +30,11 @@ def test_shares_are_never_more_than_is_left(monkeypatch: pytest.MonkeyPatch) -> 
     now, used = 20.0, 0.0
     second = budget.begin("b", 3)
     now = first
-    budget.end("a", lost=True)
+    budget.end("a", ended=True)
     used += first
     third = budget.begin("c", 3)
     now += second - (first - 20.0)
-    budget.end("b", lost=True)
+    budget.end("b", ended=True)
     used += second
     fourth = budget.begin("d", 3)
     assert used + third + fourth <= 100
@@ -146,7 +146,7 @@ def test_a_busy_machine_costs_no_budget(monkeypatch: pytest.MonkeyPatch) -> None
     assert budget.begin("a", 2) == 45.0
     now = 1000.0
     assert budget.left == 45.0
-    budget.end("a", lost=True)
+    budget.end("a", ended=True)
     assert budget.begin("b", 2) == 45.0
 
 

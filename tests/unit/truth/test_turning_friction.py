@@ -249,3 +249,24 @@ def test_the_iteration_around_pinocchios_solver_leaves_no_error_of_its_own() -> 
     assert (
         np.abs(at(run, "p_WB") - at(right, "p_WB")).max() < 3e-13
     )  # m; 3e-14 is seen, and 6e-12 a thousand times looser
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -1.1, 2.3)])
+def test_a_free_joint_bears_nothing_once_a_spin_has_stopped(turn: tuple[float, float, float]) -> None:
+    """Forces and moments of a free joint are 0 and determinate, also while friction against spinning holds its ball."""
+    scene = ball(law(0.3, rolling_resistance=2e-3, spinning_friction=1e-3), (0.3, 0.1, 0, 0.5, 1.0, 0.4))
+    (element,) = scene.elements
+    found = truth_of(turned_mechanism(element.mechanism, turn, (0.0, 0.0, 0.0)), np.linspace(0.0, 0.6, 4))  # type: ignore[attr-defined]  # a mechanism
+    assert [event.kind for event in found.events] != []
+    np.testing.assert_allclose(found.record.wrench[:, 0], 0.0, atol=1e-13)
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -1.1, 2.3)])
+def test_a_guided_foot_shares_its_load_and_does_not_tear(turn: tuple[float, float, float]) -> None:
+    """A foot with friction on a floor along which its guide lies has no determinate normal force: no paradox."""
+    scene = ball(law(0.3), slope=0.2)
+    (element,) = scene.elements
+    slide = Joint("slide", "prismatic", "world", "ball", (0, 0, RADIUS), axis=(1, 0, 0), v0=(0.5,))
+    guided = replace(element.mechanism, joints=(slide,))  # type: ignore[attr-defined]  # a mechanism
+    with pytest.raises(Refused, match="joints already hold the body of contact off its surface"):
+        truth_of(turned_mechanism(guided, turn, (0.0, 0.0, 0.0)), np.linspace(0.0, 0.6, 4))

@@ -239,6 +239,7 @@ def _pair(placed: PlacedBall, wall: Geometry) -> Pair:
         static_friction=law.mu_static if friction < law.mu_static else None,
         tangential_restitution=law.tangential_restitution,
         rolling_resistance=law.rolling_resistance,
+        against=law.against,
     )
 
 

@@ -1,5 +1,6 @@
 """Route 2 of a mechanism that switches: separate bodies, modes of contacts and laws of joints found by trial."""
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -21,7 +22,7 @@ from proofroll.elements.mechanism.contact.modes import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.rolling_and_spin import shut_by_pressing
+from proofroll.elements.mechanism.contact.rolling_and_spin import moved_by_slip, shut_by_pressing, standing
 from proofroll.elements.mechanism.contact.sequences import groups_of
 from proofroll.elements.mechanism.contact.start import closed_and_still, start_digits
 from proofroll.elements.mechanism.contact.touching import Touching
@@ -29,7 +30,13 @@ from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.truth.bodies.body_impacts import ImpactLaw, impulses_in_turn
 from proofroll.truth.bodies.contact_body_symbols import BodySymbols
-from proofroll.truth.bodies.contact_equations import BodiesSolution, BodiesState, ContactEquations, slides_of
+from proofroll.truth.bodies.contact_equations import (
+    BodiesSolution,
+    BodiesState,
+    ContactEquations,
+    accelerated_by,
+    slides_of,
+)
 from proofroll.truth.bodies.contact_trials import SLACK, all_held, consistent, follow, next_trial, provisional
 from proofroll.truth.numerics.hybrid import Transition
 from proofroll.truth.switching.contact_guards import SolvedContacts, pressing, sharing
@@ -98,7 +105,8 @@ class ContactBodies(ContactStretches):
             ]
             return self.equations.accelerated(bodies, tuple(directed))
 
-        free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
+        free_motion = accelerated_by(bodies.mass, bodies.force, bodies.C, -bodies.of_joints)
+        free = float(np.abs(bodies.J @ free_motion + bodies.bias).max())
         if any(sticks) and not leaving and not ways:
             resting = self._resting(bodies, closed_mask, sticks)
             if all_held(self.equations, bodies, resting, free):
@@ -119,7 +127,7 @@ class ContactBodies(ContactStretches):
                 slip = slip_velocity(touch)
                 way = direction_of(slip / (float(np.linalg.norm(slip)) or 1.0))
                 mode.append(Acting("slip", None if acting.along is None else way, way))
-        return tuple(mode)
+        return standing(self.contacts, tuple(mode))
 
     def _completed(
         self,
@@ -258,6 +266,7 @@ class ContactBodies(ContactStretches):
         The first mode has all contacts closed, those that may stick sticking.
         """
         mode = [next((option for option in options if option.kind != "open"), OPEN) for options in choices]
+        follow(self.contacts, mode, choices)
         for _ in range(_PIVOTS * (1 + len(mode))):
             attempt = self._headed(bodies, tuple(mode), resting_mask, trial)
             if attempt is None:
@@ -346,9 +355,14 @@ class ContactBodies(ContactStretches):
             return None  # whatever the directions are
         if not unknown:
             return initial, mode
-        loose = initial.slide
-        start = np.array([float(np.arctan2(frames[k][:, 1] @ loose[k], frames[k][:, 0] @ loose[k])) for k in unknown])
-        for turn in (0.0, 1.0, -1.0, 2.0, -2.0):
+
+        def toward(slide: Array) -> Array:
+            return np.array([np.arctan2(frames[k][:, 1] @ slide[k], frames[k][:, 0] @ slide[k]) for k in unknown])
+
+        # near the way without friction, or with a friction of any direction
+        starts = [toward(slides_of(bodies).rates), toward(initial.slide)]
+        starts.append(toward(tried(starts[1]).slide))  # as a moment against motion turns the slip, and not the motion
+        for start, turn in itertools.product(starts, (0.0, 1.0, -1.0, 2.0, -2.0)):
             answer = root(sideways, start + turn, tol=1e-15)
             solution, ways = tried(answer.x), dict(zip(unknown, directions(answer.x), strict=True))
             size = float(np.abs(solution.slide).max()) or 1.0
@@ -375,7 +389,9 @@ class ContactBodies(ContactStretches):
         touch, mu, bound = bodies.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
         size_f, size_s = float(np.abs(solution.force).max()), max(float(np.abs(solution.slide).max()), free) or 1.0
         if acting.kind == "open":
-            return float(solution.parting[k]) / size_s if self.contacts[k].pressed_by is None else np.inf
+            moves = float(np.linalg.norm(solution.slide[k])) * moved_by_slip(self.contacts[k], solution.mode)
+            resists = self.contacts[k].pressed_by is not None and moves <= SLACK * size_s
+            return np.inf if resists else (float(solution.parting[k]) - moves) / size_s
         normal = np.inf if bound else normal
         if not size_f:
             return np.inf

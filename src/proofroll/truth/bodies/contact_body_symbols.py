@@ -26,7 +26,7 @@ from proofroll.truth.switching.contact_symbols import (
     rows_of,
     worth_compiling,
 )
-from proofroll.truth.switching.turning_symbols import TurningMoments, of_turning, resisted, resisted_rate
+from proofroll.truth.switching.turning_symbols import TurningMoments, of_turning, opposed_rates, resisted, resisted_rate
 
 
 class _Now(NamedTuple):
@@ -138,7 +138,7 @@ class BodySymbols:
             lines=lines,
             forces=forces,
             response=response,
-            slide_rates=moved,
+            slide_rates=opposed_rates(contacts, touching, moved),
             within_limits=limits,
             poses=self._poses(motion.views)[:-1],
             efforts=motion.efforts,

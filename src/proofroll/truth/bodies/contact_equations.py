@@ -22,6 +22,8 @@ from proofroll.elements.mechanism.contact.modes import (
 from proofroll.elements.mechanism.contact.rolling_and_spin import (
     TurningFriction,
     moments_by_pressing,
+    opposed_rates,
+    standing,
     turning_frictions,
 )
 from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
@@ -274,7 +276,7 @@ class ContactEquations:
         right = right + np.einsum("kin,ki->n", state.J, force)
         if not owner:  # no contact holds anything: the rows of joints alone, which are independent
             x, none = accelerated_by(state.mass, right, state.C, of_joints), np.zeros((len(mode), 3, 0))
-            slide = state.J @ x + bias
+            slide = opposed_rates(self.contacts, state.touching, state.J @ x + bias)
             parting = (
                 np.array([point.normal @ rate for point, rate in zip(state.touching, slide, strict=True)]) + beyond
             )
@@ -322,7 +324,7 @@ class ContactEquations:
         for k, place, moment in moments:
             force[k] += z[place] * moment
             shifts[k] += np.outer(moment, ways[nu + len(state.C) + place])
-        slide = state.J @ x + bias
+        slide = opposed_rates(self.contacts, state.touching, state.J @ x + bias)
         parting = np.array([point.normal @ rate for point, rate in zip(state.touching, slide, strict=True)]) + beyond
         spread = float(np.linalg.norm(ways[:nu]))
         return BodiesSolution(
@@ -398,6 +400,7 @@ class ContactEquations:
 
     def eliminated(self, state: Array, mode: ContactMode) -> Array:
         """State without violations of joint rows, closed contacts and unit quaternions."""
+        mode = standing(self.contacts, mode)
         e = self.equations.equations
         unit = np.append(self.equations.normalised(state[:-1]), state[-1])
         state = unit if np.abs(unit - state).max() > EXACT else state

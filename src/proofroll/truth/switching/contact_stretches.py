@@ -31,7 +31,7 @@ from proofroll.elements.mechanism.contact.modes import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.rolling_and_spin import opened, shut_by_pressing
+from proofroll.elements.mechanism.contact.rolling_and_spin import opened, require_moving, shut_by_pressing
 from proofroll.elements.mechanism.contact.touching import Touching, lying, torn
 from proofroll.elements.mechanism.dynamics.switches import Settling
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -285,6 +285,7 @@ class ContactStretches(ContactWalks):
         mode, leaving = list(stretch.mode), leaving_slips(stretch.mode, solved, grips)
         for number, acting in leaving.items():
             mode[number] = acting
+        require_moving(contacts, tuple(mode), stretch.end)
         return Transition(stretch.last, tuple(mode), tuple((EventKind.SLIP, contacts[k].name) for k in leaving))
 
     def _unshared(self, stretch: Stretch[ContactMode], leaving: Sequence[int]) -> Transition[ContactMode]:

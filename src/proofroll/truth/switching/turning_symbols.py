@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.truth.numerics.elimination import Row
-from proofroll.truth.numerics.scalars import Scalar, add, dot, minus, plus, scaled
+from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, minus, plus, scaled
 from proofroll.truth.switching.contact_guards import Touchable
 from proofroll.truth.switching.contact_scalars import ScalarTouch
 
@@ -21,6 +21,8 @@ def of_turning(friction: TurningFriction, touch: ScalarTouch, turning: Vector) -
     A spin is a slide along the normal, across none.
     """
     slide = resisted(friction, touch, turning)
+    if friction.bend:
+        slide = plus(slide, scaled(friction.bend, cross(touch.normal, touch.slide)))
     if not friction.spins:
         return touch._replace(slide=slide, tilt=1.0)
     return touch._replace(normal=_NONE, normal_rate=_NONE, slide=slide, tilt=1.0)
@@ -36,7 +38,21 @@ def resisted_rate(friction: TurningFriction, touch: ScalarTouch, turning: Vector
     """Rate of the resisted part of an angular velocity as the normal turns."""
     n, rate = touch.normal, touch.normal_rate
     turned = plus(scaled(dot(n, turning), rate), scaled(dot(rate, turning), n))
-    return turned if friction.spins else scaled(-1.0, turned)
+    if not friction.bend:
+        return turned if friction.spins else scaled(-1.0, turned)
+    return minus(scaled(friction.bend, cross(rate, touch.slide)), turned)
+
+
+def opposed_rates(
+    contacts: Sequence[Touchable], touching: Sequence[ScalarTouch], rates: Sequence[Vector]
+) -> list[Vector]:
+    """Rates of all slides from these and the rates of turning that friction resists; see :meth:`.opposed`."""
+    whole = list(rates)
+    for k, contact in enumerate(contacts):
+        if isinstance(contact, TurningFriction) and contact.bend:
+            slide = cross(touching[contact.pressed_by].normal, rates[contact.pressed_by])
+            whole[k] = plus(rates[k], scaled(contact.bend, slide))
+    return whole
 
 
 def follows(mode: ContactMode, contacts: Sequence[Touchable]) -> bool:

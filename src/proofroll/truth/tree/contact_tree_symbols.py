@@ -40,7 +40,7 @@ from proofroll.truth.switching.contact_symbols import (
     rows_of,
     worth_compiling,
 )
-from proofroll.truth.switching.turning_symbols import TurningMoments, of_turning, resisted, resisted_rate
+from proofroll.truth.switching.turning_symbols import TurningMoments, of_turning, opposed_rates, resisted, resisted_rate
 from proofroll.truth.tree.tree_loads import NONE as _NONE
 from proofroll.truth.tree.tree_loads import MovingBody, add_point_loads, bodies_of_tree
 
@@ -152,7 +152,7 @@ class TreeSymbols:
             lines=lines,
             forces=forces,
             response=response,
-            slide_rates=slide_rates,
+            slide_rates=opposed_rates(contacts, touching, slide_rates),
             within_limits=[*limits, *kink_guards(kinks)],
             poses=[(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies[:-1]],
             efforts=inertial.efforts,

@@ -85,6 +85,15 @@ def test_a_ball_becomes_a_body_a_sphere_a_wall_and_a_pair(tmp_path: Path) -> Non
     assert wall.axis == pytest.approx((math.sin(0.4), 0.0, math.cos(0.4)))
 
 
+def test_resistance_is_against_the_motion_of_a_ball_unless_its_file_says_turning(tmp_path: Path) -> None:
+    """The default of a contact of a ball is the article's law, and the other one is read."""
+    turning = ("mu_static = 0.5", 'mu_static = 0.5\nagainst = "turning"')
+    assert [read(tmp_path, *changes).mechanism.pairs[0].against for changes in ((), (turning,))] == [
+        "motion",
+        "turning",
+    ]
+
+
 def test_a_ball_that_never_slips_has_no_kinetic_friction(tmp_path: Path) -> None:
     """Static friction without a bound holds whatever the kinetic one is."""
     element = read(tmp_path, ("mu_static = 0.5", "mu_static = inf"))
@@ -112,6 +121,7 @@ def test_a_start_beyond_half_a_turn_keeps_its_turns(tmp_path: Path) -> None:
         (('[[initial]]\nbody = "ball"', '[[initial]]\nbody = "bal"'), "initial.0.body"),
         (("mu_static = 0.5", "mu_statc = 0.5"), "contacts.0.mu_statc"),
         (("spin = 3.0", "spin = 3.0\ntangential_spin = [1.0, 2.0]\ngap = -1.0"), "initial.0.gap"),
+        (("mu_static = 0.5", 'mu_static = 0.5\nagainst = "rolling"'), "contacts.0.against"),
     ],
 )
 def test_a_mistake_is_told_with_its_place(tmp_path: Path, change: tuple[str, str], place: str) -> None:

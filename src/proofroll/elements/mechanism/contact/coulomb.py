@@ -15,6 +15,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contact.distributions import best_distribution, cones_of
 from proofroll.elements.mechanism.contact.lemke import lemke
 from proofroll.elements.mechanism.contact.one_contact import AT_BOUND, ModeKind, force_of_one, rubbing
+from proofroll.elements.mechanism.contact.rolling_and_spin import Presser
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.scene.rotations import Array
 
@@ -70,7 +71,7 @@ def contact_forces(
     near: float = 0.0,
     static: Array | None = None,
     guess: Sequence[ModeKind] | None = None,
-    pressed_by: Sequence[int | None] | None = None,
+    pressed_by: Sequence[Presser | None] | None = None,
 ) -> tuple[Array, list[ModeKind]]:
     """Forces of all contacts, shape (contacts, 3), and outcome of each contact.
 
@@ -86,8 +87,8 @@ def contact_forces(
         near: part of the loads and of friction's bound that is round-off where all contacts stick.
         static: coefficient of each while it sticks; None: as while it slips.
         guess: outcomes whose forces the sweeps start from; None: all press that can.
-        pressed_by: place of the contact whose normal force bounds the moment of a friction against turning; None: an
-            own normal force, or a bound.
+        pressed_by: contact whose normal force bounds the moment of a friction against turning; None: an own normal
+            force, or a bound. While it slips, resistance against motion has no influence on that, and opposes its rate.
 
     Raises:
         NotUnique: the force of a contact is not unique.
@@ -101,8 +102,16 @@ def contact_forces(
     f = np.zeros(len(c)) if turns else _guessed(G, c, friction, sliding, bounds, guess)
     static = friction if static is None else static
     least = _RESTS * float(np.abs(c).max())
+
+    def led(k: int) -> bool:
+        """True for resistance against motion whose contact slips."""
+        by = pressing[k]
+        return by is not None and bool(by.bend) and done[by.place] == "slip"
+
     if len(friction) > 1 and (friction + bounds).all() and all(slip is None for slip in sliding):
-        sticking_forces = _all_held(G, c, static, bounds, max(near, _RESTS), max(near, AT_BOUND), pressing)
+        sticking_forces = _all_held(
+            G, c, static, bounds, max(near, _RESTS), max(near, AT_BOUND), [by and by.place for by in pressing]
+        )
         if sticking_forces is not None:
             return sticking_forces.reshape(-1, 3), ["stick"] * len(friction)
     for _ in range(_SWEEPS):
@@ -111,9 +120,9 @@ def contact_forces(
             part = slice(3 * k, 3 * k + 3)
             free = c[part] + G[part] @ f - G[part, part] @ f[part]
             by = pressing[k]
-            bound = bounds[k] if by is None else mu * max(float(f[3 * by]), 0.0)
-            if by is not None and not bound:
-                f[part], done[k] = 0.0, "open"
+            bound = bounds[k] if by is None else mu * max(float(f[3 * by.place]), 0.0)
+            if by is not None and (not bound or (led(k) and sliding[k] is None)):
+                f[part], done[k] = _against_rate(c + G @ f, (k, by.place), by.bend, bound, least)
             elif bound:
                 f[part], done[k] = rubbing(G[part, part], free, bound, sliding[k])
             else:
@@ -126,13 +135,23 @@ def contact_forces(
                 done[k] = "slip"
             for k, way in enumerate(sliding):
                 rubs = friction[k] or bounds[k]
-                if done[k] == "slip" and way is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
+                if done[k] == "slip" and way is None and rubs and not led(k) and np.linalg.norm(w[k, 1:]) <= least:
                     done[k] = "stick"  # one of several holding contacts may reach its bound while nothing moves
             return f.reshape(-1, 3), done
     together = None if bounds.any() or turns else _together(G, c, friction, sliding, least)
     if together is not None:
         return together
     raise Refused(f"forces of the contacts {', '.join(names)} at t = {time:.6g} s are not found in {_SWEEPS} sweeps")
+
+
+def _against_rate(
+    rates: Array, which: tuple[int, int], bend: float, bound: float, least: float
+) -> tuple[Array, ModeKind]:
+    """Moment against the rate at which a ball's centre begins to move, and outcome; ``which``: it, what presses."""
+    (across, aside), (slide, slide_aside) = (rates[3 * k + 1 : 3 * k + 3].tolist() for k in which)
+    rate = np.array([0.0, across - bend * slide_aside, aside + bend * slide])  # with n × (x, y) = (-y, x)
+    size = float(np.linalg.norm(rate))
+    return (-bound / size * rate, "slip") if bound and size > least else (np.zeros(3), "open")
 
 
 def _check_directions(G: Array, c: Array, names: Sequence[str], time: float) -> None:
@@ -309,7 +328,7 @@ def robust_forces(
     time: float = 0.0,
     least: float = 0.0,
     static: Array | None = None,
-    pressed_by: Sequence[int | None] | None = None,
+    pressed_by: Sequence[Presser | None] | None = None,
 ) -> tuple[Array, list[ModeKind], bool]:
     """Solution as of :func:`contact_forces`, and True if slightly changed pressure and friction give the same outcomes.
 

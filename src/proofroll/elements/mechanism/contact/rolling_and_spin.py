@@ -6,13 +6,14 @@ its force is a moment, and its bound is a coefficient [m] times the normal force
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from proofroll.elements.mechanism.contact.modes import OPEN, ROUND_OFF, ContactMode
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism.contact.modes import OPEN, ROUND_OFF, Acting, ContactMode
 from proofroll.elements.mechanism.contact.touching import Touching
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 
 
@@ -26,6 +27,8 @@ class TurningFriction:
         spins: True: friction against spin about the normal; False: rolling resistance.
         friction: coefficient, the largest moment over the normal force [m].
         pair: text that no other contact has.
+        bend: of rolling resistance against the motion of a ball's centre: 1 over the ball's radius, negative if the
+            ball is body b [1/m]; 0: against turning.
     """
 
     bound: ClassVar[float] = 0.0
@@ -37,6 +40,7 @@ class TurningFriction:
     spins: bool
     friction: float
     pair: str
+    bend: float = 0.0
 
     @property
     def static(self) -> float:
@@ -48,7 +52,7 @@ class TurningFriction:
 
         The normal of a spin is one across it, so that the spin is a slide along a line.
         """
-        slide = self.resisted(touch.normal, turning)
+        slide = self.opposed(touch.normal, turning, touch.slide)
         if not self.spins:
             return touch._replace(slide=slide, tilt=1.0, feature=0, borders=())
         across = frame_of_axis(touch.normal)[:, 0]
@@ -61,6 +65,14 @@ class TurningFriction:
         part = (projection if self.spins else np.eye(3) - projection) @ turning
         return _without_round_off(part, np.linalg.norm(turning, axis=0))
 
+    def opposed(self, normal: Array, turning: Array, slide: Array) -> Array:
+        """Angular velocity that the moment opposes [rad/s], (3,), at those of a relative to b and a slide [m/s].
+
+        Against motion: of a ball that rolls as fast as its centre moves as the wall's body sees it, n × v / a.
+        """
+        resisted = self.resisted(normal, turning)
+        return resisted + self.bend * cross(normal, slide) if self.bend else resisted
+
     def resisted_rate(self, touch: Touching, turning: Array, rate: Array, fastest: float) -> Array:
         """Rate of the resisted part of an angular velocity with its ``rate``; 0 where it is round-off.
 
@@ -68,7 +80,8 @@ class TurningFriction:
         """
         by_normal = self._part_rate(touch) @ turning
         size = np.linalg.norm(rate) + fastest * (fastest + np.linalg.norm(touch.normal_rate))
-        return _without_round_off(self.resisted(touch.normal, rate) + by_normal, size)
+        rate = _without_round_off(self.resisted(touch.normal, rate) + by_normal, size)
+        return rate + self.bend * cross(touch.normal_rate, touch.slide) if self.bend else rate
 
     def _part_rate(self, touch: Touching) -> Array:
         """Rate of that matrix as the normal turns [1/s]."""
@@ -98,8 +111,41 @@ def turning_frictions(contacts: Sequence[BodyContact]) -> tuple[TurningFriction,
         for spins, size in ((False, contact.rolling_resistance), (True, contact.spinning_friction)):
             if size:
                 text = f"{contact.name} {'spin' if spins else 'roll'}"
-                laws.append(TurningFriction(name=contact.name, pressed_by=k, spins=spins, friction=size, pair=text))
+                bend = 0.0 if spins else contact.bend
+                laws.append(TurningFriction(contact.name, k, spins=spins, friction=size, pair=text, bend=bend))
     return tuple(laws)
+
+
+def opposed_rates(contacts: Sequence[Any], touching: Sequence[Touching], rates: Array) -> Array:
+    """Rates of all slides, (contacts, 3), from these and the rates of turning that friction resists."""
+    for k, contact in enumerate(contacts):
+        if isinstance(contact, TurningFriction) and contact.bend:
+            slide = contact.bend * cross(touching[contact.pressed_by].normal, rates[contact.pressed_by])
+            rates = np.concatenate([rates[:k], (rates[k] + slide)[None], rates[k + 1 :]])
+    return rates
+
+
+def standing(contacts: Sequence[Any], mode: ContactMode) -> ContactMode:
+    """Mode in which resistance against motion is open while its contact slips: it holds no turning then."""
+    return tuple(
+        OPEN._replace(feature=acting.feature) if acting.kind == "stick" and moved_by_slip(contact, mode) else acting
+        for contact, acting in zip(contacts, mode, strict=True)
+    )
+
+
+def moved_by_slip(contact: Any, mode: Sequence[Acting]) -> bool:
+    """True for resistance against motion whose contact slips in a mode: the moment has no influence on the motion."""
+    return isinstance(contact, TurningFriction) and bool(contact.bend) and mode[contact.pressed_by].kind == "slip"
+
+
+def require_moving(contacts: Sequence[Any], mode: ContactMode, time: float) -> None:
+    """Raises Diverged if a ball that stands begins to slip in a mode, where its resistance has no direction yet."""
+    for contact, acting in zip(contacts, mode, strict=True):
+        if acting.kind == "stick" and moved_by_slip(contact, mode):
+            raise Diverged(
+                f"{contact.name} begins to slip from rest at t = {time:.6g} s while its rolling resistance holds the "
+                "ball: it is against the motion of a centre that does not move yet; take less of it, or more friction"
+            )
 
 
 def moments_by_pressing(
@@ -142,6 +188,18 @@ def shut_by_pressing(contacts: Sequence[_Pressed], closed_mask: Sequence[bool]) 
     ]
 
 
-def pressed_by(contacts: Sequence[_Pressed], which: Sequence[int]) -> list[int | None]:
-    """Place among some contacts of that whose normal force bounds each; None: its own."""
-    return [None if (k := contacts[number].pressed_by) is None else list(which).index(k) for number in which]
+class Presser(NamedTuple):
+    """Contact that presses, by its place among some contacts, and the friction's :attr:`TurningFriction.bend`."""
+
+    place: int
+    bend: float
+
+
+def pressed_by(contacts: Sequence[Any], which: Sequence[int]) -> list[Presser | None]:
+    """Contacts whose normal force bounds the friction of each of some contacts; None: its own does."""
+    return [
+        Presser(list(which).index(contacts[k].pressed_by), contacts[k].bend)
+        if isinstance(contacts[k], TurningFriction)
+        else None
+        for k in which
+    ]

@@ -1,5 +1,6 @@
 """Contacts at one state: kinematics, and accelerations and forces in a mode."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from proofroll.elements.mechanism.contact.free_slides import FreeSlides, free_slides
 from proofroll.elements.mechanism.contact.modes import ContactMode
+from proofroll.elements.mechanism.contact.rolling_and_spin import opposed_rates
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.dynamics.joint_coordinates import Solution
@@ -19,6 +21,7 @@ class ContactsNow:
     """Kinematics and free accelerations of the contacts at one state, independent of the mode.
 
     Attributes:
+        contacts: their laws.
         solution: of the mechanism without forces of contact.
         mass: of the velocities, (nv, nv).
         W: accelerations caused by unit forces along the velocities, (nv, nv).
@@ -28,6 +31,7 @@ class ContactsNow:
         bias: rate of each slide where v̇ = 0, (contacts, 3).
     """
 
+    contacts: Sequence[object]
     solution: Solution
     mass: Array
     W: Array
@@ -70,7 +74,8 @@ class ContactSolution:
     @cached_property
     def slide_rate(self) -> Array:
         """Rate of each slide [m/s²], (contacts, 3)."""
-        return np.asarray(self.state.J @ self.acceleration + self.state.bias)
+        state = self.state
+        return opposed_rates(state.contacts, state.touching, state.J @ self.acceleration + state.bias)
 
     @property
     def undetermined(self) -> Array:

@@ -106,6 +106,14 @@ def torn(name: str, time: float) -> NotUnique:
     )
 
 
+def guided(name: str, time: float) -> NotUnique:
+    """Error of a contact with friction whose load joints share, from a time on [s]."""
+    return NotUnique(
+        f"joints already hold the body of {name} off its surface at t = {time:.6g} s: they share its normal force, "
+        "which is not determinate, nor is its friction; leave out the friction, or give the joint play"
+    )
+
+
 def touch(contact: BodyContact, a: Moving, b: Moving, feature: int | None = None) -> Touching:
     """Gap, normal, point of contact and rates of a contact at given motions of its bodies.
 

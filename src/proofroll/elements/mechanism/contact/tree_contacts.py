@@ -44,13 +44,14 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import (
     TurningFriction,
     moments_by_pressing,
     pressed_by,
+    standing,
     turning_frictions,
 )
 from proofroll.elements.mechanism.contact.sequences import groups_of, left_by, ordered, refuse_spread, sequences
 from proofroll.elements.mechanism.contact.slide_rows import slide_row, turning_row
 from proofroll.elements.mechanism.contact.start import TOUCHING, at_start, touches
 from proofroll.elements.mechanism.contact.states import ContactsNow, ContactSolution
-from proofroll.elements.mechanism.contact.touching import Touching, lying
+from proofroll.elements.mechanism.contact.touching import Touching, guided, lying
 from proofroll.elements.mechanism.dynamics.analysis import NO_RESPONSE, RANK
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.point_loads import kink_arguments
@@ -122,7 +123,9 @@ class ContactDynamics:
             parts.append((friction.resisted(touch.normal, J), friction.resisted_rate(touch, turning, rate, fastest)))
         J = np.array([row for row, _ in parts]).reshape(-1, 3, len(v))
         bias = np.array([rate for _, rate in parts]).reshape(-1, 3)
-        return ContactsNow(solution=solution, mass=mass, W=W, loose=loose, touching=touching, J=J, bias=bias)
+        return ContactsNow(
+            contacts=self.contacts, solution=solution, mass=mass, W=W, loose=loose, touching=touching, J=J, bias=bias
+        )
 
     def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
         """Accelerations and forces while each contact keeps the given mode, at a time [s].
@@ -231,6 +234,7 @@ class ContactDynamics:
 
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""
+        mode = standing(self.contacts, mode)
         (q, v, time), presses = self.parts(y), [contact.presses for contact in self.contacts]
         closed_contacts = [k for k, acting in enumerate(mode) if acting.kind != "open" and presses[k]]
         unit = self.equations.tree.normalised(q)
@@ -282,6 +286,7 @@ class ContactDynamics:
         closed_mask = acting_ones(self.contacts, rough, state.free_slides)
         which = [k for k, shut in enumerate(closed_mask) if shut]
         self._refuse_flat(state, which, time)
+        self._refuse_guided(state, which, time)
         if not which:
             return rough, np.inf
         frames = {k: frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which}
@@ -396,6 +401,14 @@ class ContactDynamics:
             if state.touching[k].flat:
                 raise lying(self.mechanism.contacts[k], time)
 
+    def _refuse_guided(self, state: ContactsNow, closed_contacts: Sequence[int], time: float) -> None:
+        """Raises NotUnique if joints keep one of these contacts with friction from opening at a time [s]."""
+        for k in closed_contacts:
+            if k < len(self._bodies) and self.friction[k]:
+                normal, J = state.touching[k].normal @ state.J[k], state.J[k]
+                if normal @ state.W @ normal <= NO_RESPONSE * np.trace(J @ state.loose @ J.T):
+                    raise guided(self.mechanism.contacts[k].name, time)
+
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array, Array]:
         """Fields of a record at one time [s], contact forces between bodies, and their sums.
 
@@ -409,12 +422,19 @@ class ContactDynamics:
 
         fields, pressed = record(solution.force), solution.force[:count]
         for shift in np.moveaxis(solution.undetermined, 2, 0):  # what another distribution changes is not determinate
-            others = record(solution.force + shift)
+            others = record(solution.force + self._borne(solution.state, shift))
             for name in ("wrench", "named"):
                 fields[name] = np.where(np.abs(others[name] - fields[name]) > RANK, np.nan, fields[name])
         moved = np.abs(np.einsum("pk,kiw->piw", self.sums, solution.undetermined)).max(axis=2, initial=0.0)
         sums = np.where(moved <= RANK, self.sums[:, :count] @ pressed, np.nan)
         return fields, np.where(solution.determinate[:count], pressed, np.nan), sums
+
+    def _borne(self, state: ContactsNow, shift: Array) -> Array:
+        """Part of a change of all forces, (contacts, 3), that friction against turning can bear about its axes."""
+        borne = shift.copy()
+        for k, friction in enumerate(self.turning, len(self._bodies) + len(self._of_joints)):
+            borne[k] = friction.resisted(state.touching[friction.pressed_by].normal, shift[k][:, None])[:, 0]
+        return borne
 
     def _loads(self, state: ContactsNow, force: Array) -> tuple[Array, Array]:
         """Loads by contacts of bodies: along the velocities, and about the world's origin, (bodies + 1, 6)."""

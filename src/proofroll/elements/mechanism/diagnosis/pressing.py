@@ -11,7 +11,7 @@ from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion
 from proofroll.elements.mechanism.run.contacts.observables import SLIDES
 from proofroll.elements.mechanism.scene.model import Mechanism
-from proofroll.elements.mechanism.scene.rotations import frame_of_axis
+from proofroll.elements.mechanism.scene.rotations import cross, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 
 _CLOSED = 1e-3  # largest gap of a closed contact, relative to the mechanism's size
@@ -49,11 +49,13 @@ class Resisting(NamedTuple):
         factor: on its arm.
         along_spin: True if the moment is against the whole angular velocity, spin about the normal included.
         by_weight: True if it is the arm times the weight of the bodies that touch, not times the normal force.
+        turning: True if it is against turning, also where the scene's is against the motion of a ball.
     """
 
     factor: float = 1.0
     along_spin: bool = False
     by_weight: bool = False
+    turning: bool = False
 
 
 SCENES_LAW = Resisting()
@@ -114,8 +116,9 @@ def _against_turning(
     spin = n * (n @ turning)
     moments, loose = np.zeros((2, 3)), [np.zeros((0, 3))]
     least = _STILL * float(np.linalg.norm(turning))
+    rolling = turning - spin + (0.0 if law.turning else contact.bend) * cross(n, touching.slide)
     laws = (
-        (law.factor * contact.rolling_resistance, turning if law.along_spin else turning - spin),
+        (law.factor * contact.rolling_resistance, turning if law.along_spin else rolling),
         (contact.spinning_friction, spin),
     )
     for k, (arm, part) in enumerate(laws):

@@ -10,8 +10,10 @@ from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.pressing import Resisting
 from proofroll.elements.mechanism.diagnosis.residuals import residuals_of
 
-_REMEDY = "the moment is an arm, in metres, times the normal force of that moment, against the rolling alone"
+_REMEDY = "the moment is an arm, in metres, times the normal force of that moment, against what the scene says"
 _LAWS = (
+    # of a scene's law against motion alone
+    (Resisting(turning=True), "the rolling resistance is against turning where the ball slips, not against its motion"),
     (
         Resisting(along_spin=True),
         "the rolling resistance acts against the whole angular velocity, spin about the normal included",
@@ -29,8 +31,9 @@ def rolling_resistance(evidence: Evidence) -> Iterator[Cause]:
     mechanism = evidence.element.mechanism
     if not any(contact.rolling_resistance for contact in mechanism.contacts):
         return
+    moves = any(contact.bend for contact in mechanism.contacts)
     for residuals in residuals_of(evidence):
-        for law, says in _LAWS:
+        for law, says in _LAWS if moves else _LAWS[1:]:
             yield residuals.cause("rolling resistance", says, Change(mechanism, resisting=law), _REMEDY, 0)
 
         def changed(factor: float) -> Change:

@@ -154,6 +154,8 @@ def _place(
     sketch.add("joints", **free, q0=floats(start), v0=floats(rates))
     previous = sketch.tables["geometries"][-1]["name"]
     geometry = sketch.add("geometries", body=body["name"], **keys)
+    if shape == "sphere" and previous == "ground" and "rolling_resistance" in pair:
+        pair = {**pair, "against": choices.pick(("motion", "turning"))}
     sketch.add("pairs", geometries=[geometry["name"], previous], **pair)
     top: Array = centre + normal * height
     return top

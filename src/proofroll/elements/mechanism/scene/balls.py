@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from proofroll.core.bounds import OutOfBounds, require_bounds
+from proofroll.elements.mechanism.scene.checks import Against
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class Contact:
     Attributes:
         body, surface: names of a ball and of the surface that it touches.
         rolling_resistance: f, distance by which the normal force is shifted forward [m].
+        against: law of that resistance while the ball slips: the ``motion`` of its centre, or its ``turning``.
         mu_static: largest |F|/N while sticking [1]; inf: the ball never slips.
         mu_kinetic: |F|/N while slipping [1].
         restitution: e: normal speed after an impact over that before it [1]; left out: impacts are not modelled, and
@@ -55,6 +57,7 @@ class Contact:
     body: str
     surface: str
     rolling_resistance: float = field(default=0.0, metadata={"unit": "m"})
+    against: Against = "motion"
     mu_static: float = field(default=math.inf, metadata={"unit": "1"})
     mu_kinetic: float = field(default=math.inf, metadata={"unit": "1"})
     restitution: float | None = field(default=None, metadata={"unit": "1"})

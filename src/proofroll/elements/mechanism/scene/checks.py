@@ -1,7 +1,7 @@
 """Checks of user input: numbers, vectors, axes, inertias; each failure is one clear line."""
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -32,6 +32,7 @@ METRES, RADIANS, RATIO = ({"unit": unit} for unit in ("m", "rad", "1"))
 WORLD = "world"
 ZERO: Vector = (0.0, 0.0, 0.0)
 Z: Vector = (0.0, 0.0, 1.0)
+Against = Literal["motion", "turning"]  # what rolling resistance opposes
 _LONGEST_NAME = 200  # characters
 _SQUARED = 1e-150  # sizes above it, and below its inverse, have squares within the range of numbers
 

@@ -203,21 +203,22 @@ class Spheres(Redundant):
         radius = max(shape.radius for shape in (contact.shape_a, contact.shape_b) if isinstance(shape, SphereShape))
         zone = settings.penalty[1] / radius
 
-        # A moment resists turning alike about a normal and its opposite; that of spheres joins their centres.
         item, kind, output = (
             self.system.GetObject(made.item),
             exu.ConfigurationType.Current,
             self.system.GetMarkerOutput,
         )
         end_a, end_b = item["markerNumbers"]
+        outward = -made.sign if item.get("isHollowSphere1") else 1.0  # sense of the centres' line against the normal
 
         def between_spheres() -> tuple[float, Sequence[float]]:
             xa, ya, za = output(end_a, Output.Position, kind).tolist()
             xb, yb, zb = output(end_b, Output.Position, kind).tolist()
             x, y, z = xa - xb, ya - yb, za - zb
-            distance = math.hypot(x, y, z)
+            distance = outward * math.hypot(x, y, z)
             Fx, Fy, Fz = self.system.GetObjectOutput(made.item, Output.Force).tolist()
-            return abs(x * Fx + y * Fy + z * Fz) / distance, (x / distance, y / distance, z / distance)
+            pressed = abs((x * Fx + y * Fy + z * Fz) / distance)
+            return pressed, (x / distance, y / distance, z / distance)
 
         def on_plane() -> tuple[float, Sequence[float]]:
             _, normal, _ = self._lying(made)
@@ -228,9 +229,13 @@ class Spheres(Redundant):
 
         bodies = contact.body_a, contact.body_b
         self._resisting.append(friction)
-        add_turning(self.system, friction, [self.marker(body, np.zeros(3)) for body in bodies], pressing, zone)
+        places = [
+            shape.centre if friction.bend and isinstance(shape, SphereShape) else np.zeros(3)
+            for shape in (contact.shape_a, contact.shape_b)
+        ]
+        add_turning(self.system, friction, list(map(self.marker, bodies, places)), pressing, zone)
         w_a, w_b = (self._at_start.w_WB[self._mechanism.body_index[body]] for body in bodies)
-        turns = np.linalg.norm(friction.resisted(touch.normal, w_a - w_b)) >= zone
+        turns = np.linalg.norm(friction.opposed(touch.normal, w_a - w_b, touch.slide)) >= zone
         return 0.0 if turns else float(np.linalg.norm(moment)) / radius
 
     def _add_plane(self, plane: HalfSpace, plane_body: str, sphere: SphereShape, body: str) -> tuple[Any, Any]:

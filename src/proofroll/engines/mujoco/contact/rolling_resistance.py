@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers, turning_frictions
 from proofroll.elements.mechanism.run.contacts.step_events import SLIP
-from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.rotations import Array, cross
 from proofroll.engines.mujoco.contact.contact_states import ContactStates
 from proofroll.engines.mujoco.contact.mechanism_contacts import Contacts
 from proofroll.engines.mujoco.settings import MujocoSettings
@@ -37,9 +37,12 @@ class RollingResistance:
         self.levers = rolling_levers(self._frictions, len(mechanism.contacts))
         pairs = [mechanism.contacts[friction.pressed_by] for friction in self._frictions]
         self._bodies = [(model.body(contact.body_a).id, model.body(contact.body_b).id) for contact in pairs]
+        names = [f"contact{law.pressed_by}{'a' if law.bend > 0 else 'b'}" for law in self._frictions]
+        self._balls = [model.geom(name).id for name in names]
         self._dt, self._lag = settings.dt, settings.velocity_lag
         count = len(self._frictions)
-        self.applied, self.of_step, self._w = np.zeros((3, count, 3))
+        self.applied, self.of_step = np.zeros((2, count, 3))
+        self._last_moving = np.zeros((count, 2, 3))
         self._ease = np.full(count, np.inf)  # largest response to a torque, (rad/s²) / (N m)
         self._times, self._normals = [0.0, 0.0], [np.zeros(count), np.zeros(count)]  # of the last two steps
 
@@ -54,13 +57,13 @@ class RollingResistance:
             behind: MuJoCo's data with velocities that lag.
         """
         self._normals = [self.pressing(present)] * 2
-        w_now, w_behind = self._turning(present), self._turning(behind)
-        self._w = w_behind - (w_now - w_behind) * (self._dt / self._lag) if self._lag else w_now
+        now, before = self._moving(present), self._moving(behind)
+        self._last_moving = before - (now - before) * (self._dt / self._lag) if self._lag else now
 
     def remember(self, data: Any, time: float) -> None:
         """Takes the normal forces of a step from ``data``, which belong to a ``time`` [s]."""
         self._times, self._normals = [self._times[1], time], [self._normals[1], self.pressing(data)]
-        self._w = self._turning(data)
+        self._last_moving = self._moving(data)
 
     def pressing(self, data: Any) -> Array:
         """Normal force on each contact with resistance [N], by the last forces of ``data``."""
@@ -92,14 +95,15 @@ class RollingResistance:
             The moments on the first bodies of the contacts [N m], (contacts, 3).
         """
         moments, directions = np.zeros((len(self._frictions), 3)), self._directions(data)
-        turning = self._turning(data)
-        later_turning = turning + (turning - self._w) * (self._lag / self._dt)
+        moving = self._moving(data)
+        later_moving = moving + (moving - self._last_moving) * (self._lag / self._dt)
         for place, (friction, N) in enumerate(zip(self._frictions, normals.tolist(), strict=True)):
             if N <= 0.0 or place not in directions:
                 continue
-            resisted = friction.resisted(directions[place], later_turning[place])
+            resisted = friction.opposed(directions[place], *later_moving[place])
             bound, rate = friction.friction * N, float(np.linalg.norm(resisted))
-            if self._dt * self._ease[place] * bound < _SLOW * rate:
+            moves = friction.bend and rate and states.events.state(friction.pressed_by) == SLIP
+            if moves or self._dt * self._ease[place] * bound < _SLOW * rate:
                 moments[place] = -bound / rate * resisted
                 continue
             moments[place] = self._stopping(data, place, directions[place], last[place], states)
@@ -150,15 +154,33 @@ class RollingResistance:
                 held_rows.append(contact_rows)
         return np.concatenate(held_rows)
 
-    def _turning(self, data: Any) -> Array:
-        """Angular velocity of the first body relative to the second, of each contact with resistance [rad/s]."""
-        return np.array([data.cvel[a, :3] - data.cvel[b, :3] for a, b in self._bodies]).reshape(-1, 3)
+    def _moving(self, data: Any) -> Array:
+        """Motion of each contact, first body against second, as :meth:`.TurningFriction.opposed` takes it, (n, 2, 3).
+
+        Angular velocity [rad/s], or of a ball whose motion is resisted the slide of one that does not turn [m/s].
+        """
+        moving = np.zeros((len(self._frictions), 2, 3))
+        for place, (friction, (a, b), ball) in enumerate(zip(self._frictions, self._bodies, self._balls, strict=True)):
+            if friction.bend:
+                centre = data.geom_xpos[ball]
+                moving[place, 1] = self._velocity(data, a, centre) - self._velocity(data, b, centre)
+            else:
+                moving[place, 0] = data.cvel[a, :3] - data.cvel[b, :3]
+        return moving
+
+    def _velocity(self, data: Any, body: int, place: Array) -> Array:
+        """Velocity of a body's material at a place [m/s]."""
+        arm = place - data.subtree_com[self._model.body_rootid[body]]
+        return np.asarray(data.cvel[body, 3:] + cross(data.cvel[body, :3], arm))
 
     def _directions(self, data: Any) -> dict[int, Array]:
-        """Normals of the contacts with resistance that MuJoCo has found, by their places in the list of frictions."""
-        places = [self._place(data, index) for index in range(data.ncon)]
-        frames = {place: data.contact[index].frame for index, place in enumerate(places) if place is not None}
-        return {place: frame[:3].copy() for place, frame in frames.items()}
+        """Normals, from b to a, of the contacts with resistance that MuJoCo has found, by their places among these."""
+        directions = dict[int, Array]()
+        for index in range(data.ncon):
+            place, contact = self._place(data, index), data.contact[index]
+            if place is not None:  # MuJoCo's normal points from its first geom to the second
+                directions[place] = self._contacts.owner(data, contact)[1] * contact.frame[:3]
+        return directions
 
     def _place(self, data: Any, index: int) -> int | None:
         """Place of one of MuJoCo's contacts among those with resistance; None: it has none."""

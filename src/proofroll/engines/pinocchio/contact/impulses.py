@@ -387,7 +387,7 @@ class ImpulseSteps:
         if not self._moments.frictions:
             return self._solved(terms, shifts, span, convex=convex)
         J, free, inverse, touching = terms
-        rows, count = self._moments.rows(self._data, touching), len(touching)
+        rows, count = self._moments.rows(self._data, touching, J), len(touching)
         bends = np.abs(self._turning(q, v, touching, span)[:, 2])  # as a curved wall turns away from a fast ball
         soft = J[:, 2] @ v >= -_SOFT * (self._gravity * span + bends)
         kicks = list[Impulses]()
@@ -399,7 +399,7 @@ class ImpulseSteps:
             sticking_rows = [np.zeros((0, len(v)))]
             for k in np.flatnonzero(sizes > 0).tolist():
                 sticking_rows.append(J[k, 2:] if kick.states[k] == SLIP else J[k])
-            return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(sticking_rows))
+            return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(sticking_rows), kick.states)
 
         moments, impulses = self._moments.found(rows, v, inverse, pressed, self.t)
         by_contact = np.zeros((count, 3))

@@ -9,7 +9,8 @@ import pinocchio as pin
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.contact.rolling_and_spin import turning_frictions
 from proofroll.elements.mechanism.contact.touching import Touching
-from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.run.contacts.step_events import SLIP, States
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, skew
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
 # Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one:
@@ -26,18 +27,20 @@ class Pressed(NamedTuple):
         v: velocities after it, (nv,).
         normal: impulse along the normal of each contact whose friction against turning acts [N s].
         held: rows that its contacts hold at zero, (rows, nv).
+        states: of all contacts.
     """
 
     v: Array
     normal: Array
     held: Array
+    states: States
 
 
 class TurningImpulses:
     """Friction against turning of all contacts.
 
     While a body turns, the moment opposes the mean of the angular velocities before and after a step; it holds what it
-    can stop within the step.
+    can stop within the step. Against the motion of a ball that slips it opposes the mean of that motion.
     """
 
     def __init__(self, tree: JointTree, tolerance: float) -> None:
@@ -45,17 +48,22 @@ class TurningImpulses:
         self._tree, self._tolerance = tree, tolerance
         self.frictions = turning_frictions(tree.mechanism.contacts)
 
-    def rows(self, data: pin.Data, touching: Sequence[Touching]) -> Array:
-        """Derivative of the resisted angular velocities by the joint velocities, (frictions, 3, nv), from ``data``."""
+    def rows(self, data: pin.Data, touching: Sequence[Touching], J: Array) -> Array:
+        """Derivatives of resisted angular velocities, and of what moments oppose, by joint velocities, from ``data``.
+
+        (2, frictions, 3, nv); ``J``: those of the slides, along the normals' :func:`frame_of_axis`, (contacts, 3, nv).
+        """
         index, model = self._tree.mechanism.body_index, self._tree.model
-        rows = np.zeros((len(self.frictions), 3, model.nv))
+        rows = np.zeros((2, len(self.frictions), 3, model.nv))
         for k, friction in enumerate(self.frictions):
-            contact = self._tree.mechanism.contacts[friction.pressed_by]
+            contact, normal = self._tree.mechanism.contacts[friction.pressed_by], touching[friction.pressed_by].normal
             for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
                 if index[body] >= 0:
                     frame = self._tree.body[index[body]]
-                    rows[k] += sign * pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[3:]
-            rows[k] = friction.resisted(touching[friction.pressed_by].normal, rows[k])
+                    rows[0, k] += sign * pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[3:]
+            rows[0, k] = friction.resisted(normal, rows[0, k])
+            slides = frame_of_axis(normal) @ J[friction.pressed_by]
+            rows[1, k] = rows[0, k] + friction.bend * skew(normal) @ slides
         return rows
 
     def found(
@@ -73,16 +81,17 @@ class TurningImpulses:
         Raises:
             Diverged: the iterations do not settle.
         """
-        moments, impulses = np.zeros((len(rows), 3)), np.zeros(len(v))
+        moments, impulses = np.zeros((len(self.frictions), 3)), np.zeros(len(v))
         for _ in range(_MOST):
             outcome, last = pressed(impulses), moments.copy()
             bounds = np.array([friction.friction for friction in self.frictions]) * outcome.normal
-            for k, (row, bound) in enumerate(zip(rows, bounds, strict=True)):
+            for k, (row, opposed, bound) in enumerate(zip(*rows, bounds, strict=True)):
                 moments[k] += _stopping(row, inverse, outcome)
-                if np.linalg.norm(moments[k]) > bound:
-                    turning = row @ (v + outcome.v)
+                moves = self.frictions[k].bend and outcome.states[self.frictions[k].pressed_by] == SLIP
+                if moves or np.linalg.norm(moments[k]) > bound:
+                    turning = opposed @ (v + outcome.v)
                     moments[k] = -bound * turning / (float(np.linalg.norm(turning)) or 1.0)
-            impulses = np.einsum("kin,ki->n", rows, moments)
+            impulses = np.einsum("kin,ki->n", rows[0], moments)
             if np.abs(moments - last).max() <= _SETTLED * self._tolerance * bounds.max():
                 return moments, impulses
         raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")

@@ -37,7 +37,9 @@ from proofroll.elements.mechanism.contact.modes import (
 from proofroll.elements.mechanism.contact.rolling_and_spin import (
     TurningFriction,
     moments_by_pressing,
+    opposed_rates,
     pressed_by,
+    require_moving,
     shut_by_pressing,
     turning_frictions,
 )
@@ -231,7 +233,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
         def rate(heading: Array) -> Array:
             rates = instant.slide_rate(self._forces_against(instant, mode, {**headings, k: heading}))
-            return np.asarray(rates[k])
+            return np.asarray(opposed_rates(self.contacts, instant.touching, rates)[k])
 
         return rate
 
@@ -400,6 +402,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             resting = [stuck or number == k or slips[number] <= self._faint for number, stuck in enumerate(resting)]
         if kind == EventKind.SLIP:
             mode = leaving(old_mode, k, self.forces(instant, old_mode)[k], instant.touching[k].normal)
+            require_moving(self.contacts, mode, self.t)
         else:
             mode = self._decided(instant, closed_mask, resting)
         if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped
@@ -485,7 +488,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             if self._presses[k]:
                 c[3 * place] += point.normal_rate @ point.slide
             slip = frame[:, 1:].T @ point.slide
-            sliding.append(slip / np.linalg.norm(slip) if self._rubs[k] and not resting[k] else None)
+            sliding.append(slip / np.linalg.norm(slip) if self._rubs[k] and slip.any() and not resting[k] else None)
         G = J @ response
         force, done = self._law(G, c, which, sliding)
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):

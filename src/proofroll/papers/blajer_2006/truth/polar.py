@@ -22,8 +22,9 @@ from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates, s
 from proofroll.papers.blajer_2006.truth.explicit import ExplicitRun, Rates
 from proofroll.papers.blajer_2006.truth.sliding import End, Sliding
 from proofroll.papers.blajer_2006.truth.taylor import SlidingTaylor
-from proofroll.papers.blajer_2006.truth.taylor_model import HALT
 
+# Span of the central differences of the drive, in natural times.
+_SPAN = 1e-4
 _Stop = tuple[End, Callable[[FloatArray], float]]
 
 
@@ -79,7 +80,7 @@ class Polar(Sliding):
 
     def _grown(self, time: float, state: FloatArray, until: float) -> float:
         strength, change = self._pull(state)
-        pace = min(strength / change if change > 0 else np.inf, until - time, self._turning_back(state))
+        pace = min(strength / change if change > 0 else np.inf, until - time)
         # A slip must grow by more than the round-off of the time resolves.
         return float(max(self._handover * strength * pace, 64 * strength * np.spacing(time), np.finfo(float).tiny))
 
@@ -98,7 +99,6 @@ class Polar(Sliding):
         stops: tuple[_Stop, ...] = (
             (End.TIME, lambda y: y[7] - until),
             (End.STILL, lambda y: floor - y[5]),
-            *([(End.HALT, self._halting)] if self._body.contact.rolling_resistance else []),
         )
 
         def ended(solver: Any) -> tuple[float, FloatArray, End] | None:
@@ -107,12 +107,6 @@ class Polar(Sliding):
 
         return ExplicitRun(self._slipping, 0.0, start_state, np.inf, atol=self._atol, ended=ended)
 
-    def _halting(self, y: FloatArray) -> float:
-        """Rises through zero where a ball that slips all but stops rolling [m²/s²]."""
-        v = self._body.surface.frame(y[:2]).T[1:] @ (self._body.surface.tangents(y[:2]) @ y[2:4])
-        rolling = v - np.exp(y[5]) * np.array([np.cos(y[6]), np.sin(y[6])])
-        return float(HALT**2 * (v @ v) - rolling @ rolling)
-
     def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
         """Drive b along e2, e3 [m/s²], shape (2,), and normal force N [N]."""
         return self._with_slip(y, 0.0, 0.0)[1:3]
@@ -120,25 +114,9 @@ class Polar(Sliding):
     def _pull(self, y: FloatArray) -> tuple[float, float]:
         """Magnitudes of the drive b and of ḃ while sticking; ḃ by a central difference, as it only sets a scale."""
         rates = self.rates(y)
-        span = self._span(y)
+        span = _SPAN * self._pace
         b_rate = (self._drive(y + span * rates)[0] - self._drive(y - span * rates)[0]) / (2 * span)
         return float(np.linalg.norm(self._drive(y)[0])), float(np.linalg.norm(b_rate))
-
-    def _turning_back(self, y: FloatArray) -> float:
-        """Time in which gravity and friction would stop the centre [s], where rolling resistance reverses."""
-        contact, body = self._body.contact, self._body
-        if not contact.rolling_resistance:
-            return np.inf
-        frame, tangents = body.surface.frame(y[:2]), body.surface.tangents(y[:2])
-        speed = float(np.linalg.norm(tangents @ y[2:4]))
-        strength = float(np.linalg.norm(frame.T[1:] @ body.gravity)) + contact.mu_kinetic * abs(self._drive(y)[1]) / (
-            body.ball.mass
-        )
-        return speed / strength if speed > 0 and strength > 0 else np.inf
-
-    def _span(self, y: FloatArray) -> float:
-        """Time span of the central differences of the drive [s]: short if the centre is about to stop."""
-        return min(1e-4 * self._pace, 0.1 * self._turning_back(y))
 
     def _with_slip(self, y: FloatArray, size: float, phi: float) -> tuple[FloatArray, FloatArray, float, float]:
         """Rates of (u, u̇, ω1), drive b, N and ė2 · e3 for a slip of ``size`` [m/s] in the direction ``phi`` [rad]."""
@@ -155,11 +133,10 @@ class Polar(Sliding):
         N = m * (turn2 * v2 + turn3 * v3 + g1)
         spin = a * float(y[4])
         c, s = math.cos(phi), math.sin(phi)
-        rolling2, rolling3 = v2 - size * c, v3 - size * s
-        speed, grip = math.hypot(rolling2, rolling3), self._mu_k * N / m
+        speed, grip = math.hypot(v2, v3), self._mu_k * N / m
         ahead = f * N / (kappa * m * a * speed) if f and speed > 0 else 0.0
         # e1 × (x, y) = (-y, x)
-        b = np.array([g2 - spin * turn3 + ahead * rolling2, g3 + spin * turn2 + ahead * rolling3])
+        b = np.array([g2 - spin * turn3 + ahead * v2, g3 + spin * turn2 + ahead * v3])
         u_second = inverse @ (np.array([g2 - grip * c, g3 - grip * s]) - across @ (bending @ y[2:4]))
         w2, w3 = (v3 - size * s) / a, (size * c - v2) / a  # e1 × (u - v) / a
         rates = np.array([du2, du3, *u_second.tolist(), w2 * turn2 + w3 * turn3])
@@ -180,21 +157,17 @@ class Polar(Sliding):
         return self._following(state)[1]
 
     def _following(self, y: FloatArray) -> tuple[FloatArray, float]:
-        """Rates of (u, u̇, ω1, |u|) and φ of the slaved slip, where φ - φ_b = -(|u| φ̇_b - b'·n) / (|b| + d|u|/dt).
-
-        b': the drive of that slip, whose resistance is against the rolling alone; n: across b.
-        """
+        """Rates of (u, u̇, ω1, |u|) and φ of the slaved slip, where φ - φ_b = -|u| φ̇_b / (|b| + d|u|/dt)."""
         b, N = self._drive(y)
         grip = self._A * self._body.contact.mu_kinetic * N
         phi, size, strength = float(np.arctan2(b[1], b[0])), float(y[5]), float(np.linalg.norm(b))
-        leading, slipping, _, turning = self._with_slip(y, size, phi)
-        across = float(slipping[1] * np.cos(phi) - slipping[0] * np.sin(phi))
-        span = self._span(y)
+        leading, _, _, turning = self._with_slip(y, size, phi)
+        span = _SPAN * self._pace
         change = (self._drive(y[:5] + span * leading)[0] - self._drive(y[:5] - span * leading)[0]) / (2 * span)
         rotation = float(b[0] * change[1] - b[1] * change[0]) / strength**2 + turning
-        phi -= (size * rotation - across) / (2 * strength - grip)
-        rates, slipping, _, _ = self._with_slip(y, size, phi)
-        return np.append(rates, slipping @ (np.cos(phi), np.sin(phi)) - grip), phi
+        delta = -size * rotation / (2 * strength - grip)
+        rates = self._with_slip(y, size, phi + delta)[0]
+        return np.append(rates, strength * np.cos(delta) - grip), phi + delta
 
     def _stood_still(self, last: FloatArray) -> FloatArray:
         rates = self._slipping(last)

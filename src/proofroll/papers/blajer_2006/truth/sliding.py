@@ -26,7 +26,6 @@ class End(Enum):
     TIME = auto()  # the time limit was reached
     CONE = auto()  # sticking: the needed friction left the static cone
     STILL = auto()  # slipping: the contact point stopped
-    HALT = auto()  # slipping with rolling resistance: the rolling all but stopped
     GROWN = auto()  # of the start of a slip, never of a stretch: its direction can be integrated from here on
 
 

@@ -18,10 +18,6 @@ from proofroll.truth.numerics.hybrid import Transition
 
 # Relative distance from the friction cone below which round-off (1e-15) decides on which side a state is.
 _ON_CONE = 1e-12
-# Successive slips that are followed when each is shorter than the one before by more than the fraction _SHORTER; each
-# costs a search for the place where the rolling resistance changes direction.
-_REVERSALS = 10
-_SHORTER = 1e-6
 
 
 @dataclass(frozen=True)
@@ -43,8 +39,10 @@ def follow(body: RollingBall, route: Sliding, until: float) -> Path:
     """Path from time 0 to ``until`` [s], or to an earlier time from which the motion is not known.
 
     Raises:
-        Refused, Diverged: no motion is known from time 0 on.
+        Refused, Diverged: no motion is known from time 0 on, or rolling resistance is against turning.
     """
+    if body.contact.rolling_resistance and body.contact.against == "turning":
+        raise Refused('the article has its resistance against the motion of the centre; set against = "motion"')
     path = hybrid.follow(SwitchedBall(body, route), until)
     return Path(list(path.stretches), [(event.kind, event.time) for event in path.happenings], path.ended)
 
@@ -54,7 +52,6 @@ class SwitchedBall:
 
     def __init__(self, body: RollingBall, route: Sliding) -> None:
         self.body, self.route = body, route
-        self._reversals, self._spans = 0, (0.0, 0.0)  # durations of the last two stretches [s]
 
     def begin(self) -> Transition[bool]:
         """See the protocol."""
@@ -65,24 +62,11 @@ class SwitchedBall:
 
     def walk(self, time: float, state: FloatArray, mode: bool, until: float) -> BallStretch:
         """See the protocol."""
-        stretch = (self.route.stick if mode else self.route.slip)(time, state, until)
-        self._spans = self._spans[1], stretch.end - stretch.start
-        return stretch
+        return (self.route.stick if mode else self.route.slip)(time, state, until)
 
     def change(self, stretch: BallStretch) -> Transition[bool]:
         """See the protocol."""
         state = stretch.state
-        if stretch.why is End.HALT:
-            raise Refused(f"at {stretch.end:.6g} s the ball slips and all but stops rolling: resistance turns round")
-        last_span, span = self._spans
-        hastens = stretch.why is End.STILL and not stretch.sticking and span < (1 - _SHORTER) * last_span
-        self._reversals = self._reversals + 1 if hastens else 0
-        if self._reversals > _REVERSALS:
-            raise Refused(
-                f"from about {stretch.end:.6g} s on the ball slips to and fro ever faster: resistance stops the "
-                "rolling before friction stops the centre; "
-                "end the run earlier, or take more friction or less resistance"
-            )
         # At |u| = 0 the ball sticks if the needed friction is inside the cone; otherwise it goes on slipping.
         slips = stretch.why is End.CONE or _must_slip(self.body, self.route, state)
         if slips != stretch.sticking:

@@ -18,7 +18,7 @@ from proofroll.papers.blajer_2006.truth.taylor_model import TaylorModel, model
 # Reasons for an end, in the order of the integrators' events.
 _STICK_ENDS = (End.CONE,)
 _CREEP_ENDS = (End.GROWN, End.STILL)
-_SLIP_ENDS = (End.STILL, End.TIME, End.HALT)
+_SLIP_ENDS = (End.STILL, End.TIME)
 _LARGEST = 1e6  # largest friction coefficient: more than any motion needs, and its square still counts
 _TIME_LIMIT = -(2**32) - 3  # heyoka's taylor_outcome.time_limit
 

@@ -11,8 +11,6 @@ from typing import Any
 from proofroll.papers.blajer_2006.ball.compiled.rolling import PARAMETERS as SHARED
 from proofroll.papers.blajer_2006.ball.compiled.rolling import Function, expressions
 
-# Part of its speed with which a ball that slips still rolls where its resistance has no direction any more.
-HALT = 1e-3
 # Run-time parameters of all integrators and functions, in this order. Each uses a leading part of them.
 PARAMETERS = (*SHARED, "mu_k", "mu_s", "limit", "t_end")
 
@@ -26,7 +24,7 @@ class TaylorModel:
         creep: (q, h, v2, v3, ω1, |u|) over t with the direction of slip slaved to the drive; stops where |u|
             reaches the parameter ``limit`` or returns to zero.
         slip: (q, h, v2, v3, ω1, ln |u|, φ, t) over τ with dt = |u| dτ; stops where ln |u| falls to ``limit``, where
-            t reaches ``t_end`` or, with rolling resistance, where the rolling all but stops.
+            t reaches ``t_end``.
         drive: (q, h, v2, v3, ω1) -> b2, b3, |ḃ| while sticking, N; compiled function.
         rates: (q, h, v2, v3, ω1) -> their rates while sticking; compiled function.
         direction: (q, h, v2, v3, ω1, |u|) -> φ of the slaved slip; compiled function.
@@ -69,32 +67,24 @@ def _compiled(resistance: bool) -> TaylorModel:
         # opt_level=0: optimised code takes ten times as long to compile, which no run earns back
         return hy.taylor_adaptive(system, [1.0] * len(system), t_events=events, opt_level=0)
 
-    # Slaved direction: the angle between u and b is δ = -|u| (φ̇_b - β) / (|b| + d|u|/dt); β |u|: part across b by which
-    # the slip turns the resistance.
+    # Slaved direction: the angle between u and b is δ = -|u| φ̇_b / (|b| + d|u|/dt).
     strength = hy.sqrt(b2**2 + b3**2)
     c, s = b2 / strength, b3 / strength
     leading = rates(-mu_k * N * c, -mu_k * N * s, size * s)
     turning = (b2 * derivative_along(b3, leading) - b3 * derivative_along(b2, leading)) / strength**2
     net = strength - A * mu_k * N
-    across = 0.0
-    if equations.lever is not None:
-        across = equations.lever * (v3 * c - v2 * s) * (v2 * c + v3 * s) / (v2**2 + v3**2) ** 1.5
-    delta = -size * (turning - across) / (strength + net)
+    delta = -size * turning / (strength + net)
     c_slip, s_slip = c - delta * s, s + delta * c  # δ² is below round-off before the handover
-    b2_slip, b3_slip = equations.slipping(size * c_slip, size * s_slip)
     creeping = [
         *rates(-mu_k * N * c_slip, -mu_k * N * s_slip, size * s_slip),
-        (size, b2_slip * c_slip + b3_slip * s_slip - A * mu_k * N),
+        (size, strength * hy.cos(delta) - A * mu_k * N),
     ]
 
     speed, cos, sin = hy.exp(y), hy.cos(phi), hy.sin(phi)
-    rolling_speed = (v2 - speed * cos) ** 2 + (v3 - speed * sin) ** 2
-    halts = [hy.t_event(rolling_speed - HALT**2 * (v2**2 + v3**2), direction=down)] if resistance else []
-    b2_slip, b3_slip = equations.slipping(speed * cos, speed * sin)
     slipping = [
         *((x, speed * x_rate) for x, x_rate in rates(-mu_k * N * cos, -mu_k * N * sin, speed * sin)),
-        (y, b2_slip * cos + b3_slip * sin - A * mu_k * N),
-        (phi, b3_slip * cos - b2_slip * sin),
+        (y, b2 * cos + b3 * sin - A * mu_k * N),
+        (phi, b3 * cos - b2 * sin),
         (t, speed),
     ]
     return TaylorModel(
@@ -104,7 +94,7 @@ def _compiled(resistance: bool) -> TaylorModel:
         ),
         slip=integrator(
             slipping,
-            [hy.t_event(y - limit, direction=down), hy.t_event(t - t_end, direction=up), *halts],
+            [hy.t_event(y - limit, direction=down), hy.t_event(t - t_end, direction=up)],
         ),
         drive=Function([b2, b3, hy.sqrt(b_rate[0] ** 2 + b_rate[1] ** 2), N], [q, h, v2, v3, w1]),
         direction=Function([hy.atan2(s_slip, c_slip)], [q, h, v2, v3, w1, size]),

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.truth.check.laws.integrals import dot, norm
+from proofroll.truth.check.laws.integrals import dot, norm, turned
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Pieces
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
@@ -145,6 +145,18 @@ def _presses(pieces: Pieces, residuals: LawResiduals, touch: ClosedContact, larg
         residuals.note("cone", contact.name, excess, largest, pieces.time)
 
 
+def rolling_of(contact: PairContact, pieces: Pieces, k: int, relative: Array) -> Array:
+    """Rolling that resistance opposes [rad/s]: of the ``relative`` angular velocity, or as a ball's centre moves."""
+    normal = pieces.normal[..., k, :]
+    if contact.pair.against == "turning":
+        return relative - dot(normal, relative)[..., None] * normal
+    first = contact.solid_a.kind == "sphere"
+    ball, body = (contact.solid_a, contact.a) if first else (contact.solid_b, contact.b)
+    centre = pieces.p[..., body, :] + turned(pieces.R[..., body, :, :], ball.centre)
+    sign = 1.0 if first else -1.0
+    return np.asarray(np.cross(normal, slide_of(contact, pieces, centre)) * (sign / ball.radius))
+
+
 def _turning(
     scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: BodyLoads, closed: tuple[ClosedContact, Array]
 ) -> None:
@@ -155,8 +167,9 @@ def _turning(
     normal, relative = pieces.normal[..., k, :], pieces.w[..., a, :] - pieces.w[..., b, :]
     spin = dot(normal, relative)[..., None] * normal
     quick = scene.rate + norm(pieces.w[..., a, :]) + norm(pieces.w[..., b, :])
+    rolling = rolling_of(contact, pieces, k, relative)
     for size, part, moments, modes in (
-        (contact.pair.rolling_resistance, relative - spin, pieces.rolling, pieces.modes.rolling),
+        (contact.pair.rolling_resistance, rolling, pieces.rolling, pieces.modes.rolling),
         (contact.pair.spinning_friction, spin, pieces.spinning, pieces.modes.spinning),
     ):
         if not size:

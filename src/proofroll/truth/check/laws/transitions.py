@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.check.laws.contacts import gap_of, slide_of
+from proofroll.truth.check.laws.contacts import gap_of, rolling_of, slide_of
 from proofroll.truth.check.laws.impacts import impact
 from proofroll.truth.check.laws.integrals import dot, norm
 from proofroll.truth.check.laws.joints import Coordinates
@@ -82,9 +82,9 @@ def _of_contacts(scene: LawScene, pieces_before: Pieces, pieces_after: Pieces) -
         ):
             if old_mode == new_mode or "open" in {old_mode, new_mode}:
                 continue
-            relative = pieces_before.w[0, 0, contact.a] - pieces_before.w[0, 0, contact.b]
-            spin = (normal @ relative) * normal
-            part = float(norm(spin if law == "spin" else relative - spin))
+            relative = pieces_before.w[..., contact.a, :] - pieces_before.w[..., contact.b, :]
+            spin = (normal @ relative[0, 0]) * normal
+            part = float(norm(spin if law == "spin" else rolling_of(contact, pieces_before, k, relative)[0, 0]))
             quick = scene.rate + float(np.abs(pieces_before.w).max())
             excess = abs(float(norm(moment)) - turning * pressed) / (turning * largest)
             yield contact.name, part / quick if new_mode == "stick" else excess

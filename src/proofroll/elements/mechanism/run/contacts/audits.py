@@ -48,7 +48,8 @@ def energy_balance(body: BodyOnWall, dataset: xr.Dataset) -> FloatArray:
     if f:
         e1 = body.surface.normal(dataset["p_WB"].to_numpy())
         rests = not np.all(np.any(dataset["v_WB"].to_numpy(), axis=-1))
-        moment = body.resisting(dataset["N"].to_numpy(), e1, *(dataset[name].to_numpy() for name in ("v_WB", "w_WB")))
+        motion = (dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
+        moment = body.resisting(dataset["N"].to_numpy(), e1, *motion)
         power -= np.einsum("ti,ti->t", moment, dataset["w_WB"].to_numpy())
     if body.wall_rate is not None:
         p_WB = dataset["p_WB"].to_numpy()

@@ -110,11 +110,14 @@ class BodyOnWall:
         """A variable of all bodies, for the ball alone, shape (time, ...)."""
         return np.asarray(dataset[name].to_numpy()[:, self.index])
 
-    def resisting(self, N: FloatArray, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:  # noqa: ARG002 -- the protocol's
-        """Moment against turning relative to the wall, about axes along it; of a ball that slips, too [N m]."""
-        turning = w_WB if self.wall_rate is None else w_WB - self.wall_rate
-        # Turned by a right angle, it is the velocity with which a ball that rolls moves relative to its wall.
-        return resistance_moment(self.contact.rolling_resistance, N, e1, cross(e1, turning))
+    def resisting(
+        self, N: FloatArray, e1: FloatArray, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray
+    ) -> FloatArray:
+        """Moment of the rolling resistance, of a ball that slips, too [N m]; both motions are relative to the wall."""
+        rate = np.zeros(3) if self.wall_rate is None else self.wall_rate
+        # Turned by a right angle, turning is the velocity with which a ball that rolls moves relative to its wall.
+        moving = cross(e1, w_WB - rate) if self.contact.against == "turning" else v_WB - cross(rate, p_WB)
+        return resistance_moment(self.contact.rolling_resistance, N, e1, moving)
 
 
 def body_on_wall(mechanism: Mechanism, local: LocalStart) -> BodyOnWall | None:
@@ -173,6 +176,7 @@ def _law(contact: BodyContact, ball: str, wall: str) -> Contact:
         body=ball,
         surface=wall,
         rolling_resistance=contact.rolling_resistance,
+        against=contact.against,
         mu_static=contact.static,
         mu_kinetic=contact.friction,
         restitution=contact.restitution,

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Literal, cast
+from typing import ClassVar, Literal, cast, get_args
 
 import numpy as np
 from typing_extensions import override
@@ -14,7 +14,7 @@ from typing_extensions import override
 from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism.scene import checks, rotations
-from proofroll.elements.mechanism.scene.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Vector, Z
+from proofroll.elements.mechanism.scene.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Against, Vector, Z
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.box_features import BoxSlot
 from proofroll.elements.mechanism.scene.shapes.capsule_box import CapsuleBoxSlot
@@ -249,6 +249,8 @@ class Pair:
             as far as friction allows, from -1 to 1; 0: without slip.
         rolling_resistance: largest moment against rolling over the normal force [m].
         spinning_friction: largest moment against spin about the normal over the normal force [m].
+        against: law of rolling resistance where the pair slips: against the ``turning`` of the bodies, or against the
+            ``motion`` of a ball's centre over a plane or a curved wall; while a ball rolls both are one.
     """
 
     name: str
@@ -259,6 +261,7 @@ class Pair:
     tangential_restitution: float = field(default=0.0, metadata=RATIO)
     rolling_resistance: float = field(default=0.0, metadata=METRES)
     spinning_friction: float = field(default=0.0, metadata=METRES)
+    against: Against = "turning"
 
     def __post_init__(self) -> None:
         where = f"pairs.{checks.name(self.name, 'pairs')}"
@@ -267,6 +270,7 @@ class Pair:
         checks.assign(self, geometries=tuple(self.geometries))
         checks.read(self, where, checks.number, "friction", at_least=0, bounded=False)
         checks.read(self, where, checks.number, "rolling_resistance", "spinning_friction", at_least=0)
+        require_known(f"{where}.against", self.against, get_args(Against))
         checks.read(self, where, checks.number, "restitution", at_least=0)
         if self.restitution > 1:
             advice = "no impact returns more than it takes; give 0 to 1"
@@ -307,6 +311,7 @@ class BodyContact:
         static_friction: coefficient while it sticks; None: the same.
         tangential_restitution: of the pair.
         rolling_resistance, spinning_friction: of the pair [m].
+        against: see :class:`Pair`.
         slot: number among the contacts of two boxes, or of a box and a capsule.
         bound: largest friction without a normal force; always 0 between bodies [N].
         presses: True, as it has a normal force.
@@ -328,12 +333,22 @@ class BodyContact:
     tangential_restitution: float = 0.0
     rolling_resistance: float = 0.0
     spinning_friction: float = 0.0
+    against: Against = "turning"
     slot: int = 0
 
     @property
     def static(self) -> float:
         """Coefficient of the contact while it sticks."""
         return self.friction if self.static_friction is None else self.static_friction
+
+    @property
+    def bend(self) -> float:
+        """1 over the radius of a ball whose motion is resisted, negative if it is of body b [1/m]; 0: turning is."""
+        if self.against == "turning":
+            return 0.0
+        shape, sign = (self.shape_a, 1.0) if isinstance(self.shape_a, SphereShape) else (self.shape_b, -1.0)
+        assert isinstance(shape, SphereShape)  # by `require_rule`
+        return sign / shape.radius
 
     @cached_property
     def features(self) -> SolidFeatures | None:
@@ -401,6 +416,7 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
                     tangential_restitution=pair.tangential_restitution,
                     rolling_resistance=pair.rolling_resistance,
                     spinning_friction=pair.spinning_friction,
+                    against=pair.against,
                     slot=number - 1,
                 )
             )

@@ -41,6 +41,9 @@ def require_rule(key: str, pair: Pair, a: Geometry, b: Geometry) -> None:
     if kinds & {"box", "cylinder"} and any(not ball.radius for ball in balls):
         raise InputError(key, pair.geometries, "a point has no direction from an edge; give the sphere a radius")
     _require_one_place(pair, kinds)
+    if pair.against == "motion" and not (kinds & {"plane", *CURVED} and any(ball.radius for ball in balls)):
+        advice = "only a sphere moves over a plane or a curved wall with its centre; leave it out, or give turning"
+        raise InputError(f"pairs.{pair.name}.against", pair.against, advice)
 
 
 def _require_one_place(pair: Pair, kinds: set[GeometryKind]) -> None:

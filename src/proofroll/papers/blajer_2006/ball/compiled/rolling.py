@@ -4,7 +4,7 @@ The surface bends along the arc length q only, with the curvature k = 1/c, and g
 and height h [m], velocities v2, v3 of the centre [m/s], ω1 [rad/s]; all forces are divided by the mass. With κ =
 J/(m a²), A = (1 + κ)/κ and the drive
 
-    b = g + a ω1 e1 × ė1 + (f N / (κ a)) (v - u)/|v - u|
+    b = g + a ω1 e1 × ė1 + (f N / (κ a)) v/|v|
 
 the slip velocity u obeys u̇ = A F + b, whether the ball slips (F = -μk N u/|u|) or sticks (F = -b/A).
 
@@ -36,8 +36,7 @@ class Expressions:
         swing: k/a [1/m²].
         A, per_A: (1 + κ)/κ [1] and its inverse.
         g: gravity along the axis [m/s²].
-        b2, b3: drive without slip [m/s²].
-        lever: f N/(κ a) [m/s²]; None without rolling resistance.
+        b2, b3: drive [m/s²].
         N: normal force over mass [m/s²].
     """
 
@@ -48,7 +47,6 @@ class Expressions:
     g: Any
     b2: Any
     b3: Any
-    lever: Any
     N: Any
 
     def rates(self, F2: Any, F3: Any, u3: Any = 0.0) -> list[tuple[Any, Any]]:
@@ -56,17 +54,6 @@ class Expressions:
         q, h, v2, v3, w1 = self.state
         turning = self.swing * (v3 - u3) * v2
         return [(q, v2), (h, v3), (v2, F2), (v3, self.g + F3), (w1, turning)]
-
-    def slipping(self, u2: Any, u3: Any) -> tuple[Any, Any]:
-        """Drive b of a contact point that slips with the velocity u [m/s]: resistance is against the rolling alone."""
-        import heyoka as hy
-
-        if self.lever is None:
-            return self.b2, self.b3
-        _, _, v2, v3, _ = self.state
-        r2, r3 = v2 - u2, v3 - u3
-        speed, rolling = hy.sqrt(v2**2 + v3**2), hy.sqrt(r2**2 + r3**2)
-        return self.b2 + self.lever * (r2 / rolling - v2 / speed), self.b3 + self.lever * (r3 / rolling - v3 / speed)
 
     def rolling(self) -> list[tuple[Any, Any]]:
         """(variable, rate) pairs of rolling without slip."""
@@ -100,7 +87,6 @@ def expressions(resistance: bool) -> Expressions:
         g=g,
         b2=per_speed * v2,
         b3=g + back * w1 * v2 + per_speed * v3,
-        lever=lever * N if resistance else None,
         N=N,
     )
 

@@ -20,6 +20,7 @@ from proofroll.core.time_grid import off_grid
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.run.contacts.audits import energy_balance, force_audit, rate_audit
 from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall
+from proofroll.elements.mechanism.run.contacts.stretches import with_sticking
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.mechanics import natural_acceleration
@@ -52,6 +53,17 @@ def test_energy_balance_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     lost = float(dataset["energy"][0] - dataset["energy"][-1])
     assert lost > 0.1
     assert largest(energy_balance(on_wall(scene), of_ball(dataset))) < 1e-9 * lost
+
+
+def test_energy_balance_of_a_resisted_slip() -> None:
+    """While a ball slips the balance counts the resistance by the law that its contact names, and by no other."""
+    scene = load_scene("slide_to_roll", speed=1.0, back_spin=60.0, rolling_resistance=5e-4)
+    body, found = on_wall(scene), truth(scene, np.linspace(0, 0.3, 61))
+    dataset = of_ball(with_sticking(body, found))
+    other = dataclasses.replace(body, contact=dataclasses.replace(body.contact, against="turning"))
+    lost = float(dataset["energy"][0] - dataset["energy"][-1])
+    assert largest(energy_balance(body, dataset)) < 1e-3 * lost
+    assert largest(energy_balance(other, dataset)) > 0.05 * lost
 
 
 def test_energy_balance_sees_lost_energy(case: tuple[Scene, xr.Dataset]) -> None:
