@@ -106,5 +106,5 @@ def _where_contacts_act(element: MechanismElement, values: Mapping[str, Array]) 
 
 def _turning(contacts: tuple[object, ...], count: int, name: str) -> Array:
     """Moments of contacts, (samples, 1, contacts, 3): NaN of those that have one."""
-    given = np.array([bool(getattr(contact, name, 0.0)) for contact in contacts], dtype=bool).reshape(-1, 1)
-    return np.broadcast_to(np.where(given, np.nan, 0.0), (count, 1, len(contacts), 3)).copy()
+    mask = np.array([bool(getattr(contact, name, 0.0)) for contact in contacts], dtype=bool).reshape(-1, 1)
+    return np.broadcast_to(np.where(mask, np.nan, 0.0), (count, 1, len(contacts), 3)).copy()

@@ -321,7 +321,7 @@ class _SmoothTruth:
         """Ends the truth where velocities of a closed form are not the rates of its places.
 
         Raises:
-            Refused: they are not from the start.
+            Refused: the velocities are wrong from the start.
         """
         residuals = LawResiduals(rate=1 / self._units.time)
         spans = [(start, start + _FORM_SPAN) for start in (0.0, self._until / 2)]

@@ -37,9 +37,9 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
         least = _STRUCK + _GROWTH * scene.rate * max(begin - end, 0.0)
         if jump > least and not any(item.jumps for item in near):
             residuals.note("change", "a jump of velocities", np.ones((1, 1)), 1.0, time)
-        changed = _changed(scene, tiles.modes[number], tiles.modes[number + 1])
-        if changed and not any(_of(item.name, name) for item in near for name in changed):
-            residuals.note("change", min(changed), np.ones((1, 1)), 1.0, time)
+        names = _changed(scene, tiles.modes[number], tiles.modes[number + 1])
+        if names and not any(_of(item.name, name) for item in near for name in names):
+            residuals.note("change", min(names), np.ones((1, 1)), 1.0, time)
         for item in near:
             _at_impact(scene, tiles, residuals, item, number, jump > least)
     for item in published.changes:
@@ -65,23 +65,23 @@ def _summed(scene: LawScene, changes: Sequence[PublishedEvent], item: PublishedE
     return 2 * float(spans[1]) * ratio / (1 - ratio)
 
 
-def _of(event: str, changed: str) -> bool:
-    """True if an event of a pair or joint is that of what has changed, which may be one of several places."""
-    return changed == event or changed.startswith(f"{event}.")
+def _of(event: str, place: str) -> bool:
+    """True if an event of a pair or joint is that of a place, which may be one of several."""
+    return place == event or place.startswith(f"{event}.")
 
 
 def _changed(scene: LawScene, sooner: Modes, later: Modes) -> set[str]:
     """Names of contacts and joints whose modes differ."""
     places = zip(scene.contacts, sooner.contacts, later.contacts, strict=True)
-    changed = {contact.name for contact, mode, next_mode in places if mode != next_mode}
+    names = {contact.name for contact, mode, next_mode in places if mode != next_mode}
     for number, joint in enumerate(scene.mechanism.joints):
         modes = [(item.friction[number], item.stops[number]) for item in (sooner, later)]
-        changed |= {joint.name} if modes[0] != modes[1] else set()
-    return changed
+        names |= {joint.name} if modes[0] != modes[1] else set()
+    return names
 
 
 def _at_impact(
-    scene: LawScene, tiles: Tiles, residuals: LawResiduals, item: PublishedEvent, number: int, struck: bool
+    scene: LawScene, tiles: Tiles, residuals: LawResiduals, item: PublishedEvent, number: int, jumps: bool
 ) -> None:
     """A contact that is struck has no gap, and velocities jump."""
     if not item.strikes:
@@ -91,7 +91,7 @@ def _at_impact(
             gap = abs(_last_gap(scene, tiles, contact.name, number))
             far = scene.length + float(np.abs(tiles.p[number, -1]).max())
             residuals.note("gap", item.name, np.array([[gap]]), far, np.array([[item.time]]))
-            if not struck:
+            if not jumps:
                 residuals.note("change", item.name, np.ones((1, 1)), 1.0, np.array([[item.time]]))
 
 

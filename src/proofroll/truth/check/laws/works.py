@@ -26,7 +26,7 @@ def works_follow(
     names = [name for name in published.values if name.startswith("work.")]
     if not names:
         return
-    control, along = scene.mechanism.control, published.bars
+    control, bars = scene.mechanism.control, published.bars
     natural = scene.mass.sum() * scene.speed**2
     for data in scene.mechanism.actuators:
         if control is not None and data.name in control.actuators:
@@ -34,10 +34,10 @@ def works_follow(
         number = scene.mechanism.joint_index[data.joint]
         rate = _rates(scene, tiles, number)[0]
         force = law_of(data, value_of(data.target, tiles.time), turns[number, 0], rate)
-        own, size = (_summed(values, tiles) for values in (force * rate, np.abs(force * rate)))
+        work, size = (_summed(values, tiles) for values in (force * rate, np.abs(force * rate)))
         name = f"work.effort.{data.name}"
         _note(
-            name, (published.values[name], places.at(own), natural + places.at(size)), published, residuals, along[name]
+            name, (published.values[name], places.at(work), natural + places.at(size)), published, residuals, bars[name]
         )
     if any({"slip", SPREAD} & {*mode.contacts, *mode.rolling, *mode.spinning} for mode in tiles.modes):
         return
@@ -47,20 +47,20 @@ def works_follow(
     loads = BodyLoads(scene, tiles)
     power, size = loads.power + 0.0, loads.power_size + 0.0
     for number in range(len(scene.mechanism.joints)):
-        given = _passive_power(scene, tiles, turns, number)
-        power, size = power + given, size + np.abs(given)
-    own = energy - energy[0, 0] - _summed(power, tiles)
+        joint_power = _passive_power(scene, tiles, turns, number)
+        power, size = power + joint_power, size + np.abs(joint_power)
+    work = energy - energy[0, 0] - _summed(power, tiles)
     sizes = natural + places.at(_summed(size, tiles) + parts) + float(parts[0, 0])
-    said = np.sum([published.values[name] for name in names], axis=0)
-    _note("all drives", (said, places.at(own), sizes), published, residuals, sum(along[name] for name in names))
+    value = np.sum([published.values[name] for name in names], axis=0)
+    _note("all drives", (value, places.at(work), sizes), published, residuals, sum(bars[name] for name in names))
 
 
 def _note(
     name: str, values: tuple[Array, Array, Array], published: PublishedValues, residuals: LawResiduals, bar: float
 ) -> None:
-    """Takes what is said and found of a work, and its size [J]."""
-    said, own, size = values
-    residuals.note("work", name, (said - own)[:, None], size[:, None], published.pieces.time, bar)
+    """Takes a published work, that of the laws, and its size [J]."""
+    value, work, size = values
+    residuals.note("work", name, (value - work)[:, None], size[:, None], published.pieces.time, bar)
 
 
 def _summed(values: Array, tiles: Tiles) -> Array:
@@ -71,7 +71,7 @@ def _summed(values: Array, tiles: Tiles) -> Array:
 
 
 def _rates(scene: LawScene, tiles: Tiles, number: int) -> list[Array]:
-    """Rates along the free directions of a joint."""
+    """Rates bars the free directions of a joint."""
     connection = scene.connections[number]
     placed = scene.placed(connection, tiles)
     return [
