@@ -153,13 +153,16 @@ class _Walk:
         self._recorder, self._path, self._held = route.recorder, route.path, route.held
         self._check = LawCheck(mechanism, units.length, 1 / units.time)
         self.work, self._working = WorkAlong(mechanism, units.length, 1 / units.time), bool(working(mechanism))
+        resisted = any(pair.rolling_resistance or pair.spinning_friction for pair in mechanism.pairs)
+        self._numeric = self._working or resisted
         self.taken = dict[int, list[Pieces]]()
         self._waiting = list[Pieces]()  # of stretches in one mode, which are checked together
 
     def through(self, end: float) -> LawResiduals:
         """Remainders of the laws along the path, whose stretches are judged up to a time in natural units.
 
-        Forces that are found in numbers, at a third of the cost of steps, are held at samples, and here if works ask.
+        Forces in numbers, at a third of the cost of steps, are held at samples; here too where works ask for
+        them, or contacts have moments, which no dataset has.
         """
         last_pieces: Pieces | None = None
         judged = self._check.residuals
@@ -171,7 +174,7 @@ class _Walk:
                 self._check.residuals = LawResiduals(rate=judged.rate)  # behind the end work alone goes on
             if self._held is not None:
                 self._held.recall(stretch.start)
-            pieces = self._recorder.pieces(stretch, numeric=self._working)
+            pieces = self._recorder.pieces(stretch, numeric=self._numeric)
             self.taken[number] = pieces
             if last_pieces is not None:
                 passage = self._recorder.passage(self._path, number, last_pieces, self._recorder.start(stretch, pieces))
