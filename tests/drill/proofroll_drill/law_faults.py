@@ -1,4 +1,4 @@
-"""One-token faults in code that both routes of the truth share, planted at run time; the law check must see each."""
+"""One-token faults in code that both routes of the truth share, planted at run time; the checks must see each."""
 
 from __future__ import annotations
 import __future__
@@ -15,17 +15,19 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
+from proofroll.core.dataset import ENDED
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism, Spring
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.bushing import Bushing
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.error_bars import TwoRouteMotion
-from proofroll.truth.truth_of_mechanism import truth_of
+from proofroll.truth.plug_in import MechanismTruth
 
 _WIDER = 10.0  # bars by which a motion with a fault may be off
 
@@ -147,25 +149,28 @@ def planted(fault: LawFault) -> Iterator[None]:
 
 
 @cache
-def honest(scene: str) -> TwoRouteMotion:
+def honest(scene: str) -> xr.Dataset:
     """Truth of a scene without a fault."""
+    return _published(scene)
+
+
+def _published(scene: str) -> xr.Dataset:
     make, until = SCENES[scene]
-    return truth_of(make(), np.linspace(0.0, until, 6))
+    return MechanismTruth.truth(MechanismElement(make()), np.linspace(0.0, until, 6), ())
 
 
 def outcome(fault: LawFault) -> str:
     """Result with a fault: "refused", "within the bar" or "silent", with the words of the refusal."""
     right = honest(fault.scene)
-    assert not right.ended, right.ended
-    make, until = SCENES[fault.scene]
+    assert ENDED not in right.attrs, right.attrs[ENDED]
     with planted(fault):
         try:
-            motion = truth_of(make(), np.linspace(0.0, until, 6))
+            found = _published(fault.scene)
         except (Refused, Diverged, InputError, ArithmeticError) as error:
             return f"refused: {error}"
-    if motion.ended:
-        return f"refused: {motion.ended}"
-    count = min(len(motion.record.time), len(right.record.time))
-    apart = np.abs(motion.record.p_WB[:count] - right.record.p_WB[:count]).max()
-    bar = float(motion.bars["p_WB"][-1] + right.bars["p_WB"][-1])
+    if ENDED in found.attrs:
+        return f"refused: {found.attrs[ENDED]}"
+    count = min(found.sizes["time"], right.sizes["time"])
+    apart = np.abs(found["p_WB"].to_numpy()[:count] - right["p_WB"].to_numpy()[:count]).max()
+    bar = float(found["p_WB"].attrs["error_bar"] + right["p_WB"].attrs["error_bar"])
     return f"{'within the bar' if apart <= _WIDER * bar else 'silent'}: off by {apart:.1e} m, bar {bar:.1e} m"

@@ -74,6 +74,7 @@ class LawRecorder:
 
     def pieces(self, stretch: Stretch[ContactMode], *, numeric: bool) -> list[Pieces]:
         """Pieces of a stretch: of steps and of dense output apart; ``numeric``: those with forces in numbers, too."""
+        numeric = numeric or isinstance(stretch, BegunSlip | StoppingSlip)  # a few pieces that no sample may lie on
         cut, stated = [piece for piece in self._cut(stretch) if numeric or piece.record is not None], []
         for coarse in (False, True):
             pieces = [piece for piece in cut if piece.coarse is coarse]

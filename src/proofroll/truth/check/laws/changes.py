@@ -24,6 +24,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
     """Checks all events before a ``last`` time [s]."""
     borders = np.flatnonzero(tiles.stretch[1:] != tiles.stretch[:-1])
     ends, begins, jumps = tiles.time[borders, -1], tiles.time[borders + 1, 0], changed_velocity(scene, tiles)[borders]
+    hits = list[PublishedEvent]()
     for number, end, begin, jump in zip(borders.tolist(), ends.tolist(), begins.tolist(), jumps.tolist(), strict=True):
         if end >= last * (1 - _BEFORE_END):
             continue
@@ -40,8 +41,10 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
         names = _changed(scene, tiles.modes[number], tiles.modes[number + 1])
         if names and not any(_of(item.name, name) for item in near for name in names):
             residuals.note("change", min(names), np.ones((1, 1)), 1.0, time)
-        for item in near:
-            _at_impact(scene, tiles, residuals, item, number, jump > least)
+        for item in near if jump > least else ():
+            hits.append(item)
+            _at_impact(scene, tiles, residuals, item, number)
+    contacts = {contact.name for contact in scene.contacts if contact.alone}
     for item in published.changes:
         if item.of_effort or item.time >= last * (1 - _BEFORE_END):
             continue
@@ -51,6 +54,8 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
         apart = np.append(apart, abs(item.time) if item.time <= 0 else np.inf)
         off = min(float(apart.min()), 1 + item.time)
         residuals.note("change", item.name, np.array([[off]]), 1 + abs(item.time), np.array([[item.time]]))
+        if item.strikes and item.name in contacts and item not in hits:
+            residuals.note("change", item.name, np.ones((1, 1)), 1.0, np.array([[item.time]]))
 
 
 def _summed(scene: LawScene, changes: Sequence[PublishedEvent], item: PublishedEvent) -> float:
@@ -58,11 +63,11 @@ def _summed(scene: LawScene, changes: Sequence[PublishedEvent], item: PublishedE
     if not item.settles:
         return 0.0
     hits = [other.time for other in changes if other.strikes and other.name == item.name and other.time < item.time]
-    spans = np.diff(hits[-3:])
+    spans, least = np.diff(hits[-3:]), _LAST_REBOUNDS / scene.rate
     if len(spans) < 2 or not 0 < spans[1] < spans[0]:
-        return _LAST_REBOUNDS / scene.rate
+        return least
     ratio = float(spans[1] / spans[0])
-    return 2 * float(spans[1]) * ratio / (1 - ratio)
+    return max(least, 2 * float(spans[1]) * ratio / (1 - ratio))
 
 
 def _of(event: str, place: str) -> bool:
@@ -80,10 +85,8 @@ def _changed(scene: LawScene, sooner: Modes, later: Modes) -> set[str]:
     return names
 
 
-def _at_impact(
-    scene: LawScene, tiles: Tiles, residuals: LawResiduals, item: PublishedEvent, number: int, jumps: bool
-) -> None:
-    """A contact that is struck has no gap, and velocities jump."""
+def _at_impact(scene: LawScene, tiles: Tiles, residuals: LawResiduals, item: PublishedEvent, number: int) -> None:
+    """A contact that is struck has no gap."""
     if not item.strikes:
         return
     for contact in scene.contacts:
@@ -91,8 +94,6 @@ def _at_impact(
             gap = abs(_last_gap(scene, tiles, contact.name, number))
             far = scene.length + float(np.abs(tiles.p[number, -1]).max())
             residuals.note("gap", item.name, np.array([[gap]]), far, np.array([[item.time]]))
-            if not jumps:
-                residuals.note("change", item.name, np.ones((1, 1)), 1.0, np.array([[item.time]]))
 
 
 def _last_gap(scene: LawScene, tiles: Tiles, name: str, number: int) -> float:
