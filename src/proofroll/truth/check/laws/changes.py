@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.truth.check.laws.contacts import gap_of
 from proofroll.truth.check.laws.record import Array, Modes, PublishedEvent, PublishedValues
-from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.residuals import INSTANT, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiled import changed_velocity
 from proofroll.truth.check.laws.tiles import Tiles
@@ -32,7 +32,8 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
         near = [
             item
             for item in published.changes
-            if item.low - room - _summed(scene, published.changes, item) <= begin and end <= item.high + room
+            if item.low - room - _summed(scene, published.changes, item) <= begin
+            and end <= item.high + room + (INSTANT / scene.rate if item.jumps else 0.0)  # a rebound that is none
         ]
         time = np.array([[begin]])
         least = _STRUCK + _GROWTH * scene.rate * max(begin - end, 0.0)
@@ -59,8 +60,11 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
 
 
 def _summed(scene: LawScene, changes: Sequence[PublishedEvent], item: PublishedEvent) -> float:
-    """Time before a settling at which the motion may rest already: twice that of rebounds in the last ratio [s]."""
-    if not item.settles:
+    """Time before a settling, and what follows it at once, at which the motion may rest already [s].
+
+    That is twice the time that rebounds take in their last ratio.
+    """
+    if not any(other.settles and abs(other.time - item.time) <= _ROOM * (1 + item.time) for other in changes):
         return 0.0
     hits = [other.time for other in changes if other.strikes and other.name == item.name and other.time < item.time]
     spans, least = np.diff(hits[-3:]), _LAST_REBOUNDS / scene.rate
