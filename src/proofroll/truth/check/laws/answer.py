@@ -71,7 +71,9 @@ class AnswerCheck:
         for item in published.changes:  # within the bracket of an event a sample is that of the later side
             reached[(item.low <= time) & (time < item.time)] = item.time
         places = tiles.holding(reached)
-        rows = np.flatnonzero(places.held & (time < sure))
+        # of a sample at the last time where stretches meet, which is that of the later side, there is no piece
+        late = (time >= tiles.time[-1, -1] - _BESIDE * (1 + time)) & self._at_borders(published.pieces.time, tiles)
+        rows = np.flatnonzero(places.held & (time < sure) & ~late)
         self.held = len(rows)
         if not rows.size:
             return
@@ -81,7 +83,9 @@ class AnswerCheck:
         works_follow(scene, tiles, turns, places, published, residuals)
         values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
         modes = [tiles.modes[tile] for tile in places.tile]
-        between = ~(self._at_instants(published.pieces.time[:, 0]) | self._at_borders(published.pieces.time, tiles))
+        between = ~(
+            self._at_instants(published.pieces.time[:, 0]) | self._at_borders(published.pieces.time, tiles, kinks=True)
+        )
         for mode in dict.fromkeys(modes):
             chosen = np.flatnonzero(np.array([item == mode for item in modes]) & between)
             if chosen.size:
@@ -110,10 +114,10 @@ class AnswerCheck:
             values[:, 0, number, k] = places.at(coordinates)
         return values
 
-    def _at_borders(self, time: Array, tiles: Tiles) -> NDArray[np.bool_]:
-        """True where stretches meet, and forces are those of either side; of a scene with kinks also at both ends."""
+    def _at_borders(self, time: Array, tiles: Tiles, *, kinks: bool = False) -> NDArray[np.bool_]:
+        """True where stretches meet, and forces are of either side; ``kinks``: of a scene with kinks at both ends, too."""
         ends = tiles.borders
-        if self._scene.mechanism.kinks:
+        if kinks and self._scene.mechanism.kinks:
             ends = np.append(ends, [tiles.time[0, 0], tiles.time[-1, -1]])
         return np.asarray((np.abs(time - ends) <= _BESIDE * (1 + np.abs(ends))).any(1))
 
