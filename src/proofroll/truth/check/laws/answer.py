@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _BESIDE = 1e-9  # time beside the end of a stretch, relative to it and to a second, that counts as that end
 _UNCERTAIN = 4e-5  # part of the time before a horizon in which what it hangs on may happen, and is no event
+_EXACT = 1e-14  # round-off of times, relative to them and to a second
 _INSTANT = 1e-6  # part of an interval of a controller beside an instant, where forces are those of either side
 
 
@@ -73,6 +74,8 @@ class AnswerCheck:
         places = tiles.holding(reached)
         # of a sample at the last time where stretches meet, which is that of the later side, there is no piece
         late = (time >= tiles.time[-1, -1] - _BESIDE * (1 + time)) & self._at_borders(published.pieces.time, tiles)
+        for item in published.changes:  # at an instant of an impact values are of either side
+            late |= item.jumps & (item.low - _EXACT * (1 + time) <= time) & (time <= item.high + _EXACT * (1 + time))
         rows = np.flatnonzero(places.held & (time < sure) & ~late)
         self.held = len(rows)
         if not rows.size:
@@ -115,7 +118,7 @@ class AnswerCheck:
         return values
 
     def _at_borders(self, time: Array, tiles: Tiles, *, kinks: bool = False) -> NDArray[np.bool_]:
-        """True where stretches meet, and forces are of either side; ``kinks``: of a scene with kinks at both ends, too."""
+        """True where stretches meet, where forces are of either side; ``kinks``: of a scene with kinks at both ends."""
         ends = tiles.borders
         if kinks and self._scene.mechanism.kinks:
             ends = np.append(ends, [tiles.time[0, 0], tiles.time[-1, -1]])

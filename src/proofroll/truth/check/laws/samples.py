@@ -157,6 +157,7 @@ def _along(
         direction = axis.direction
         said = dot(np.where(np.abs(direction) < _IN_PLANE, 0.0, part), direction)
         given, size = axis.force, axis.size + _ARM * natural + np.nan_to_num(norm(part))
+        size = size + np.nan_to_num(norm(pieces.force)).sum(-1) * (scene.length if axis.turns else 1.0)
         digits = axis.digits
         if joint.armature:
             frames, (which, number, _) = (
