@@ -132,14 +132,14 @@ def test_compare(command_line: Proofroll) -> None:
 
 @pytest.mark.drill
 def test_tradeoff_and_recommend(command_line: Proofroll, springs: Path) -> None:
-    """Tradeoff goes by the deciding observable, and recommend answers from it."""
+    """Tradeoff goes by the deciding observable, and recommend bounds it."""
     code, out, err = command_line("tradeoff", str(springs), "--engine", "sprung", "--until", "0.1", "--json")
     assert code == 0, err
     assert json.loads(out)["quantity"] == "x"
     arguments = ("--until", "0.1", "--tolerance", "1e-3", "--engine", "sprung", "--json")
     code, out, err = command_line("recommend", str(springs), *arguments)
     assert code == 0, err
-    assert json.loads(out)["choice"]["engine"].startswith("sprung")
+    assert json.loads(out)["engines"][0]["engine"].startswith("sprung")
 
 
 @pytest.mark.drill

@@ -138,16 +138,6 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     assert all(sentence.endswith(".") for sentence in nothing)
 
 
-def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(report: Report) -> None:
-    """At a millimetre the cheap one fails, with its reason."""
-    answers = {item.answer.tolerance: item.answer for item in report.content.entries["tradeoffs"][0].advice}
-    answer = answers[1e-3]
-    assert answer.choice.point.engine == "good"
-    assert answer.first_failure.point.engine == "rough"
-    assert "off by 3e-3 m" in answer.first_failure.reason
-    assert answers[1e-2].choice.point.engine == "rough"
-
-
 def test_a_chapter_is_closed_with_its_result_in_its_title(written_page: str, parse: Any) -> None:
     """Studies of a scene lie in one fold, named with a result; within, the trade-off lists only what holds."""
     start = written_page.index('<section id="chapter-sphere_in_cylinder"')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -46,7 +47,7 @@ def recommend(
 
     Each engine is searched over all its settings and steps until no other can be cheaper. A step is advised if half of
     it holds, too, and a third more does not break down. A run takes at most 8 s of processor time and an engine 30 s;
-    what that leaves open is told. Exit 1 if nothing holds the tolerance.
+    what that leaves open is named. Exit 1 if nothing holds the tolerance.
     """
     from proofroll.report.answer.sentences import answer_lines
     from proofroll.report.terminal.screen import WIDTH
@@ -82,16 +83,18 @@ def _answer(
     path = answer_path(out, question, asked, engines)
     if not runner.fresh and (stored := stored_answer(path)) is not None:
         return stored
-    if not quiet:
-        length = f"{question.scene} over {question.until:g} s"
-        options.complain(f"searching {length}: at most {CELL_CAP:g} s of processor time an engine, and the truth's")
 
-    def told(item: EngineAnswer) -> None:
+    def begin(names: Sequence[str]) -> None:
+        if not quiet:
+            where = f"{question.scene} over {question.until:g} s"
+            options.complain(f"searching {', '.join(names)} in {where}: at most {CELL_CAP:g} s of processor time each")
+
+    def tell(item: EngineAnswer) -> None:
         if not quiet:
             options.complain(sentence(item, question.until))
 
     with options.progress_bar(f"{question.scene}: the truth") as advance:
-        (made,) = answer(question, [asked], engines, runner, told, lambda engine: advance(f"runs of {engine}"))
+        (made,) = answer(question, [asked], engines, runner, begin, tell, lambda engine: advance(f"runs of {engine}"))
     return keep_answer(made, path)
 
 

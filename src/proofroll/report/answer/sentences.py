@@ -10,7 +10,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.report.labels import engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
 from proofroll.running.case import Status
-from proofroll.studies.answer.records import Bound, EngineAnswer, SceneAnswer, StepTried
+from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, StepTried
 from proofroll.studies.answer.setting_search import State
 
 # State -> sign and short word.
@@ -43,14 +43,14 @@ def speed(cost: float | None) -> str:
     return f"{float(f'{1 / cost:.2g}'):g}×"
 
 
-def error_words(bound: Bound, error: float) -> str:
+def error_words(bound: AllowedError, error: float) -> str:
     """An error beside what is allowed: ``0.12 mm of 1 mm``, or ``6e-5 of 1e-4`` as parts of the size."""
     if bound.relative and bound.size:
         return f"{number(error / bound.size)} of {number(bound.allowed / bound.size)}"
     return f"{measure(error, bound.unit)} of {measure(bound.allowed, bound.unit)}"
 
 
-def off_words(bound: Bound, of_allowed: float) -> str:
+def off_words(bound: AllowedError, of_allowed: float) -> str:
     """An error by its part of what is allowed: ``0.12 mm``, or ``6e-5`` as a part of the size."""
     error = of_allowed * bound.allowed
     return number(error / bound.size) if bound.relative and bound.size else measure(error, bound.unit)
@@ -153,8 +153,8 @@ def own_sentence(made: SceneAnswer) -> str:
 def scope_sentence(made: SceneAnswer) -> str:
     """Sentence on what was judged, over which time, and that attitudes were not."""
     names = ", ".join(quantity_words(bound.quantity) for bound in made.bounds)
-    attitudes = f"; {' and '.join(made.attitudes)} not" if made.attitudes else ""
-    return f"Judged: {names}, over {made.until:g} s at {made.every:g} s{attitudes}."
+    unjudged = f" Not judged: {' and '.join(made.unjudged)}." if made.unjudged else ""
+    return f"Judged: {names}, every {made.every:g} s over {made.until:g} s.{unjudged}"
 
 
 def answer_lines(made: SceneAnswer) -> Iterator[str]:

@@ -20,25 +20,33 @@ from proofroll.running.timing import time_in_rounds
 from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion
 from proofroll.studies.answer.records import (
-    Bound,
+    AllowedError,
     EngineAnswer,
     SceneAnswer,
     SettingTried,
     StepTried,
     ranked,
 )
-from proofroll.studies.answer.search import EngineSearch, SearchesAbreast, at_step, searching, settings_of
+from proofroll.studies.answer.search import (
+    EngineSearch,
+    SearchesAbreast,
+    at_step,
+    curves_to_search,
+    searching,
+    settings_of,
+)
 from proofroll.studies.answer.setting_search import RUN_CAP, SettingSearch, State
-from proofroll.studies.answer.tolerance import AskedTolerance, attitudes_of
+from proofroll.studies.answer.tolerance import AskedTolerance, orientations_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.study_store import conditions_now, keep_study, valid_study
+from proofroll.studies.tradeoff.curve import Curve
 
 # Speeds of the cheapest and of all within this factor of it are measured again, one at a time.
 _NEAR = 3.0
 # Rounds and length of such a measurement [s]; a slower run is measured once.
 _ROUNDS, _SECONDS, _ONCE = 2, 0.1, 0.3
 
-Told = Callable[[EngineAnswer], None]
+Tell = Callable[[EngineAnswer], None]
 
 
 def answer(
@@ -46,7 +54,8 @@ def answer(
     asked: Sequence[AskedTolerance],
     engines: Sequence[str],
     runner: Runner,
-    told: Told = lambda _: None,
+    begins: Callable[[Sequence[str]], None] = lambda _: None,
+    tell: Tell = lambda _: None,
     ran: Callable[[str], None] = lambda _: None,
 ) -> list[SceneAnswer]:
     """Answers for several tolerances, one after another: what was run for one is not run again for the next.
@@ -56,7 +65,8 @@ def answer(
         asked: tolerances.
         engines: names or ``name[key=value,…]``; empty: all that are installed, without those that check the truth.
         runner: runs the cases.
-        told: called with the answer of an engine as soon as it is found.
+        begins: called with the names of the engines before the first run.
+        tell: called with the answer of an engine as soon as its search has ended.
         ran: called with the name of an engine after each of its runs.
 
     Raises:
@@ -64,11 +74,14 @@ def answer(
         ProofrollError: there is no truth.
     """
     begin = processor_seconds()
+    curves, absent = curves_to_search(question, engines, runner.workers)
+    begins(list(dict.fromkeys(curve.facts.name for curve in curves)))
     _, truth = resolve_with_truth([], runner.workers)
     abreast = SearchesAbreast(question.references(truth, runner), runner, ran)
     answers = []
     for tolerance in asked:
-        answers.append(_answered(question, tolerance, engines, abreast, told, begin))
+        spent = processor_seconds() - begin
+        answers.append(_answered(question, tolerance, curves, absent, abreast, tell, spent))
         begin = processor_seconds()
     return answers
 
@@ -76,20 +89,23 @@ def answer(
 def _answered(
     question: AnswerQuestion,
     tolerance: AskedTolerance,
-    engines: Sequence[str],
+    curves: Sequence[Curve],
+    absent: Mapping[str, str],
     abreast: SearchesAbreast,
-    told: Told,
-    begin: float,
+    tell: Tell,
+    spent: float,
 ) -> SceneAnswer:
-    """Answer for one tolerance; ``begin``: processor time at its start [s]."""
+    """Answer for one tolerance; ``spent``: processor time before it that counts as its own [s]."""
+    begin = processor_seconds() - spent
     reference, runner = abreast.references[question.every], abreast.runner
     bounds = bounds_of(tolerance, reference)
     unanswerable = unanswerable_because(bounds, reference)
     allowed = {bound.quantity: bound.allowed for bound in bounds}
     sizes = {bound.quantity: bound.size or bound.allowed for bound in bounds}
-    searches = [] if unanswerable else settings_of(question, engines, allowed, sizes, runner.workers)
+    searches = [] if unanswerable else settings_of(question, curves, allowed, sizes)
+    lacking = [EngineSearch(engine=name, settings=[], cannot=why) for name, why in absent.items()]
     generators = [searching(search, question) for search in searches]
-    abreast.run(generators, lambda number: told(engine_answer(searches[number], bounds)))
+    abreast.run(generators, lambda number: tell(engine_answer(searches[number], bounds)))
     speeds = _speeds(searches, question, runner)
     return SceneAnswer(
         scene=question.scene,
@@ -98,19 +114,19 @@ def _answered(
         every=question.every,
         tolerance=tolerance.text,
         bounds=bounds,
-        attitudes=attitudes_of(question.loaded, allowed),
+        unjudged=orientations_of(question.loaded, allowed),
         open=unanswerable,
-        engines=ranked([engine_answer(search, bounds, speeds) for search in searches]),
+        engines=ranked([engine_answer(search, bounds, speeds) for search in [*searches, *lacking]]),
         spent=processor_seconds() - begin,
         measured=conditions_now(),
         omitted=list(question.loaded.omitted),
     )
 
 
-def bounds_of(tolerance: AskedTolerance, reference: Reference) -> list[Bound]:
+def bounds_of(tolerance: AskedTolerance, reference: Reference) -> list[AllowedError]:
     """Bounds of the judged quantities that the truth knows."""
     return [
-        Bound(
+        AllowedError(
             quantity=name,
             unit=reference.scene.observables[name].unit,
             allowed=allowed,
@@ -122,7 +138,7 @@ def bounds_of(tolerance: AskedTolerance, reference: Reference) -> list[Bound]:
     ]
 
 
-def unanswerable_because(bounds: Sequence[Bound], reference: Reference) -> str:
+def unanswerable_because(bounds: Sequence[AllowedError], reference: Reference) -> str:
     """Reason why no engine can be judged; empty: they can."""
     if reference.ill_posed:
         return reference.ill_posed
@@ -167,7 +183,7 @@ def spec_of(item: SettingSearch, run: JudgedRun | None = None) -> str:
 
 
 def engine_answer(
-    search: EngineSearch, bounds: Sequence[Bound], speeds: Mapping[str, float] | None = None
+    search: EngineSearch, bounds: Sequence[AllowedError], speeds: Mapping[str, float] | None = None
 ) -> EngineAnswer:
     """Answer of one engine from its search; ``speeds``: of settings that were measured alone."""
     from proofroll.core.engine_abilities import title_of
@@ -177,15 +193,9 @@ def engine_answer(
     nothing = partial(EngineAnswer, engine=search.engine, title=title, spent=search.spent, settings=settings)
     if not search.settings:
         return nothing(state=State.CANNOT, why=search.cannot)
-    held = [item for item in search.settings if item.state in {State.HOLDS, State.UNCONFIRMED}]
-    if speeds is not None and (sure := [item for item in held if item.state is State.HOLDS]):
-        held = sure
-        timed = [item for item in held if spec_of(item) in speeds]
-        found = min(timed, key=lambda item: speeds[spec_of(item)]) if timed else search.found
-    else:
-        found = search.found
-    if found is not None and (run := found.chosen) is not None:
-        return _of_setting(nothing, found, run, bounds, found.state, found.why, speeds or {})
+    choice = _fastest(search, speeds or {}) or search.found
+    if choice is not None and (run := choice.chosen) is not None:
+        return _of_setting(nothing, choice, run, bounds, choice.state, choice.why, speeds or {})
     ran = [item for item in search.settings if item.state in {State.FINER, State.ELSEWHERE, State.OPEN}]
     if not ran:
         item = min(search.settings, key=lambda item: _ORDER.index(item.state) if item.state in _ORDER else len(_ORDER))
@@ -196,15 +206,21 @@ def engine_answer(
     return _of_setting(nothing, item, nearest, bounds, state, item.why, {})
 
 
+def _fastest(search: EngineSearch, speeds: Mapping[str, float]) -> SettingSearch | None:
+    """Confirmed setting with the best speed among those that were measured alone; None: none was."""
+    timed = [item for item in search.settings if item.state is State.HOLDS and spec_of(item) in speeds]
+    return min(timed, key=lambda item: speeds[spec_of(item)], default=None)
+
+
 _ORDER = (State.SILENT, State.REFUSED, State.NOT_RUN)
 
 
 def _divisor(item: SettingSearch, run: JudgedRun) -> int:
-    return next(divisor for divisor, other in item.runs.items() if other is run)
+    return next(divisor for divisor, rival in item.runs.items() if rival is run)
 
 
 def _of_setting(
-    nothing: Callable[..., EngineAnswer], item: SettingSearch, run: JudgedRun, bounds: Sequence[Bound],
+    nothing: Callable[..., EngineAnswer], item: SettingSearch, run: JudgedRun, bounds: Sequence[AllowedError],
     state: State, why: str, speeds: Mapping[str, float],
 ) -> EngineAnswer:  # fmt: skip
     """Answer that names one run of a setting."""

@@ -69,8 +69,8 @@ class JudgedRun:
         for name, bound in allowed.items():
             growth = self.growth.get(name, np.zeros(0))
             times = self.times[len(self.times) - len(growth) :]
-            held = int(np.searchsorted(growth, bound, side="right"))
-            ends.append(float(times[held - 1]) if held else 0.0)
+            count = int(np.searchsorted(growth, bound, side="right"))
+            ends.append(float(times[count - 1]) if count else 0.0)
         return min(ends, default=0.0)
 
     def with_sparse(self, sparse: JudgedRun) -> JudgedRun:
@@ -154,15 +154,15 @@ def least_of_limit(runs: tuple[JudgedRun, JudgedRun, JudgedRun], allowed: Mappin
         if any(name not in run.curves for run in runs):
             return 0.0
         coarse, middle, fine = (run.curves[name] for run in runs)
-        first, second = largest_difference(coarse, middle), largest_difference(middle, fine)
+        change, next_change = largest_difference(coarse, middle), largest_difference(middle, fine)
         off = largest_difference(fine, runs[-1].true[name])
-        if not all(map(math.isfinite, (first, second, off))):
+        if not all(map(math.isfinite, (change, next_change, off))):
             return 0.0
-        fall = second / first if first else 0.0
+        fall = next_change / change if change else 0.0
         if fall >= _FALLS:
             continue
         factor = max(fall, 0.5)
-        least = max(least, (off - 2 * second * factor / (1 - factor)) / bound)
+        least = max(least, (off - 2 * next_change * factor / (1 - factor)) / bound)
     return least
 
 

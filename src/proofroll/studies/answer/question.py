@@ -76,7 +76,7 @@ class AnswerQuestion:
 
         Args:
             scene: name of the scene.
-            parameters: those that differ from the defaults.
+            parameters: values that differ from the defaults.
             until: length of the runs [s]; None: the scene's own duration.
             step: step that is asked about [s]: samples are then at whole steps of it, of its double and of four times
                 it, and the runs end with such a step.

@@ -10,7 +10,7 @@ from proofroll.studies.study_store import Measured
 
 
 @dataclass(frozen=True)
-class Bound:
+class AllowedError:
     """Largest allowed error of a quantity.
 
     Attributes:
@@ -57,9 +57,9 @@ class SettingTried:
 
     Attributes:
         spec: ``name[formulation=…,preset=…]``.
-        state: what the search has shown.
+        state: result of the search.
         why: clause with the reason, or empty.
-        steps: that were run, coarse first.
+        steps: all runs, coarse first.
     """
 
     spec: str
@@ -104,7 +104,7 @@ class EngineAnswer:
     step: float | None = None
     seconds_per_second: float | None = None
     timed_alone: bool = False
-    bound: Bound | None = None
+    bound: AllowedError | None = None
     error: float | None = None
     held_until: float = 0.0
     coarser: StepTried | None = None
@@ -129,7 +129,7 @@ class SceneAnswer:
         until, every: time over which every run is judged, and the sampling interval [s].
         tolerance: as it was given.
         bounds: of the judged quantities.
-        attitudes: observables of orientation that the tolerance does not bound.
+        unjudged: observables of orientation that the tolerance does not bound.
         open: why no engine can be judged here; empty: all are.
         engines: the cheapest that holds first.
         spent: processor time, that of the truth included [s].
@@ -142,8 +142,8 @@ class SceneAnswer:
     until: float
     every: float
     tolerance: str
-    bounds: list[Bound]
-    attitudes: list[str]
+    bounds: list[AllowedError]
+    unjudged: list[str]
     open: str
     engines: list[EngineAnswer]
     spent: float
@@ -153,8 +153,8 @@ class SceneAnswer:
     @property
     def taken(self) -> EngineAnswer | None:
         """The cheapest confirmed engine, or else the cheapest that holds; None: none does."""
-        first = next(iter(self.engines), None)
-        return first if first is not None and first.holds else None
+        best = next(iter(self.engines), None)
+        return best if best is not None and best.holds else None
 
 
 def ranked(engines: Sequence[EngineAnswer]) -> list[EngineAnswer]:

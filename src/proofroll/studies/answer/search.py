@@ -18,6 +18,7 @@ from proofroll.studies.answer.judged_run import JudgedRun, judged_run
 from proofroll.studies.answer.question import AnswerQuestion
 from proofroll.studies.answer.setting_search import CELL_CAP, RUN_CAP, SettingSearch, State
 from proofroll.studies.judging.reference import Reference
+from proofroll.studies.tradeoff.curve import Curve
 from proofroll.studies.tradeoff.sweep import curves_of
 
 # Wall time of a run over its cap of processor time, and least limit of a run that should be cheap [s].
@@ -47,41 +48,29 @@ class EngineSearch:
     @property
     def found(self) -> SettingSearch | None:
         """Cheapest setting with a step that holds, confirmed ones first; None: there is none."""
-        held = [item for item in self.settings if item.state in {State.HOLDS, State.UNCONFIRMED} and item.chosen]
-        sure = [item for item in held if item.state is State.HOLDS]
-        return min(sure or held, key=lambda item: item.chosen.cost if item.chosen else math.inf, default=None)
+        holding = [item for item in self.settings if item.state in {State.HOLDS, State.UNCONFIRMED} and item.chosen]
+        sure = [item for item in holding if item.state is State.HOLDS]
+        return min(sure or holding, key=lambda item: item.chosen.cost if item.chosen else math.inf, default=None)
 
 
 def settings_of(
-    question: AnswerQuestion,
-    engines: Sequence[str],
-    allowed: Mapping[str, float],
-    sizes: Mapping[str, float],
-    workers: Workers,
+    question: AnswerQuestion, curves: Sequence[Curve], allowed: Mapping[str, float], sizes: Mapping[str, float]
 ) -> list[EngineSearch]:
     """Searches of engines, not yet begun, over the settings that can represent the scene.
 
-    Settings that differ in the name of their preset alone are one; engines that only cross-check the truth have none
-    unless they are named.
+    Settings that differ in the name of their preset alone are one.
 
     Args:
         question: of the answer.
-        engines: names or ``name[key=value,…]``; empty: all that are installed.
+        curves: one for each formulation and preset.
         allowed: observable -> largest error.
         sizes: observable -> size.
-        workers: pool for the questions to engines.
-
-    Raises:
-        InputError: an unknown engine, formulation or setting.
     """
     scene = question.loaded
-    curves, absent = curves_of(engines, workers, scene.requires)
     searches: dict[str, EngineSearch] = {}
     seen: set[str] = set()
     for curve in curves:
         facts = curve.facts
-        if facts.witness and not engines:
-            continue
         of_engine = searches.setdefault(facts.name, EngineSearch(facts.name, []))
         formulation = str(facts.settings.get("formulation"))
         if not represents(scene, formulation, facts.provides):
@@ -92,16 +81,44 @@ def settings_of(
         if (key := f"{facts.name} {plain(alike)!r}") in seen:
             continue
         seen.add(key)
-        item = SettingSearch(curve.engine, facts, question.every, question.until, allowed, sizes)
-        if facts.step is not None:
+        item = SettingSearch(
+            spec=curve.engine,
+            facts=facts,
+            first=question.every,
+            until=question.until,
+            allowed=allowed,
+            sizes=sizes,
+            given=float(facts.settings[facts.resolution]) if facts.resolution and curve.fixed else None,
+        )
+        if facts.step is not None and item.given is None:
             item.start = max(0, round(math.log2(question.every / facts.step)))
         of_engine.settings.append(item)
-    reasons = {parse_engine(name).name: why for name, why in absent.items()}
-    reasons = {name: why for name, why in reasons.items() if name not in searches}
-    for name, described in zip(reasons, resolve([(name, {}) for name in reasons], workers), strict=True):
-        if engines or not (isinstance(described, EngineFacts) and described.witness):
-            searches[name] = EngineSearch(name, [], reasons[name])
     return list(searches.values())
+
+
+def curves_to_search(
+    question: AnswerQuestion, engines: Sequence[str], workers: Workers
+) -> tuple[list[Curve], dict[str, str]]:
+    """Formulations and presets of engines, and engine without one -> reason.
+
+    Engines that only cross-check the truth are left out unless they are named.
+
+    Args:
+        question: of the answer.
+        engines: names or ``name[key=value,…]``; empty: all that are installed.
+        workers: pool for the questions to engines.
+
+    Raises:
+        InputError: an unknown engine, formulation or setting.
+    """
+    curves, absent = curves_of(engines, workers, question.loaded.requires)
+    curves = [curve for curve in curves if engines or not curve.facts.witness]
+    names = {curve.facts.name for curve in curves}
+    reasons = {parse_engine(text).name: why for text, why in absent.items()}
+    reasons = {name: why for name, why in reasons.items() if name not in names}
+    described = zip(reasons, resolve([(name, {}) for name in reasons], workers), strict=True)
+    witnesses = {name for name, facts in described if isinstance(facts, EngineFacts) and facts.witness}
+    return curves, {name: why for name, why in reasons.items() if engines or name not in witnesses}
 
 
 def searching(search: EngineSearch, question: AnswerQuestion) -> Asking:
@@ -133,9 +150,9 @@ def _run(item: SettingSearch, divisor: int, question: AnswerQuestion) -> Generat
     """Run of a setting with a step; of a scheme that adapts its steps with the larger error of few samples, too."""
     facts = at_step(item.facts, item.step(divisor))
     limit = _LIMIT * RUN_CAP
-    if (held := min((run.cost for run in item.runs.values() if run.status is Status.DONE), default=None)) is not None:
-        coarser = all(divisor < other for other in item.runs)
-        limit = min(limit, max(_LEAST_LIMIT, _DEARER * held * question.until)) if coarser else limit
+    least = min((run.cost for run in item.runs.values() if run.status is Status.DONE), default=math.inf)
+    if all(divisor < finer for finer in item.runs) and math.isfinite(least):
+        limit = min(limit, max(_LEAST_LIMIT, _DEARER * least * question.until))
     run = yield question.case(facts, question.every, limit)
     if facts.resolution in {None, "dt"} or run.status is not Status.DONE:
         return run

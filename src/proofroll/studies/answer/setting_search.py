@@ -13,7 +13,7 @@ from proofroll.studies.answer.judged_run import REFUSALS, JudgedRun, least_of_li
 
 
 class State(StrEnum):
-    """What a search has shown of a setting, or of an engine."""
+    """Result of a search for a setting, or for an engine."""
 
     HOLDS = "holds"
     UNCONFIRMED = "holds, not confirmed"  # one step holds; half of it, or another check, is not affordable
@@ -64,6 +64,7 @@ class SettingSearch:
         allowed: observable -> largest error.
         sizes: observable -> size.
         start: halvings of the first step at which the search begins.
+        given: step or relative tolerance that a person gave, the only one that is run; None: it is searched.
         runs: divisor -> run.
         unsafe: halvings whose step holds and must not be advised.
         state, why: result of the search, and a clause with its reason.
@@ -78,6 +79,7 @@ class SettingSearch:
     allowed: Mapping[str, float]
     sizes: Mapping[str, float]
     start: int = 0
+    given: float | None = None
     run_cap: float = RUN_CAP
     runs: dict[int, JudgedRun] = field(default_factory=dict)
     unsafe: dict[int, str] = field(default_factory=dict)
@@ -108,7 +110,9 @@ class SettingSearch:
 
     @property
     def _last(self) -> int:
-        return 0 if self.facts.resolution is None else _FINEST if self.fixed_step else _TIGHTEST
+        if self.facts.resolution is None or self.given is not None:
+            return 0
+        return _FINEST if self.fixed_step else _TIGHTEST
 
     def divisor(self, level: int) -> int:
         """Divisor of a level."""
@@ -116,8 +120,8 @@ class SettingSearch:
 
     def step(self, divisor: int) -> float:
         """Step [s] or relative tolerance of a divisor."""
-        if self.facts.resolution is None:
-            return 0.0
+        if self.facts.resolution is None or self.given is not None:
+            return self.given or 0.0
         return float(f"{self.first / divisor:.12g}") if self.fixed_step else float(f"{_LOOSEST / divisor:.3g}")
 
     @property
@@ -205,14 +209,15 @@ class SettingSearch:
         return max(bad + 1, good - max(1, min(_JUMP, int(levels))))
 
     def _finer(self, levels: Mapping[int, JudgedRun], left: float) -> int | None:
-        """Next finer level of a setting of which no step holds yet; None: it is decided."""
+        """Divisor of a finer level, where no step holds yet; None: the setting is decided."""
         finest = max(levels)
         run, size = levels[finest], self.size(self.divisor(finest))
         done = [n for n, item in levels.items() if item.status is Status.DONE]
         if finest >= self._last:
             worst = run.worst(self.allowed)
             told = f"{worst} is off by {number(size)} times what is allowed" if worst else run.message
-            self.decide(State.ELSEWHERE if run.status is Status.DONE else State.FINER, f"{told} at its tightest")
+            tightest = run.status is Status.DONE and self.given is None
+            self.decide(State.ELSEWHERE if tightest else State.FINER, f"{told} at {self._at(finest)}")
         elif run.status in REFUSALS:
             return self.divisor(finest + 2)
         elif run.status is Status.TIMEOUT and done:
@@ -322,36 +327,39 @@ class SettingSearch:
             self.unsafe[good] = fault
             return self.next_divisor(left)
         self.level = good
-        self.decide(State.HOLDS)
+        if self.given is None:
+            self.decide(State.HOLDS)
+        else:
+            self.decide(State.UNCONFIRMED, "no other step was asked for")
         return None
 
     def _next_check(self, good: int) -> tuple[int | None, str]:
         """Divisor of a check that is still to be made of a level that holds, or the fault that its checks show."""
-        if not self.fixed_step:
+        if not self.fixed_step or self.given is not None:
             return None, ""
         check, fault = self._order_check(good)
         return (check, fault) if check is not None or fault else self._breakdown_check(good)
 
     def _order_check(self, good: int) -> tuple[int | None, str]:
-        """As :meth:`_next_check`: where errors do not fall in order, a step that is no half has to hold."""
+        """Check of a step that is no half, where errors do not fall in order; see :meth:`_next_check`."""
         divisor = self.divisor(good)
         size, half = self.size(divisor), self.size(2 * divisor)
         irregular = size < _REGULAR * half or bool(self.unsafe)
         if not irregular and (size <= 1 / _MARGIN or self.order > 1):
             return None, ""
-        other = 5 * divisor // 4 if good >= 2 else 3
-        if other not in self.runs:
-            return other, ""
-        between, fault = self.size(other), ""
-        held, off = number(self.step(divisor), 3), number(self.step(other), 3)
+        uneven = 5 * divisor // 4 if good >= 2 else 3
+        if uneven not in self.runs:
+            return uneven, ""
+        between, fault = self.size(uneven), ""
+        lucky, off = number(self.step(divisor), 3), number(self.step(uneven), 3)
         if between > 1:
-            fault = f"dt {held} s holds by luck: dt {off} s is off by {number(between)} times what is allowed"
+            fault = f"dt {lucky} s holds by luck: dt {off} s is off by {number(between)} times what is allowed"
         elif irregular and max(size, half, between) > 1 / _MARGIN:
-            fault = f"from dt {held} s on errors do not fall in order, with less than a factor of {_MARGIN:g}"
+            fault = f"from dt {lucky} s on errors do not fall in order, with less than a factor of {_MARGIN:g}"
         return None, fault
 
     def _breakdown_check(self, good: int) -> tuple[int | None, str]:
-        """As :meth:`_next_check`: where twice the step breaks down, a third more than the step must not."""
+        """Check of a third more than the step, where twice of it breaks down; see :meth:`_next_check`."""
         divisor = self.divisor(good)
         if good - 1 not in self.levels or self._sound(divisor // 2):
             return None, ""

@@ -15,7 +15,7 @@ from proofroll.studies.judging.reference import Reference
 FORMS = "write 1e-4 of the path, '0.1 %' of it, '1 mm', or QUANTITY='1 mm'"
 DEFAULT = "1e-4"
 _PART = re.compile(r"\s*(\d*\.?\d+\.?(?:[eE][-+]?\d+)?)\s*(?:of\s+(?:the\s+)?path)?\s*")
-_LENGTH = "m"
+_LENGTH, _COMPONENTS = "m", "1"
 
 
 @dataclass(frozen=True)
@@ -80,14 +80,14 @@ def judged_names(scene: Scene, *, forces: bool = False) -> list[str]:
     return [*names, *(reactions if forces else [])]
 
 
-def attitudes_of(scene: Scene, names: Iterable[str]) -> list[str]:
-    """Observables of orientation that are not among ``names``: a tolerance of lengths bounds none of them."""
+def orientations_of(scene: Scene, names: Iterable[str]) -> list[str]:
+    """Observables of orientation that are not among ``names``: a tolerance of lengths bounds none of them.
+
+    They are the motion without a unit: components of quaternions.
+    """
     judged = set(names)
-    return [
-        name
-        for name, item in scene.observables.items()
-        if item.role is Role.MOTION and item.name in {"attitude", "attitudes"} and name not in judged
-    ]
+    motion = {name: item for name, item in scene.observables.items() if item.role is Role.MOTION}
+    return [name for name, item in motion.items() if item.unit == _COMPONENTS and name not in judged]
 
 
 def _common(text: str, scene: Scene, *, forces: bool) -> Mapping[str, Tolerance]:

@@ -16,13 +16,13 @@ from proofroll.running.store import Store
 from proofroll.studies.answer.answers import answer, answer_path, engine_answer, keep_answer, stored_answer
 from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion, sampling_of
-from proofroll.studies.answer.records import Bound, SceneAnswer
+from proofroll.studies.answer.records import AllowedError, SceneAnswer
 from proofroll.studies.answer.search import EngineSearch, searching
 from proofroll.studies.answer.setting_search import SettingSearch, State
 from proofroll.studies.answer.tolerance import AskedTolerance
 
 QUESTION = AnswerQuestion("double_pendulum", {}, 10.0, 0.1)
-BOUND = Bound("x", "m", 1e-4, 1.0, 0.0, relative=True)
+BOUND = AllowedError("x", "m", 1e-4, 1.0, 0.0, relative=True)
 
 
 def setting(preset: str) -> SettingSearch:

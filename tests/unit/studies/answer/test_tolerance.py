@@ -7,7 +7,7 @@ import pytest
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.answer.tolerance import AskedTolerance, attitudes_of, judged_names
+from proofroll.studies.answer.tolerance import AskedTolerance, judged_names, orientations_of
 
 SCENE = load_scene("double_pendulum")
 
@@ -55,5 +55,5 @@ def test_another_form_is_refused(text: str) -> None:
 
 def test_attitudes_are_bounded_by_a_tolerance_of_their_own() -> None:
     """A tolerance of lengths bounds no attitude, and that is known; a tolerance of its own bounds it."""
-    assert attitudes_of(SCENE, judged_names(SCENE)) == ["attitudes"]
-    assert attitudes_of(SCENE, AskedTolerance.of(["1 mm", "attitudes=1e-3"], SCENE).bounds) == []
+    assert orientations_of(SCENE, judged_names(SCENE)) == ["attitudes"]
+    assert orientations_of(SCENE, AskedTolerance.of(["1 mm", "attitudes=1e-3"], SCENE).bounds) == []
