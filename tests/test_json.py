@@ -45,7 +45,14 @@ from proofroll.robots.control.judge import RecordJudgement
 from proofroll.robots.control.record import Layer, LayerCause
 from proofroll.robots.files.robot_file import LintRemark
 from proofroll.running.timing import Interval
-from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, SettingTried, StepTried
+from proofroll.studies.answer.records import (
+    AllowedError,
+    EngineAnswer,
+    SceneAnswer,
+    SettingTried,
+    StepAnswer,
+    StepTried,
+)
 from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.fuzz.hunt import FoundKind, Hunt
 from proofroll.studies.fuzz.shrink import SmallestScene
@@ -184,7 +191,11 @@ TRADEOFF = (
         ("json.md", "`judge --robot --json`", (RecordJudgement, Layer, LayerCause)),
         ("json.md", "`compare --json`", COMPARISON),
         ("json.md", "`stability --json`", MAP),
-        ("tradeoff.md", "JSON", (*TRADEOFF, SceneAnswer, EngineAnswer, AllowedError, StepTried, SettingTried)),
+        (
+            "tradeoff.md",
+            "JSON",
+            (*TRADEOFF, SceneAnswer, StepAnswer, EngineAnswer, AllowedError, StepTried, SettingTried),
+        ),
         ("json.md", "`ladder --json`", LADDER),
         ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
         (

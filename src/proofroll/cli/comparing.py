@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from proofroll.cli import options
+from proofroll.cli.own_step import answer_steps
 from proofroll.core.number_format import number as written
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ def compare(
     scheduler: options.Scheduler = None,
     budget: options.Budget = None,
     until: options.Until = None,
+    tolerance: options.Tolerances = None,
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default about a fiftieth of --until.")
     ] = None,
@@ -71,6 +73,9 @@ def compare(
     For a scene or a robot file every formulation that can represent it is run, without claims. --set, --until, --every
     and --budget are for these; runs beyond 60 s of processor time are left out and named. An --engine without a row in
     the file gets a row without claims.
+
+    With --tolerance a scene is judged by it. With --engine, too, the answer is one line for each: whether that step
+    is good enough over the scene's own duration, by how much, and which one would do.
     """
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.screen import WIDTH
@@ -79,10 +84,12 @@ def compare(
     from proofroll.studies.comparison.by_name import comparison_named
 
     comparison, workers = options.controlled(comparison, control), Workers()
+    assigned, bounds = options.assignments(settings), tolerance or []
+    if engine and bounds:
+        runner = options.new_runner(out, fresh, jobs, scheduler, workers)
+        answer_steps(comparison, engine, bounds, assigned, until, runner, out, as_json=as_json)
     with options.spinner(comparison):
-        loaded = comparison_named(
-            comparison, options.assignments(settings), workers, budget, scheduler, engine or [], until, every
-        )
+        loaded = comparison_named(comparison, assigned, workers, budget, scheduler, engine or [], until, every, bounds)
     mention_absent(loaded.absent)
     if control is not None:
         options.doubt_numbers(comparison, settings)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from proofroll.running.runner import Runner
     from proofroll.studies.answer.question import AnswerQuestion
     from proofroll.studies.answer.records import EngineAnswer, SceneAnswer
-    from proofroll.studies.answer.tolerance import AskedTolerance
+    from proofroll.studies.judging.asked_tolerance import AskedTolerance
 
 
 def recommend(
@@ -53,7 +53,7 @@ def recommend(
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.running.idle_workers import Workers
     from proofroll.studies.answer.by_name import question_named
-    from proofroll.studies.answer.tolerance import DEFAULT, AskedTolerance
+    from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
 
     scenes = [options.controlled(scene, control) for scene in scenes]
     questions = [question_named(scene, options.assignments(settings), until) for scene in scenes]
@@ -77,12 +77,13 @@ def _answer(
 ) -> SceneAnswer:
     """Stored answer, or a new one, whose parts are printed on standard error as they are found."""
     from proofroll.report.answer.sentences import sentence
-    from proofroll.studies.answer.answers import answer, answer_path, keep_answer, stored_answer
+    from proofroll.studies.answer.answers import answer, answer_path, kept, stored
+    from proofroll.studies.answer.records import SceneAnswer
     from proofroll.studies.answer.setting_search import CELL_CAP
 
     path = answer_path(out, question, asked, engines)
-    if not runner.fresh and (stored := stored_answer(path)) is not None:
-        return stored
+    if not runner.fresh and (earlier := stored(path, SceneAnswer)) is not None:
+        return earlier
 
     def begin(names: Sequence[str]) -> None:
         if not quiet:
@@ -95,7 +96,7 @@ def _answer(
 
     with options.progress_bar(f"{question.scene}: the truth") as advance:
         (made,) = answer(question, [asked], engines, runner, begin, tell, lambda engine: advance(f"runs of {engine}"))
-    return keep_answer(made, path)
+    return kept(made, path)
 
 
 def _print_lines(made: list[SceneAnswer]) -> None:

@@ -6,11 +6,10 @@ import math
 from collections.abc import Iterator
 
 from proofroll.core.number_format import number
-from proofroll.core.plugins import parse_engine
 from proofroll.report.labels import engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
 from proofroll.running.case import Status
-from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, StepTried
+from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, StepAnswer, StepTried
 from proofroll.studies.answer.setting_search import State
 
 # State -> sign and short word.
@@ -150,7 +149,7 @@ def own_sentence(made: SceneAnswer) -> str:
     return f"Without a part of proofroll: {sentence(own, made.until)}"
 
 
-def scope_sentence(made: SceneAnswer) -> str:
+def scope_sentence(made: SceneAnswer | StepAnswer) -> str:
     """Sentence on what was judged, over which time, and that attitudes were not."""
     names = ", ".join(quantity_words(bound.quantity) for bound in made.bounds)
     unjudged = f" Not judged: {' and '.join(made.unjudged)}." if made.unjudged else ""
@@ -173,13 +172,40 @@ def answer_lines(made: SceneAnswer) -> Iterator[str]:
         yield f"Not in the answer: {', '.join(made.omitted)}."
 
 
-def command_of(made: SceneAnswer, item: EngineAnswer) -> str:
-    """Command whose answer says whether a setting holds the tolerance, with all that was given."""
-    import shlex
+def step_sentence(made: StepAnswer) -> str:
+    """Answer for a person's own step in one sentence: yes or no, by how much, and which step would do."""
+    if made.open:
+        return f"Not judged: {made.open}."
+    item, size = made.advised, step(made.resolution, made.step)
+    if made.bound is None or made.status != Status.DONE or made.error is None:
+        ended = made.message or item.why
+        until = f", it holds until {number(made.held_until, 3)} s" if made.held_until else ""
+        return f"No: {ended}{until}{_would_do(made)}."
+    error = f"{error_words(made.bound, made.error)} over {made.until:g} s"
+    if not made.holds:
+        luck = f" is luck: {made.luck}" if made.luck else ""
+        until = "" if made.luck else f"; it holds until {number(made.held_until, 3)} s"
+        return f"No: {error}{luck}{until}{_would_do(made)}."
+    told = f"Yes: {error} ({size}, {speed(made.seconds_per_second)} real time)"
+    if item.step is not None and item.step > made.step * (1 + 1e-9):
+        ratio = (made.seconds_per_second or 0.0) / (item.seconds_per_second or math.inf)
+        return f"{told}; {step(item.resolution, item.step)} would do, {number(ratio)} times faster."
+    if item.state is State.UNCONFIRMED:
+        return f"{told}; not confirmed: {item.why}."
+    double = "twice the step" if made.resolution == "dt" else "ten times the tolerance"
+    return f"{told}; {double} does not do."
 
-    words = ["proofroll", "compare", made.scene, "--engine", item.spec, "--tolerance", made.tolerance]
-    for name, value in made.parameters.items():
-        words += ["--set", f"{name}={value:g}"]
-    spec = parse_engine(item.spec)
-    assert spec.name  # it was made by the search
-    return shlex.join([*words, "--until", f"{made.until:g}"])
+
+def _would_do(made: StepAnswer) -> str:
+    """Clause on the step of the same setting that holds, or on why none was found."""
+    item = made.advised
+    if item.holds and item.step is not None and item.bound is not None and item.error is not None:
+        off = off_words(item.bound, item.error / item.bound.allowed)
+        sure = "" if item.state is State.HOLDS else ", not confirmed"
+        return (
+            f"; {step(item.resolution, item.step)} would do ({off}{sure}), {speed(item.seconds_per_second)} real time"
+        )
+    if item.state is State.FINER and item.needs_step and item.needs_seconds:
+        needed = step(item.resolution, item.needs_step, 1)
+        return f"; at best it needs {needed}, {item.needs_seconds:.0f} s of computing, which was not run"
+    return f"; {item.state}: {item.why}" if item.why and item.why != made.message else ""

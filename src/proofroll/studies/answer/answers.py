@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from proofroll.core.plugins import EngineSpec, load_engine, parse_engine
 from proofroll.files.json_data import plain, record
@@ -36,7 +37,7 @@ from proofroll.studies.answer.search import (
     settings_of,
 )
 from proofroll.studies.answer.setting_search import RUN_CAP, SettingSearch, State
-from proofroll.studies.answer.tolerance import AskedTolerance, orientations_of
+from proofroll.studies.judging.asked_tolerance import AskedTolerance, orientations_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.study_store import conditions_now, keep_study, valid_study
 from proofroll.studies.tradeoff.curve import Curve
@@ -47,6 +48,7 @@ _NEAR = 3.0
 _ROUNDS, _SECONDS, _ONCE = 2, 0.1, 0.3
 
 Tell = Callable[[EngineAnswer], None]
+_Answer = TypeVar("_Answer")
 
 
 def answer(
@@ -282,12 +284,12 @@ def answer_path(folder: Path, question: AnswerQuestion, asked: AskedTolerance, e
     return folder / "answers" / f"{question.loaded.name}-{digest}.json"
 
 
-def stored_answer(path: Path) -> SceneAnswer | None:
+def stored(path: Path, kind: type[_Answer]) -> _Answer | None:
     """Stored answer, if it is still valid here."""
-    return valid_study(path, SceneAnswer)[0]
+    return valid_study(path, kind)[0]
 
 
-def keep_answer(made: SceneAnswer, path: Path) -> SceneAnswer:
-    """Stores an answer, and returns it as it will be read."""
+def kept(made: SceneAnswer, path: Path) -> SceneAnswer:
+    """Answer as it will be read, after it was stored."""
     keep_study(made, path)
     return record(SceneAnswer, plain(made))

@@ -10,16 +10,13 @@ from proofroll.studies.answer.question import AnswerQuestion
 from proofroll.studies.comparison.planning import with_edges
 
 
-def question_named(
-    name: str, parameters: Mapping[str, object], until: float | None = None, step: float | None = None
-) -> AnswerQuestion:
+def question_named(name: str, parameters: Mapping[str, object], until: float | None = None) -> AnswerQuestion:
     """Question about a scene, or about the first brief point of a comparison; what is given counts more.
 
     Args:
         name: of a scene, of a comparison, or the path of either or of a robot file.
         parameters: values of parameters, as text or numbers.
         until: length of the runs [s]; None: the duration of the scene's file, or else that of the comparison, or 2 s.
-        step: step that is asked about [s], or None.
 
     Raises:
         InputError: there is neither, or a value makes no sense.
@@ -31,4 +28,4 @@ def question_named(
         point = {**next(iter(comparison.combinations())), **point}
         until = until or read_scene_file(scene).duration or comparison.until
     loaded = load_scene(scene, **point)  # type: ignore[arg-type]  # text is checked and converted there
-    return AnswerQuestion.of(scene, {key: loaded.parameters[key] for key in point}, until, step)
+    return AnswerQuestion.of(scene, {key: loaded.parameters[key] for key in point}, until)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -69,32 +69,42 @@ class AnswerQuestion:
     every: float
 
     @classmethod
-    def of(
-        cls, scene: str, parameters: dict[str, float], until: float | None = None, step: float | None = None
-    ) -> AnswerQuestion:
+    def of(cls, scene: str, parameters: dict[str, float], until: float | None = None) -> AnswerQuestion:
         """Question about a scene.
 
         Args:
             scene: name of the scene.
             parameters: values that differ from the defaults.
             until: length of the runs [s]; None: the scene's own duration.
-            step: step that is asked about [s]: samples are then at whole steps of it, of its double and of four times
-                it, and the runs end with such a step.
 
         Raises:
-            InputError: a time makes no sense, or the step is longer than the runs.
+            InputError: a time makes no sense.
         """
         until = duration_of(scene) if until is None else until
         time_grid(until, until or 1.0)
         if until <= 0:
             raise InputError("until", until, "give a positive, finite time in s")
+        return cls(scene, parameters, until, sampling_of(scene, until))
+
+    def sampled_for(self, step: float | None) -> AnswerQuestion:
+        """The same with samples at whole steps of a given one, of its double and of four times it.
+
+        The runs end with such a step.
+
+        Args:
+            step: step [s]; None: it adapts, and the samples stay.
+
+        Raises:
+            InputError: the step is longer than a quarter of the runs.
+        """
         if step is None:
-            return cls(scene, parameters, until, sampling_of(scene, until))
-        if not 0 < 4 * step <= until:
-            raise InputError("dt", step, f"give a positive step of at most a quarter of the {until:g} s")
-        every = float(f"{4 * step * max(1, round(until / 100 / (4 * step))):.12g}")
-        count = math.floor(until / every * (1 + 1e-12) + 1e-9)
-        return cls(scene, parameters, float(f"{count * every:.12g}"), every)
+            return self
+        longest = 4 * step
+        if not 0 < longest <= self.until:
+            raise InputError("dt", step, f"give a positive step of at most a quarter of the {self.until:g} s")
+        count = math.floor(self.until / longest * (1 + 1e-12) + 1e-9)
+        every = float(f"{longest * max(1, round(self.until / 100 / longest)):.12g}")
+        return replace(self, until=float(f"{longest * count:.12g}"), every=every)
 
     @cached_property
     def loaded(self) -> Scene:

@@ -157,6 +157,53 @@ class SceneAnswer:
         return best if best is not None and best.holds else None
 
 
+@dataclass(frozen=True)
+class StepAnswer:
+    """Answer for a person's own step: whether it is good enough, by how much, and which step would do.
+
+    Attributes:
+        scene, parameters: name of the scene, and its parameters that differ from the defaults.
+        until, every: time over which runs are judged, and the sampling interval [s].
+        tolerance: as it was given.
+        bounds: of the judged quantities.
+        unjudged: observables of orientation that the tolerance does not bound.
+        open: why no engine can be judged here; empty: all are.
+        spec: engine as it was given.
+        resolution, step: ``dt`` or ``rtol``, and its value.
+        holds: True if the step holds the tolerance and may be advised, or could not be confirmed.
+        luck: clause on why a step within the tolerance must not be advised; empty: it may.
+        bound, error: quantity with the largest error over what is allowed, and that error in its unit.
+        status, message: of the run with this step.
+        reached, held_until: time of its last sample, and up to which every error is within what is allowed [s].
+        seconds_per_second: processor time of it per simulated second.
+        advised: answer of the engine with this setting at other steps.
+        spent: processor time [s].
+    """
+
+    scene: str
+    parameters: dict[str, float]
+    until: float
+    every: float
+    tolerance: str
+    bounds: list[AllowedError]
+    unjudged: list[str]
+    open: str
+    spec: str
+    resolution: str
+    step: float
+    holds: bool
+    luck: str
+    bound: AllowedError | None
+    error: float | None
+    status: str
+    message: str
+    reached: float
+    held_until: float
+    seconds_per_second: float | None
+    advised: EngineAnswer
+    spent: float
+
+
 def ranked(engines: Sequence[EngineAnswer]) -> list[EngineAnswer]:
     """Answers in the order of a reader: confirmed ones, then others that hold, each the cheapest first, then the rest.
 

@@ -16,7 +16,7 @@ from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.studies.answer.judged_run import JudgedRun, judged_run
 from proofroll.studies.answer.question import AnswerQuestion
-from proofroll.studies.answer.setting_search import CELL_CAP, RUN_CAP, SettingSearch, State
+from proofroll.studies.answer.setting_search import CELL_CAP, LOOSEST, RUN_CAP, SettingSearch, State
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.curve import Curve
 from proofroll.studies.tradeoff.sweep import curves_of
@@ -84,7 +84,7 @@ def settings_of(
         item = SettingSearch(
             spec=curve.engine,
             facts=facts,
-            first=question.every,
+            first=question.every if facts.resolution == "dt" else LOOSEST,
             until=question.until,
             allowed=allowed,
             sizes=sizes,

@@ -29,8 +29,8 @@ class State(StrEnum):
 
 # Processor time of one run, and of the search of one engine in one scene [s].
 RUN_CAP, CELL_CAP = 8.0, 30.0
-# Loosest and tightest relative tolerance of a scheme that adapts its steps, and the factor between two.
-_LOOSEST, _TIGHTEST, _DECADE = 1e-3, 10, 10
+# Loosest relative tolerance of a scheme that adapts its steps; number of tighter ones, and the factor between two.
+LOOSEST, _TIGHTEST, _DECADE = 1e-3, 10, 10
 # Most halvings of the sampling interval.
 _FINEST = 40
 # Factor by which a tenth of a relative tolerance is assumed to cost more.
@@ -54,12 +54,12 @@ class SettingSearch:
     """State of the search along one engine, formulation and preset.
 
     A step is the first one over a whole number, the divisor: powers of two, and for checks three or five times one. A
-    relative tolerance is 1e-3 over a power of ten.
+    relative tolerance is the loosest one over a power of ten.
 
     Attributes:
         spec: ``name[formulation=…,preset=…]``.
         facts: with the preset's own step or tolerance.
-        first: coarsest step of the search [s], a sampling interval; ignored for relative tolerances.
+        first: coarsest step of the search [s], or loosest relative tolerance.
         until: length of the runs [s].
         allowed: observable -> largest error.
         sizes: observable -> size.
@@ -122,7 +122,7 @@ class SettingSearch:
         """Step [s] or relative tolerance of a divisor."""
         if self.facts.resolution is None or self.given is not None:
             return self.given or 0.0
-        return float(f"{self.first / divisor:.12g}") if self.fixed_step else float(f"{_LOOSEST / divisor:.3g}")
+        return float(f"{self.first / divisor:.12g}") if self.fixed_step else float(f"{self.first / divisor:.6g}")
 
     @property
     def levels(self) -> dict[int, JudgedRun]:

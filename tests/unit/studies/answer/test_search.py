@@ -8,18 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.answer.answers import answer, answer_path, engine_answer, keep_answer, stored_answer
+from proofroll.studies.answer.answers import answer, answer_path, engine_answer, kept, stored
 from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion, sampling_of
 from proofroll.studies.answer.records import AllowedError, SceneAnswer
 from proofroll.studies.answer.search import EngineSearch, searching
 from proofroll.studies.answer.setting_search import SettingSearch, State
-from proofroll.studies.answer.tolerance import AskedTolerance
+from proofroll.studies.judging.asked_tolerance import AskedTolerance
 
 QUESTION = AnswerQuestion("double_pendulum", {}, 10.0, 0.1)
 BOUND = AllowedError("x", "m", 1e-4, 1.0, 0.0, relative=True)
@@ -91,10 +92,15 @@ def test_samples_divide_the_duration(until: float, every: float) -> None:
 
 def test_a_step_that_is_asked_about_has_samples_at_its_double() -> None:
     """Samples are at whole steps of twice and four times the step, and the runs end with such a step."""
-    question = AnswerQuestion.of("double_pendulum", {}, 5.0, step=3e-3)
+    whole = AnswerQuestion.of("double_pendulum", {}, 5.0)
+    question = whole.sampled_for(3e-3)
     assert question.until == pytest.approx(4.992)
-    for factor in (1, 2, 4):
-        assert question.every / (factor * 3e-3) == pytest.approx(round(question.every / (factor * 3e-3)))
+    assert whole.sampled_for(1e-3).until == 5.0
+    for length in (question.until, question.every):
+        assert length / 12e-3 == pytest.approx(round(length / 12e-3))
+    assert whole.sampled_for(None) == whole
+    with pytest.raises(InputError, match="at most a quarter"):
+        whole.sampled_for(2.0)
 
 
 @pytest.mark.drill
@@ -109,8 +115,8 @@ def test_an_answer_is_true_of_the_engine_and_is_stored(tmp_path: Path) -> None:
     assert made.taken is not None
     assert made.taken.state is State.HOLDS
     path = answer_path(tmp_path, question, asked)
-    assert keep_answer(made, path) == stored_answer(path)
-    assert record(SceneAnswer, plain(made)).taken == keep_answer(made, path).taken
+    assert kept(made, path) == stored(path, SceneAnswer)
+    assert record(SceneAnswer, plain(made)).taken == kept(made, path).taken
     every = 3 * (made.taken.step or 0.0)
     until = every * int(1.0 / every)
     run = proofroll.simulate(proofroll.load_scene("double_pendulum"), made.taken.spec, until=until, every=every)

@@ -19,7 +19,8 @@ Law = Callable[[float], float]
 def setting(start: int = 0, order: int = 2, resolution: str = "dt") -> SettingSearch:
     """A setting whose coarsest step is 0.1 s, in runs of 10 s."""
     facts = EngineFacts("alpha", "1", "", {"formulation": "only", resolution: 1e-3}, resolution, order)
-    return SettingSearch("alpha[formulation=only]", facts, 0.1, 10.0, ALLOWED, SIZES, start)
+    first = 0.1 if resolution == "dt" else 1e-3
+    return SettingSearch("alpha[formulation=only]", facts, first, 10.0, ALLOWED, SIZES, start)
 
 
 def run_of(step: float, law: Law, cost: float) -> JudgedRun:

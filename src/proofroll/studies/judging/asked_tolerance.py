@@ -90,13 +90,17 @@ def orientations_of(scene: Scene, names: Iterable[str]) -> list[str]:
     return [name for name, item in motion.items() if item.unit == _COMPONENTS and name not in judged]
 
 
+def in_percent(text: str) -> str:
+    """Text of a tolerance without a name: a part of the path as a percentage, any other as it is."""
+    part = _PART.fullmatch(text)
+    return text if part is None else f"{100 * float(part[1]):.17g} %"
+
+
 def _common(text: str, scene: Scene, *, forces: bool) -> Mapping[str, Tolerance]:
     """Bounds of all judged quantities by a text without a name."""
     units = {name: scene.observables[name].unit for name in judged_names(scene, forces=forces)}
-    part = _PART.fullmatch(text)
-    if part is not None or text.rstrip().endswith("%"):
-        relative = Tolerance.of_quantity("tolerance", f"{100 * float(part[1]):.17g} %" if part else text, "1")
-        return dict.fromkeys(units, relative)
+    if (percentage := in_percent(text)).rstrip().endswith("%"):
+        return dict.fromkeys(units, Tolerance.of_quantity("tolerance", percentage, "1"))
     bounds = {}
     for name, unit in units.items():
         try:

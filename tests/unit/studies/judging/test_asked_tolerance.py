@@ -7,7 +7,7 @@ import pytest
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.answer.tolerance import AskedTolerance, judged_names, orientations_of
+from proofroll.studies.judging.asked_tolerance import AskedTolerance, judged_names, orientations_of
 
 SCENE = load_scene("double_pendulum")
 
