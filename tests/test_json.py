@@ -29,7 +29,7 @@ from proofroll.report.comparison.records import (
     WorstJudgement,
 )
 from proofroll.report.ladder.ladder import Absence, KnownTruth, LadderContent, RungFound, SideFound, TermFound
-from proofroll.report.page.advice import Advised, QuestionAnswer
+from proofroll.report.page.first_screen import ReportedAnswer
 from proofroll.robots.check.explain import RobotCause
 from proofroll.robots.check.records import (
     DrawnBody,
@@ -205,8 +205,7 @@ TRADEOFF = (
                 Against,
                 RunChange,
                 TwoRuns,
-                QuestionAnswer,
-                Advised,
+                ReportedAnswer,
                 Drilled,
                 Mutated,
                 Hunt,

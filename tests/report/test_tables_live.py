@@ -103,7 +103,7 @@ def test_every_list_sorts_and_downloads(report_page: Path, visit: Visiting) -> N
     """Each table, a map, too, and one with joined cells; with two rows or more it filters; nothing below moves."""
     with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
         opened.unfold()
-        lists = """[...document.querySelectorAll('.scroll > table:not(#choice, #uses, #answer-one *)')].filter(
+        lists = """[...document.querySelectorAll('.scroll > table')].filter(
           (table) => table.querySelectorAll('tbody tr:not(.group)').length > 0)"""
         opened.page.evaluate(
             f"window.lists = {lists}.map((table) => [table, table.tBodies[0].rows.length, table.closest('.scroll')])"
@@ -151,17 +151,6 @@ def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, 
     assert all(name.partition(" ")[2] for name in head[1:]), "axis and value"
     assert len(rows) == len(texts)
     assert {len(row) for row in rows} == {len(head)}
-
-
-@pytest.mark.drill
-def test_hidden_engines_stay_hidden_in_a_table_that_sorts(live: Visit) -> None:
-    """The boxes of the first screen act on the rows of a table that has been taken apart."""
-    live.page.locator("[name=engine][value=alpha]").uncheck()
-    shown = f"[...document.querySelectorAll(`{TABLE} tbody tr`)].filter((row) => row.checkVisibility())"
-    live.wait(f"{shown}.length === 2")
-    assert [row for row in column(live, 0) if not row.startswith("alpha")] == live.page.evaluate(
-        f"{shown}.map((row) => row.cells[0].textContent.trim())"
-    )
 
 
 @pytest.mark.drill

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator
 
 from proofroll.core.number_format import number
@@ -67,9 +68,9 @@ def setting_words(item: EngineAnswer) -> str:
     return ", ".join(filter(None, words))
 
 
-def caveat_words(item: EngineAnswer) -> str:
-    """Clause on the part of a setting that is not the engine's own; empty: none is."""
-    return f" ({item.caveat.partition(' (')[0]})" if item.caveat else ""
+def brought_words(item: EngineAnswer) -> str:
+    """Clause on the part of the computation that is proofroll's; empty: none is."""
+    return f"through proofroll's {item.brought}" if item.brought else ""
 
 
 def sentence(item: EngineAnswer, until: float) -> str:
@@ -80,7 +81,8 @@ def sentence(item: EngineAnswer, until: float) -> str:
     told = f"{speed(item.seconds_per_second)} real time, {error_words(item.bound, item.error)}"
     told += f" in {quantity_words(item.bound.quantity)} over {until:g} s"
     told += f"; not confirmed: {item.why}" if item.state is State.UNCONFIRMED else ""
-    return f"{setting_words(item)}{caveat_words(item)}: {told}."
+    brought = f" ({brought_words(item)})" if item.brought else ""
+    return f"{setting_words(item)}{brought}: {told}."
 
 
 def reason(item: EngineAnswer) -> str:
@@ -141,9 +143,9 @@ def _is_number(text: str) -> bool:
 
 def own_sentence(made: SceneAnswer) -> str:
     """Sentence on the cheapest without a part of proofroll, where the one to take has such a part; else empty."""
-    if made.taken is None or not made.taken.caveat:
+    if made.taken is None or not made.taken.brought:
         return ""
-    own = next((item for item in made.engines if item.holds and not item.caveat), None)
+    own = next((item for item in made.engines if item.holds and not item.brought), None)
     if own is None:
         return "Without a part of proofroll: none that was shown."
     return f"Without a part of proofroll: {sentence(own, made.until)}"
@@ -170,6 +172,14 @@ def answer_lines(made: SceneAnswer) -> Iterator[str]:
     yield scope_sentence(made)
     if made.omitted:
         yield f"Not in the answer: {', '.join(made.omitted)}."
+
+
+def command_of(made: SceneAnswer, item: EngineAnswer) -> str:
+    """Command that asks whether a setting holds the tolerance, with all that the answer was given."""
+    words = ["proofroll", "compare", made.scene, "--engine", item.spec, "--tolerance", made.tolerance]
+    for name, value in made.parameters.items():
+        words += ["--set", f"{name}={value!r}"]
+    return shlex.join([*words, "--until", f"{made.until!r}"])
 
 
 def step_sentence(made: StepAnswer) -> str:

@@ -21,8 +21,7 @@ from proofroll.report.comparison.records import (
 )
 from proofroll.report.comparison.scores import furthest_off
 from proofroll.report.comparison.spread import ALONE, Spread
-from proofroll.report.labels import SYMBOLS, engine_title, omitted_lines, row_words, symbol, unit, unjudged
-from proofroll.report.page.choice_cell import speed
+from proofroll.report.labels import SYMBOLS, engine_title, omitted_lines, row_words, speed, symbol, unit, unjudged
 from proofroll.report.terminal.screen import WIDTH, numeric, plain_table, unbroken
 from proofroll.running.case import Status, host_sentences
 

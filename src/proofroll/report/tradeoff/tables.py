@@ -11,9 +11,7 @@ from rich.text import Text
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import by_hand
 from proofroll.core.number_format import error, number
-from proofroll.report.labels import engine_words, listed, name_of, step
-from proofroll.report.page.choice_cell import speed
-from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
+from proofroll.report.labels import engine_words, listed, name_of, speed, step
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.tradeoff.requirements import Requirements, holding
@@ -21,6 +19,7 @@ from proofroll.studies.tradeoff.requirements import Requirements, holding
 if TYPE_CHECKING:
     from proofroll.studies.tradeoff.records import Corner, MeasuredPoint, TradeoffStudy
 
+FIRST_TOLERANCE = 1e-4  # part of a quantity's size at which the terminal names a setting
 _TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)  # parts of a quantity's size, with a column each
 _SCATTER = 2.0  # ratio of the ends of a cost's interval beyond which it is unknown
 _MOST_COLUMNS = 4  # largest number of quantities that are shown by default

@@ -198,13 +198,13 @@ def engine_answer(
     choice = _fastest(search, speeds or {}) or search.found
     if choice is not None and (run := choice.chosen) is not None:
         return _of_setting(nothing, choice, run, bounds, choice.state, choice.why, speeds or {})
-    ran = [item for item in search.settings if item.state in {State.FINER, State.ELSEWHERE, State.OPEN}]
+    ran = [item for item in search.settings if item.state in {State.FINER, State.ELSEWHERE}]
     if not ran:
         item = min(search.settings, key=lambda item: _ORDER.index(item.state) if item.state in _ORDER else len(_ORDER))
         return nothing(state=item.state, why=item.why)
-    pairs = [(item, run) for item in ran for run in item.levels.values()]
-    item, nearest = min(pairs, key=lambda pair: (pair[0].size(_divisor(*pair)), pair[1].step))
     state = State.FINER if any(item.state is State.FINER for item in ran) else State.ELSEWHERE
+    pairs = [(item, run) for item in ran if item.state is state for run in item.levels.values()]
+    item, nearest = min(pairs, key=lambda pair: (pair[0].size(_divisor(*pair)), pair[1].step))
     return _of_setting(nothing, item, nearest, bounds, state, item.why, {})
 
 
@@ -238,6 +238,7 @@ def _of_setting(
         spec=spec,
         formulation=str(item.facts.settings.get("formulation") or ""),
         preset=str(item.facts.settings.get("preset") or ""),
+        brought=item.facts.brought,
         caveat=item.facts.caveat,
         resolution=item.facts.resolution or "",
         step=run.step if item.facts.resolution else None,

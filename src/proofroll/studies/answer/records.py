@@ -78,7 +78,8 @@ class EngineAnswer:
         why: clause with the reason where it does not hold, or is not confirmed; else empty.
         spec: setting with its step, ``name[key=value,…]``; that nearest to the tolerance where none holds, or empty.
         formulation, preset: of that setting.
-        caveat: part of the setting that is not the engine's own; empty: none.
+        brought: part of the computation that proofroll's adapter brings, as ``integrator``; empty: none.
+        caveat: clause on what of the setting is not the engine's own; empty: nothing.
         resolution: ``dt``, ``rtol`` or empty.
         step: step [s] or relative tolerance; None: it has none.
         seconds_per_second: computing time per simulated second; None: not measured.
@@ -99,6 +100,7 @@ class EngineAnswer:
     spec: str = ""
     formulation: str = ""
     preset: str = ""
+    brought: str = ""
     caveat: str = ""
     resolution: str = ""
     step: float | None = None
