@@ -130,7 +130,12 @@ def test_a_chapter_is_closed_with_its_result_in_its_title(written_page: str, par
     assert "Sphere in cylinder" in title
     assert "claims hold" in title
     assert "study-tradeoff" not in written_page[start : written_page.index("</section>", start)], "it is folded"
-    table = parse(written_page).text.partition("Speed against accuracy")[2].partition("holds 1e-4")[2].partition("Price: relative")[0]
+    table = (
+        parse(written_page)
+        .text.partition("Speed against accuracy")[2]
+        .partition("holds 1e-4")[2]
+        .partition("Price: relative")[0]
+    )
     assert "good" in table
     assert "rough" not in table
     assert "do not hold it and are left out" in table

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from proofroll.cli import options
-from proofroll.cli.own_step import answer_steps
+from proofroll.cli.own_step import answer_steps, stored_sentences
 from proofroll.core.number_format import number as written
 
 if TYPE_CHECKING:
@@ -97,9 +97,9 @@ def compare(
     def show(outcome: Outcome) -> None:
         content = outcome_content(outcome)
         parts = partial(verdict_parts, content, orders=orders, witnesses=witnesses)
-        options.show(content, as_json, parts, widest=WIDTH)
+        options.show(content, as_json, lambda: [*cheapest, *parts()], widest=WIDTH)
 
-    runner = options.new_runner(out, fresh, jobs, scheduler, workers)
+    runner, cheapest = options.new_runner(out, fresh, jobs, scheduler, workers), stored_sentences(loaded, out)
     outcomes = outcomes_of([loaded], engine or [], runner, watched=_Watched(show, moves=not as_json))
     show(outcomes[0])
     raise typer.Exit(exit_code(outcomes))
@@ -143,7 +143,6 @@ def outcomes_of(
     spent: float = 0.0,
     *,
     watched: _Watched | None = None,
-    coarser: bool = False,
 ) -> list[Outcome]:
     """Runs all comparisons with one progress bar, one after the other as far as that leaves no worker idle.
 
@@ -159,7 +158,6 @@ def outcomes_of(
         budget: processor time of all of them [s]. All runs then come before the first ladder, and each comparison has
             an equal share of the time left; what it does not use is for later ones.
         spent: part of the budget that was used before [s].
-        coarser: see :func:`proofroll.studies.comparison.planning.plan`.
         watched: shows a single comparison while it runs, and what has ended if the user ends the command.
     """
     from proofroll.running.process import processor_seconds
@@ -169,7 +167,7 @@ def outcomes_of(
 
     begin = processor_seconds() - spent
     with options.spinner(f"{stage}cases"):
-        plans = [affordable(plan(item, engines, runner.workers, coarser=coarser), runner) for item in comparisons]
+        plans = [affordable(plan(item, engines, runner.workers), runner) for item in comparisons]
     brief = [item.brief for item in plans]
     grown = [(index, item.cases) for index, item in enumerate(plans) if len(item.truths) > len(brief[index].truths)]
     if budget:

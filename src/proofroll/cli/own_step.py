@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
@@ -10,8 +11,7 @@ import typer
 from proofroll.cli import options
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
+    from proofroll.core.comparison import Comparison
     from proofroll.running.runner import Runner
 
 
@@ -67,3 +67,21 @@ def answer_steps(
         lines = [f"{head}{step_sentence(item)}" for head, item in zip(heads, made, strict=True)]
         options.show_lines([*lines, scope_sentence(made[0])], widest=WIDTH)
     raise typer.Exit(options.OK if all(item.holds for item in made) else options.CONTRADICTED)
+
+
+def stored_sentences(comparison: Comparison, out: Path) -> list[str]:
+    """First sentence of a stored answer for the first point of a comparison at the default tolerance; else none."""
+    from proofroll.files.scene_file import read_scene_file
+    from proofroll.report.answer.sentences import taken_sentence
+    from proofroll.studies.answer.answers import answer_path, stored
+    from proofroll.studies.answer.question import AnswerQuestion
+    from proofroll.studies.answer.records import SceneAnswer
+    from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
+
+    point = next(iter(comparison.combinations()), {})
+    given = {name: value for name, value in point.items() if isinstance(value, float)}
+    until = read_scene_file(comparison.scene).duration or comparison.until
+    question = AnswerQuestion.of(comparison.scene, given, until)
+    path = answer_path(out, question, AskedTolerance.of([DEFAULT], question.loaded))
+    answer = stored(path, SceneAnswer) if path.is_file() else None
+    return [f"To {DEFAULT} of the path: {taken_sentence(answer)}"] if answer is not None else []
