@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterator
 
 from proofroll.core.number_format import number
-from proofroll.report.labels import engine_words, step, symbol
+from proofroll.report.labels import engine_title, engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
 from proofroll.running.case import Status
 from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, StepAnswer, StepTried
@@ -76,7 +76,7 @@ def brought_words(item: EngineAnswer) -> str:
 def sentence(item: EngineAnswer, until: float) -> str:
     """Answer of one engine over a time [s], in one sentence."""
     if not item.holds or item.bound is None or item.error is None:
-        name = setting_words(item) if item.spec and item.state is not State.REFUSED else item.title
+        name = setting_words(item) if item.spec and item.state is not State.REFUSED else engine_title(item.engine)
         return f"{name}: {reason(item)}."
     told = f"{speed(item.seconds_per_second)} real time, {error_words(item.bound, item.error)}"
     told += f" in {quantity_words(item.bound.quantity)} over {until:g} s"

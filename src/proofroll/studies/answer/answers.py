@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from proofroll.core.plugins import EngineSpec, load_engine, parse_engine
+from proofroll.core.plugins import EngineSpec, parse_engine
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status
 from proofroll.running.engine_questions import resolve_with_truth
@@ -188,9 +188,7 @@ def engine_answer(
     search: EngineSearch, bounds: Sequence[AllowedError], speeds: Mapping[str, float] | None = None
 ) -> EngineAnswer:
     """Answer of one engine from its search; ``speeds``: of settings that were measured alone."""
-    from proofroll.core.engine_abilities import title_of
-
-    title = title_of(load_engine(parse_engine(search.engine).name.partition("@")[0]))
+    title = next((item.facts.title for item in search.settings if item.facts.title), search.engine)
     settings = [_setting_tried(item) for item in search.settings]
     nothing = partial(EngineAnswer, engine=search.engine, title=title, spent=search.spent, settings=settings)
     if not search.settings:
