@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from html import unescape
 from importlib import import_module
 from pathlib import Path
 from typing import Any

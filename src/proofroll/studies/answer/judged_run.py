@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference, magnitudes
+from proofroll.core.observable import Role
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.judging import run_values
@@ -66,8 +67,8 @@ class JudgedRun:
     def held_until(self, allowed: Mapping[str, float]) -> float:
         """Time of the last sample up to which every error is within what is allowed [s]."""
         ends = []
-        for name, bound in allowed.items():
-            growth = self.growth.get(name, np.zeros(0))
+        for name in allowed.keys() & self.growth.keys():
+            growth, bound = self.growth[name], allowed[name]
             times = self.times[len(self.times) - len(growth) :]
             count = int(np.searchsorted(growth, bound, side="right"))
             ends.append(float(times[count - 1]) if count else 0.0)
@@ -131,7 +132,7 @@ def _errors(
             continue
         count = min(len(values), len(true.values))
         alike = values.shape[1:] == true.values.shape[1:]
-        if count and alike:
+        if count and alike and reference.scene.observables[name].role is not Role.EVENT:
             apart = magnitudes(values[:count] - true.values[:count], reference.vectors(name)).max(axis=1, initial=0.0)
             growth[name] = np.maximum.accumulate(np.where(np.isfinite(apart), apart, np.inf))
         if whole:

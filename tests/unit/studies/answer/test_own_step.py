@@ -38,9 +38,9 @@ def test_a_step_is_good_enough_or_is_not(proofroll: Proofroll, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("engine", "tolerance", "words"),
     [
-        ("mujoco[dt=1]", "1 mm", "at most a quarter of the 0.5 s"),
-        ("mujoco[dtt=1e-3]", "1 mm", "did you mean dt?"),
-        ("mujoco[dt=1e-3]", "1 kg", "judged here are positions [m]"),
+        ("projection[preset=default,dt=1]", "1 mm", "at most a quarter of the 0.5 s"),
+        ("projection[dtt=1e-3]", "1 mm", "did you mean dt?"),
+        ("projection[dt=1e-3]", "1 kg", "judged here are positions [m]"),
         ("reduced[formulation=closed_form]", "1 mm", "no step that could be good enough"),
     ],
 )
