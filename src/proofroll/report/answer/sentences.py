@@ -141,14 +141,11 @@ def _is_number(text: str) -> bool:
         return False
 
 
-def own_sentence(made: SceneAnswer) -> str:
-    """Sentence on the cheapest without a part of proofroll, where the one to take has such a part; else empty."""
+def unaided(made: SceneAnswer) -> EngineAnswer | None:
+    """The cheapest that holds without a part of proofroll, where the one to take has such a part; else None."""
     if made.taken is None or not made.taken.brought:
-        return ""
-    own = next((item for item in made.engines if item.holds and not item.brought), None)
-    if own is None:
-        return "Without a part of proofroll: none that was shown."
-    return f"Without a part of proofroll: {sentence(own, made.until)}"
+        return None
+    return next((item for item in made.engines if item.holds and not item.brought), None)
 
 
 def scope_sentence(made: SceneAnswer | StepAnswer) -> str:
@@ -159,13 +156,14 @@ def scope_sentence(made: SceneAnswer | StepAnswer) -> str:
 
 
 def answer_lines(made: SceneAnswer) -> Iterator[str]:
-    """An answer in lines: what to take, without a part of proofroll, every engine, and what was judged."""
+    """An answer in lines: what to take, with or without a part of proofroll, every engine, and what was judged."""
     yield taken_sentence(made)
-    if text := own_sentence(made):
-        yield text
-    taken = made.taken
+    taken, alone = made.taken, unaided(made)
+    if taken is not None and taken.brought:
+        told = sentence(alone, made.until) if alone else "none is shown to hold it."
+        yield f"Without a part of proofroll: {told}"
     for item in made.engines:
-        if item is not taken:
+        if item not in (taken, alone):
             yield f"{SIGNS[item.state][0]} {sentence(item, made.until)}"
     if taken is not None and (text := coarser_words(taken)):
         yield f"Not good enough: {text}."

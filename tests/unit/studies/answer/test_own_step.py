@@ -35,6 +35,7 @@ def test_a_step_is_good_enough_or_is_not(proofroll: Proofroll, tmp_path: Path) -
     assert "it holds until" in " ".join(out.split())
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("engine", "tolerance", "words"),
     [
