@@ -32,6 +32,7 @@ def test_an_answer_is_found_once_and_then_stored(proofroll: Proofroll, tmp_path:
     code, text, err = proofroll(*asked(tmp_path, "--tolerance", "1 mm", "--json"))
     assert (code, err) == (0, "")
     content = json.loads(text)
+    assert " ".join(out.split()).startswith(content["sentence"])
     (engine,) = content["engines"]
     assert engine["state"] == "holds"
     assert engine["error"] <= engine["bound"]["allowed"] == 1e-3

@@ -128,7 +128,8 @@ def test_every_list_sorts_and_downloads(report_page: Path, visit: Visiting) -> N
 @pytest.mark.drill
 def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, tmp_path: Path) -> None:
     """A map offers no sorting, as its text says; it filters, and its file names axis and value of each column."""
-    with visit(report_page, "#study-stability", viewport={"width": 1280, "height": 900}) as opened:
+    with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
+        opened.page.evaluate("folds.find('study-stability')")
         opened.wait("document.querySelector('.heat') !== null")
         opened.page.evaluate("""['40 d', '– d!', '5'].forEach((text) => {
           const row = document.querySelector('.heat tbody tr:last-child').cloneNode(true);
@@ -138,6 +139,7 @@ def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, 
         column = "[...document.querySelectorAll('.heat tbody tr:not(.group)')].map((row) => row.cells[1].textContent)"
         texts = opened.page.evaluate(column)
         assert len(texts) == 4
+        opened.page.evaluate("location.hash = 'study-stability'")
         opened.near(".heat", "document.querySelector('.heat').closest('.scroll').dataset.sorts === ''")
         opened.page.locator(".heat thead tr:last-child th").nth(1).click()
         assert opened.page.evaluate(column) == texts

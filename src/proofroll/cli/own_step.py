@@ -38,6 +38,7 @@ def answer_steps(
         out: folder of results.
         as_json: True for JSON.
     """
+    from proofroll.files.json_data import plain
     from proofroll.report.answer.sentences import scope_sentence, step_sentence
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.studies.answer.answers import answer_path, stored
@@ -61,7 +62,8 @@ def answer_steps(
             keep_study(answer, path)
         made.append(answer)
     if as_json:
-        options.write_json(made[0] if len(made) == 1 else made)
+        content = [{"sentence": step_sentence(item), **plain(item)} for item in made]
+        options.write_json(content[0] if len(content) == 1 else content)
     else:
         heads = [f"{engine}: " if len(engines) > 1 else "" for engine in engines]
         lines = [f"{head}{step_sentence(item)}" for head, item in zip(heads, made, strict=True)]

@@ -49,7 +49,8 @@ def recommend(
     it holds, too, and a third more does not break down. A run takes at most 8 s of processor time and an engine 30 s;
     what that leaves open is named. Exit 1 if nothing holds the tolerance.
     """
-    from proofroll.report.answer.sentences import answer_lines
+    from proofroll.files.json_data import plain
+    from proofroll.report.answer.sentences import answer_lines, taken_sentence
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.running.idle_workers import Workers
     from proofroll.studies.answer.by_name import question_named
@@ -66,7 +67,8 @@ def recommend(
             head = [question.scene] if len(questions) > 1 else []
             options.show_lines([*head, *answer_lines(made[-1])], widest=WIDTH)
     if as_json:
-        options.write_json(made[0] if len(made) == 1 else made)
+        content = [{"sentence": taken_sentence(item), **plain(item)} for item in made]
+        options.write_json(content[0] if len(content) == 1 else content)
     elif lines:
         _print_lines(made)
     raise typer.Exit(options.OK if all(item.taken for item in made) else options.CONTRADICTED)

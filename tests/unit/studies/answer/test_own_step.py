@@ -28,6 +28,7 @@ def test_a_step_is_good_enough_or_is_not(proofroll: Proofroll, tmp_path: Path) -
     code, text, _ = proofroll(*asked(tmp_path, engine.format(1e-3)), "--json")
     content = json.loads(text)
     assert content["holds"]
+    assert content["sentence"].startswith("Yes: ")
     assert content["error"] <= 1e-3
     code, out, _ = proofroll(*asked(tmp_path, engine.format(1e-3).replace("matched", "default"), "--tolerance", "1 nm"))
     assert code == 1
