@@ -28,8 +28,7 @@ from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.labels import engine_title, engine_words
-from proofroll.report.page.choice_cell import cell_of
-from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
+from proofroll.report.long_table import TableLine
 from proofroll.report.page.html import templates
 from proofroll.report.page.scene_sheet import scene_sheet
 from proofroll.running.idle_workers import Workers
@@ -136,12 +135,29 @@ def truth(outcome: Outcome, laws_alone: bool) -> str:
 
 def standings(outcome: Outcome) -> str:
     """What each formulation is at the tolerance of the matrix, as a line that no reader sees."""
-    name = outcome.comparison.name
-    matrix = choice_matrix(lines_of(outcome), {name: ChoiceStudy(outcome.comparison.title, "")})
-    column = next(item for item in matrix.columns if item.whole)
-    rows = [row for row in matrix.rows if not row.setting]
-    found = {row.name: cell_of(row.found[name], TOLERANCE, False).state for row in rows}
-    return f"<!-- at 1e-4: {json.dumps({column.group: found})} -->\n"
+    order, content = list(Verdict), outcome_content(outcome)
+    held = {(run[0].engine, run[0].formulation) for run in runs_of(lines_of(outcome)) if holds(run)}
+    found: dict[str, Verdict] = {}
+    for row in content.rows:
+        name = f"{row.name} {row.formulation or ''}".strip()
+        at_best = Verdict.CONVERGES if row.verdict is Verdict.AGREES else row.verdict
+        verdict = Verdict.AGREES if (row.name, row.formulation or "") in held else at_best
+        found[name] = min(found.get(name, verdict), verdict, key=order.index)
+    return f"<!-- at 1e-4: {json.dumps({content.group: found})} -->\n"
+
+
+def runs_of(lines: Iterable[TableLine]) -> list[list[TableLine]]:
+    """Lines of each setting with each of its steps, over all points."""
+    runs: dict[tuple[int, float | None], list[TableLine]] = {}
+    for line in lines:
+        runs.setdefault((line.row, line.step), []).append(line)
+    return list(runs.values())
+
+
+def holds(run: list[TableLine]) -> bool:
+    """True if the motion that summaries show is within the tolerance of the matrix at every point."""
+    motion = [line for line in run if line.role == "motion" and line.headline and line.scale]
+    return bool(motion) and all(line.relative <= TOLERANCE for line in motion)
 
 
 def standings_by_group(page: str) -> dict[str, dict[str, str]]:

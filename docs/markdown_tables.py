@@ -12,9 +12,8 @@ from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.tables import observables
 from proofroll.report.labels import SYMBOLS, engine_title, engine_words, name_of, step, verdict_text
-from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.tradeoff.requirements import Requirements
+from proofroll.studies.tradeoff.requirements import Requirements, holding
 
 # What a sign of the matrix means.
 CHOICE_MEANINGS = {
@@ -110,10 +109,8 @@ def cheapest_table(study: TradeoffStudy, tolerances: Sequence[float]) -> str:
     for tolerance in tolerances:
         cells = [f"{number(tolerance)} {unit}"]
         for _, levels in _AMONG:
-            choice = recommend(
-                study, Requirements(name, Tolerance(tolerance, False, unit), levels=levels)
-            ).answer.choice
-            cells.append(_cell(choice.point) if choice else "none")
+            held = holding(study, Requirements(name, Tolerance(tolerance, False, unit), levels=levels))
+            cells.append(_cell(held[0]) if held else "none")
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

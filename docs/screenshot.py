@@ -19,7 +19,7 @@ WIDTH, MOST_HEIGHT, DENSITY = 1400, 1100, 2
 # A page of text and flat cells has few colours; a palette makes the file a third as large.
 COLOURS = 128
 # The end of the picture, and the first table of verdicts, which is folded below it.
-CARDS, FOLDED, VERDICTS = "#answer-cards", "#verdicts details", ".matrix"
+CARDS, FOLDED, VERDICTS = ".kinds-of-scene >> nth=0", "#verdicts details", ".matrix"
 # Row for row: what the comparison file calls it, and its verdict.
 ROWS = """(table) => [...document.querySelector(table).querySelectorAll("tbody tr:not(.group, .note)")].map((row) =>
   [row.querySelector("th").title, row.querySelector(".v").textContent.trim().split(" ")[1]])"""

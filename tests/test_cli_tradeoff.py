@@ -1,4 +1,4 @@
-"""``proofroll tradeoff`` and ``proofroll recommend`` as a user meets them."""
+"""``proofroll tradeoff`` as a user meets it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pyperf
 import pytest
 from rich.console import Console
 
-from proofroll.core.errors import ProofrollError
 from proofroll.report import labels
 from proofroll.report.tradeoff.tables import corner_table
 from proofroll.report.tradeoff.work_precision import svg
@@ -54,12 +52,6 @@ def folder(measured: TradeoffStudy, tmp_path: Path) -> Path:
         points.append(point if point.seconds_per_second is None else steady)
     keep_study(replace(measured, measured=study_store.conditions_now(), points=points), path)
     return tmp_path
-
-
-def asked(folder: Path, *more: str, tolerance: str = "1e-3") -> list[str]:
-    """A recommendation from that folder."""
-    given = ["--set", "rolling_resistance=5e-4", "--until", "0.5", "--out", str(folder)]
-    return ["recommend", "sphere_in_cylinder", "--quantity", "z", "--tolerance", tolerance, *given, *more]
 
 
 @pytest.mark.drill
@@ -123,103 +115,6 @@ def test_the_front_is_within_the_points(measured: TradeoffStudy) -> None:
         assert [corner.parameters for corner in corners] == [{"speed": 3.0}, {"speed": 5.0}]
 
 
-def test_recommend_from_stored_curves(proofroll: Proofroll, folder: Path) -> None:
-    """The answer comes from the stored curves, with choice, failure, range, and when and where it was measured."""
-    code, out, err = proofroll(*asked(folder, "--json"))
-    answer = json.loads(out)
-    assert (code, err) == (0, "")
-    assert answer["choice"]["engine"] == "exudyn"
-    assert answer["choice"]["error"] <= 5e-4
-    assert answer["choice"]["seconds_per_second"] > 0
-    assert {"engine", "settings", "error", "seconds_per_second", "reason"} <= answer["first_failure"].keys()
-    assert answer["checked"]["parameters"] == {"speed": [3.0, 5.0]}
-    assert {"when", "machine", "versions"} <= answer["measured"].keys()
-
-
-def test_recommend_for_a_person(proofroll: Proofroll, folder: Path) -> None:
-    """The lines name engine, step, error, speed and range, within 80 columns."""
-    code, out, _ = proofroll(*asked(folder))
-    assert code == 0
-    assert all(len(line) <= 80 for line in out.splitlines())
-    assert out.startswith("Take Exudyn carrier, matched, dt ")
-    for words in ("× real time, ", " off.", "Cheaper fails: ", "speed 3 to 5"):
-        assert words in " ".join(out.split())
-
-
-def test_lines_of_a_choice_are_all_that_is_printed(proofroll: Proofroll, folder: Path) -> None:
-    """They are for a pipe: assignments to Exudyn's settings alone; without a choice there is one line of error."""
-    code, out, _ = proofroll(*asked(folder), "--lines")
-    assert code == 0
-    assert out.splitlines()
-    assert all(line.startswith(("simulationSettings.", "#")) for line in out.splitlines())
-    code, out, err = proofroll(*asked(folder), "--lines", "--tolerance", "1e-14")
-    assert (code, out) != (0, "")
-    assert "nothing that was measured holds the tolerance" in err
-
-
-def test_a_tolerance_that_nothing_holds(proofroll: Proofroll, folder: Path) -> None:
-    """Beyond what was measured there is no choice: exit code 1, and the closest is named."""
-    code, out, _ = proofroll(*asked(folder, tolerance="1e-15 m"))
-    assert code == 1
-    assert "Nothing that was measured holds z" in out
-    assert "Closest: Exudyn carrier" in out
-
-
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        (["--tolerance", "soon"], "tolerance = 'soon'"),
-        (["--tolerance", "nan"], "positive number"),
-        (["--tolerance", "1.2.3 mm"], "positive number"),
-        (["--tolerance", "1 mN"], "its unit is m"),
-        (["--tolerance", "1e-3 N"], "its unit is m"),
-        (["--tolerance", "-1"], "positive number"),
-        (["--quantity", "speed"], "there is no such observable"),
-        (["--engine", "pinocchio"], "measured are exudyn, mujoco"),
-        (["--max-cost", "0"], "positive number of seconds"),
-        (["--budget", "1"], "here it is --max-cost"),
-        (["--set", "speed=3.21"], "no curves are stored for this question"),
-    ],
-)
-def test_a_recommendation_that_cannot_be_given(proofroll: Proofroll, folder: Path, more: list[str], words: str) -> None:
-    """What makes no sense, and what was not measured, is one line on standard error and exit code 2."""
-    code, out, err = proofroll(*asked(folder), *more)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert words in err
-
-
-@pytest.mark.parametrize("more", [["--tolerance", "soon"], ["--quantity", "colour"], ["--engine", "adams"]])
-def test_nothing_is_measured_for_a_question_that_makes_no_sense(
-    proofroll: Proofroll, tmp_path: Path, more: list[str]
-) -> None:
-    """A slip of the pen is told before the minutes that --measure takes, not after."""
-    code, out, err = proofroll(*asked(tmp_path, "--measure"), *more)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert not list(tmp_path.glob("**/*.npz"))
-
-
-@pytest.mark.parametrize(
-    ("tolerance", "metres"), [("1e-3", 1e-3), ("1e-3 m", 1e-3), ("1 mm", 1e-3), ("20µm", 2e-5), ("20 um", 2e-5)]
-)
-def test_a_tolerance_as_engineers_write_it(proofroll: Proofroll, folder: Path, tolerance: str, metres: float) -> None:
-    """A unit may carry a prefix of SI, with or without a space before it."""
-    _, out, _ = proofroll(*asked(folder, "--json", tolerance=tolerance))
-    assert json.loads(out)["tolerance"] == pytest.approx(metres)
-
-
-def test_curves_of_another_version_are_not_answered_from(
-    proofroll: Proofroll, folder: Path, measured: TradeoffStudy
-) -> None:
-    """Curves measured with another version of an engine, or on another machine, are named stale, and why."""
-    (path,) = (folder / "tradeoff").iterdir()
-    old = replace(study_store.conditions_now(), versions=study_store.versions() | {"mujoco": "1.0"})
-    keep_study(replace(measured, measured=old), path)
-    code, _, err = proofroll(*asked(folder))
-    assert code == 2
-    assert "mujoco 1.0 then" in err
-    assert "--measure" in err
-
-
 def test_an_answer_needs_no_library_of_pages(
     proofroll: Proofroll, measured: TradeoffStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -241,8 +136,8 @@ def test_an_answer_needs_no_library_of_pages(
 
 
 @pytest.mark.drill
-def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> None:
-    """Lines fit 80 columns, the diagram and pyperf's file are written, and an answer comes from what was measured."""
+def test_tradeoff_writes_its_diagram_and_timings(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Lines fit 80 columns, and the diagram and pyperf's file are written."""
     given = ["--set", "speed=3", "--until", "0.1", "--engine", ENGINE, "--out", str(tmp_path)]
     code, out, err = proofroll("tradeoff", "sphere_in_cylinder", *given)
     assert (code, err) == (0, "")
@@ -253,31 +148,6 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
     assert "Exudyn carrier, matched" in drawn.read_text()
     (timings,) = (tmp_path / "tradeoff").glob("*.pyperf.json")
     assert len(pyperf.BenchmarkSuite.load(str(timings)).get_benchmarks()) >= 6
-
-    code, out, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given)
-    assert (code, err) == (0, "")
-    assert "Take Exudyn carrier, matched" in out
-    code, _, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given[:4], *given[-2:])
-    assert code == 2
-    assert f"the stored curves are of {ENGINE}; choose among these" in err
-
-
-@pytest.mark.drill
-def test_an_answer_over_a_range(proofroll: Proofroll, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With --over only curves checked over that range are answered from; --measure checks over it, and not another."""
-    assert proofroll(*asked(folder), "--over", "speed=3:5")[0] == 0
-    code, _, err = proofroll(*asked(folder), "--over", "speed=3:4.5")
-    assert code == 2
-    assert "not checked over these ranges" in err
-    given: list[Any] = []
-
-    def measuring(_question: object, _runner: object, extent: Extent, _progress: object) -> None:
-        given.append(extent.over)
-        raise ProofrollError("enough")
-
-    monkeypatch.setattr("proofroll.studies.tradeoff.study.tradeoff", measuring)
-    assert "enough" in proofroll(*asked(folder), "--over", "speed=3:4.5", "--measure")[2]
-    assert given == [{"speed": [3.0, 4.5]}]
 
 
 def test_what_was_found_over_a_range(measured: TradeoffStudy, capsys: pytest.CaptureFixture[str]) -> None:
@@ -297,28 +167,6 @@ def test_what_was_found_over_a_range(measured: TradeoffStudy, capsys: pytest.Cap
         worst = max(point.corners or [], key=lambda corner: corner.errors["z"])
         expected = f"{labels.number(worst.errors['z'])} speed = {worst.parameters['speed']:g}"
         assert any(expected in " ".join(line.split()) for line in lines)
-
-
-@pytest.mark.drill
-def test_onset_to_one_percent(proofroll: Proofroll, tmp_path: Path) -> None:
-    """The time of the first slip is a quantity too, and a percentage of it is one of the time until it."""
-    given = [
-        "sphere_in_cylinder",
-        "--set",
-        "speed=2",
-        "--set",
-        "mu_static=0.35",
-        "--until",
-        "0.25",
-        "--out",
-        str(tmp_path),
-    ]
-    given += ["--engine", "pinocchio[formulation=impulses,preset=tuned]", "--quantity", "first_slip"]
-    code, out, err = proofroll("recommend", *given, "--tolerance", "1 %", "--measure", "--json")
-    assert (code, err) == (0, "")
-    answer = json.loads(out)
-    assert answer["tolerance"] == pytest.approx(0.01 * 0.2166732, rel=1e-5)  # the closed form's first slip
-    assert answer["choice"]["error"] <= 0.5 * answer["tolerance"]
 
 
 @pytest.mark.parametrize(

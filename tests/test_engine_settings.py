@@ -24,8 +24,8 @@ PATHS = {
     "comparison under control": "compare {robot} --control {control} --until 0.02",
     "trade-off of a scene": "tradeoff pendulum --until 0.1",
     "trade-off under control": "tradeoff {robot} --control {control} --until 0.02",
-    "recommendation for a scene": "recommend pendulum --until 0.1 --tolerance 1e-3 --measure",
-    "recommendation under control": "recommend {robot} --control {control} --until 0.02 --tolerance 1e-3 --measure",
+    "recommendation for a scene": "recommend pendulum --until 0.1 --tolerance 1e-3",
+    "recommendation under control": "recommend {robot} --control {control} --until 0.02 --tolerance 1e-3",
     "balance": "balance pendulum",
     "balance under control": "balance {robot} --control {control}",
 }

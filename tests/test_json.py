@@ -29,7 +29,7 @@ from proofroll.report.comparison.records import (
     WorstJudgement,
 )
 from proofroll.report.ladder.ladder import Absence, KnownTruth, LadderContent, RungFound, SideFound, TermFound
-from proofroll.report.page.advice import Advised, QuestionAnswer
+from proofroll.report.page.first_screen import ReportedAnswer
 from proofroll.robots.check.explain import RobotCause
 from proofroll.robots.check.records import (
     DrawnBody,
@@ -45,6 +45,14 @@ from proofroll.robots.control.judge import RecordJudgement
 from proofroll.robots.control.record import Layer, LayerCause
 from proofroll.robots.files.robot_file import LintRemark
 from proofroll.running.timing import Interval
+from proofroll.studies.answer.records import (
+    AllowedError,
+    EngineAnswer,
+    SceneAnswer,
+    SettingTried,
+    StepAnswer,
+    StepTried,
+)
 from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.fuzz.hunt import FoundKind, Hunt
 from proofroll.studies.fuzz.shrink import SmallestScene
@@ -60,7 +68,6 @@ from proofroll.studies.stability.records import (
     StabilityStudy,
 )
 from proofroll.studies.study_store import Measured
-from proofroll.studies.tradeoff.recommend import Answer, CheckedOver, Recommendation
 from proofroll.studies.tradeoff.records import (
     Corner,
     CurveBudget,
@@ -184,7 +191,11 @@ TRADEOFF = (
         ("json.md", "`judge --robot --json`", (RecordJudgement, Layer, LayerCause)),
         ("json.md", "`compare --json`", COMPARISON),
         ("json.md", "`stability --json`", MAP),
-        ("tradeoff.md", "JSON", (*TRADEOFF, Recommendation, Answer, CheckedOver)),
+        (
+            "tradeoff.md",
+            "JSON",
+            (*TRADEOFF, SceneAnswer, StepAnswer, EngineAnswer, AllowedError, StepTried, SettingTried),
+        ),
         ("json.md", "`ladder --json`", LADDER),
         ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
         (
@@ -194,8 +205,7 @@ TRADEOFF = (
                 Against,
                 RunChange,
                 TwoRuns,
-                QuestionAnswer,
-                Advised,
+                ReportedAnswer,
                 Drilled,
                 Mutated,
                 Hunt,

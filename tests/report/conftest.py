@@ -19,6 +19,7 @@ from browsing import Drawn, Visit, launched, visiting
 from flat_judging import judged_curve
 from folded import whole
 from invented import figures_part, further, regimes_part
+from invented_answers import reported
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.dataset import observe, scales
@@ -130,7 +131,10 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
 def written(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
     """What stands in report.json, and the folder of a written report."""
     out = tmp_path_factory.mktemp("out")
-    begun([made[0]], "proofroll report invented").write(out)
+    whole = begun([made[0]], "proofroll report invented")
+    for item in reported():
+        whole.add_answer(item)
+    whole.write(out)
     return json.loads((out / "report.json").read_text(encoding="utf-8")), out
 
 
@@ -220,6 +224,8 @@ def everything(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFac
     for part in (figures_part(tmp_path_factory.mktemp("figures")), regimes_part(), *further()):
         whole.parts.append(part)
         whole.make(part, lambda: None)
+    for item in reported():
+        whole.add_answer(item)
     comparison = whole.content.comparisons[0]
     event = Event("slip", 0.5, 0.5, 0.51)
     onset = Onset(0.5, None, None, None, None, np.inf, 1e-3, "well-posed", None, None)

@@ -32,10 +32,10 @@ def test_every_section_says_something(report_page: Path, visit: Visiting) -> Non
     with visit(report_page, before=UNDRAWN) as seen:
         seen.unfold()
         ids = seen.page.evaluate("[...document.querySelectorAll('section[id]')].map((section) => section.id)")
-        assert {"verdicts", "use", "evidence-invented"} <= set(ids)
+        assert {"verdicts", "replay", "evidence-invented"} <= set(ids)
         assert seen.page.evaluate("reading.empty()") == []
-        seen.page.evaluate("document.querySelector('#use').innerHTML = '<h2>Scene by scene</h2> <svg></svg>'")
-        assert seen.page.evaluate("reading.empty()") == ["use"]
+        seen.page.evaluate("document.querySelector('#replay').innerHTML = '<h2>Replay</h2> <svg></svg>'")
+        assert seen.page.evaluate("reading.empty()") == ["replay"]
 
 
 @pytest.mark.drill
@@ -97,7 +97,7 @@ def test_no_number_is_broken_at_its_hyphen(report_page: Path, visit: Visiting) -
 
 @pytest.mark.drill
 def test_what_is_folded_is_built_when_it_is_opened(everything: Any, tmp_path: Path, visit: Visiting) -> None:
-    """Of two comparisons the second is a heading until it is opened; then its tables sort, and hidden engines are so.
+    """Of two comparisons the second is a heading until it is opened; then its tables are built.
 
     Until everything is opened the page has few elements.
     """
@@ -108,13 +108,10 @@ def test_what_is_folded_is_built_when_it_is_opened(everything: Any, tmp_path: Pa
     with visit(both, before=UNDRAWN) as seen:
         few = seen.page.evaluate(count)
         assert seen.page.locator("#evidence-again table").count() == 0
-        seen.page.locator("[name=engine][value=alpha]").uncheck()
         seen.page.locator("#verdicts-again > summary").press("Enter")
         seen.page.locator("#evidence-again > details > summary").press("Enter")
         seen.wait("document.querySelectorAll('#evidence-again table').length > 3")
         assert seen.page.locator("#evidence-again [data-engine='alpha']").count() > 0
-        shown = seen.page.locator("#evidence-again [data-engine='alpha']:visible")
-        seen.until(lambda: shown.count() == 0, what="alpha is hidden")
     with visit(both, before=UNDRAWN) as seen:
         seen.unfold()
         assert seen.page.evaluate(count) > 1.5 * few
@@ -239,7 +236,7 @@ def test_first_slips_and_bounds_of_friction_are_drawn(drawn: Visit) -> None:
 def test_the_contents_follow_the_reader(report_page: Path, visit: Visiting) -> None:
     """Wherever a reader is, the contents are in sight and mark the section that is being read."""
     with visit(report_page, before=UNDRAWN) as seen:
-        for name in ("use", "replay", "verdicts"):
+        for name in ("replay", "verdicts"):
             marked = "[...document.querySelectorAll('nav a[aria-current]')].map((link) => link.hash).join()"
             seen.near(f"#{name}", f"{marked} === '#{name}'")
             assert seen.page.evaluate("document.querySelector('nav').getBoundingClientRect().top") < 200

@@ -7,9 +7,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from invented import stability_study, tradeoff_study
+from invented import stability_study
 
-from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import TellsCaveats
 from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import engine_names, load_engine
@@ -19,11 +18,8 @@ from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.labels import family_and_caveat, with_caveat
 from proofroll.report.stability.tables import silent_lines
-from proofroll.report.tradeoff.tables import answer_lines
 from proofroll.running.case import EngineFacts
 from proofroll.running.engine_questions import resolve
-from proofroll.studies.tradeoff.recommend import recommend
-from proofroll.studies.tradeoff.requirements import Requirements
 
 CONTACT = MechanismCapability.CONTACT
 OURS = "integrated by proofroll"
@@ -163,15 +159,9 @@ def test_a_caveat_stands_beside_a_name_that_is_blamed() -> None:
     assert with_caveat("machine free", "") == "machine free"
 
 
-def test_advice_and_silent_failures_carry_the_caveat() -> None:
-    """A recommendation says once what is not the engine's own, and so does the line that blames a setting."""
-    mine = "somebody else's steps"
-    offered, mapped = tradeoff_study(), stability_study()
-    offered = replace(offered, points=[replace(point, caveat=mine) for point in offered.points])
-    mapped = replace(mapped, points=[replace(point, caveat=mine) for point in mapped.points])
-    answer = recommend(offered, Requirements("z", Tolerance(1e-2, False, "m")))
-    (caveats,) = (line for line in answer_lines(answer) if line.startswith("Caveats: "))
-    assert "rough" in caveats
-    assert mine in caveats
+def test_silent_failures_carry_the_caveat() -> None:
+    """The line that blames a setting says what of it is not the engine's own."""
+    mapped = stability_study()
+    mapped = replace(mapped, points=[replace(point, caveat="somebody else's steps") for point in mapped.points])
     (blamed,) = silent_lines(mapped)
     assert "somebody else's steps" in blamed

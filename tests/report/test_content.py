@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import shutil
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -38,24 +37,6 @@ def test_the_largest_error_of_a_row_is_that_of_all_its_cases() -> None:
     found = _worst([_run(2.0, 0.5, 0.1), _run(6.0, 0.9, 1.0)], "N")
     assert (found.error, found.point) == (0.5, "speed=2")
     assert found.largest == 0.9
-
-
-def test_the_answers_are_those_that_recommend_prints(
-    written: tuple[dict[str, Any], Path], proofroll: Callable[..., tuple[int, str, str]]
-) -> None:
-    """report.json has the answer to each of 14 questions; recommend makes the same choice from the same runs."""
-    content, out = written
-    assert len(content["answers"]) == 14
-    chosen = set()
-    for item in content["answers"]:
-        tolerance = f"{item['tolerance']:g} of path"
-        words = ["recommend", "invented", "--report", str(out / "report.json"), "--tolerance", tolerance, "--json"]
-        _, printed, _ = proofroll(*words, *(["--forces"] if item["forces"] else []))
-        assert [advised["choice"] for advised in json.loads(printed)["advice"]] == [
-            advised["choice"] for advised in item["advice"]
-        ]
-        chosen.add(item["advice"][0]["choice"])
-    assert len(chosen) > 1, "not one answer to all"
 
 
 def counted(load: Callable[..., Any], counts: Counter[str]) -> Callable[..., Any]:

@@ -203,11 +203,14 @@ def test_legend_has_lines_symbols_and_verdicts_and_can_be_reached(html: str, par
     assert len(buttons) == 2 * 4
     assert all(button["aria-pressed"] == "true" for button in buttons)
     canvases = [attributes for _, attributes in elements.tags if attributes.get("class") == "canvas"]
-    assert len(canvases) == 2 * 6 + 1  # the one of error against cost
+    assert len(canvases) == 2 * 6
     assert all(canvas["tabindex"] == "0" and canvas["aria-label"] for canvas in canvases)
     outlines = {attributes["d"] for tag, attributes in elements.tags if tag == "path"}
     assert len(outlines & set(OUTLINES.values())) == 2
-    assert re.search(r'alpha fine matched.*?<b class="v agrees" title="agrees">✓</b></button>', html, re.DOTALL)
+    legend = re.findall(r'<button type="button" aria-pressed="true" data-row="0">.*?</button>', html, re.DOTALL)
+    assert all("fine, matched" in item or "fine matched" in item for item in legend)
+    assert all('<b class="v agrees" title="agrees">✓</b></button>' in item for item in legend)
+    assert len(legend) == 2
 
 
 def test_whatever_the_limits_the_page_is_json(made: tuple[Outcome, Store], unpack: Any) -> None:

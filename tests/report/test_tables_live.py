@@ -103,7 +103,7 @@ def test_every_list_sorts_and_downloads(report_page: Path, visit: Visiting) -> N
     """Each table, a map, too, and one with joined cells; with two rows or more it filters; nothing below moves."""
     with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
         opened.unfold()
-        lists = """[...document.querySelectorAll('.scroll > table:not(#choice, #uses, #answer-one *)')].filter(
+        lists = """[...document.querySelectorAll('.scroll > table')].filter(
           (table) => table.querySelectorAll('tbody tr:not(.group)').length > 0)"""
         opened.page.evaluate(
             f"window.lists = {lists}.map((table) => [table, table.tBodies[0].rows.length, table.closest('.scroll')])"
@@ -128,7 +128,8 @@ def test_every_list_sorts_and_downloads(report_page: Path, visit: Visiting) -> N
 @pytest.mark.drill
 def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, tmp_path: Path) -> None:
     """A map offers no sorting, as its text says; it filters, and its file names axis and value of each column."""
-    with visit(report_page, "#study-stability", viewport={"width": 1280, "height": 900}) as opened:
+    with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
+        opened.page.evaluate("folds.find('study-stability')")
         opened.wait("document.querySelector('.heat') !== null")
         opened.page.evaluate("""['40 d', '– d!', '5'].forEach((text) => {
           const row = document.querySelector('.heat tbody tr:last-child').cloneNode(true);
@@ -138,6 +139,7 @@ def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, 
         column = "[...document.querySelectorAll('.heat tbody tr:not(.group)')].map((row) => row.cells[1].textContent)"
         texts = opened.page.evaluate(column)
         assert len(texts) == 4
+        opened.page.evaluate("location.hash = 'study-stability'")
         opened.near(".heat", "document.querySelector('.heat').closest('.scroll').dataset.sorts === ''")
         opened.page.locator(".heat thead tr:last-child th").nth(1).click()
         assert opened.page.evaluate(column) == texts
@@ -151,17 +153,6 @@ def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, 
     assert all(name.partition(" ")[2] for name in head[1:]), "axis and value"
     assert len(rows) == len(texts)
     assert {len(row) for row in rows} == {len(head)}
-
-
-@pytest.mark.drill
-def test_hidden_engines_stay_hidden_in_a_table_that_sorts(live: Visit) -> None:
-    """The boxes of the first screen act on the rows of a table that has been taken apart."""
-    live.page.locator("[name=engine][value=alpha]").uncheck()
-    shown = f"[...document.querySelectorAll(`{TABLE} tbody tr`)].filter((row) => row.checkVisibility())"
-    live.wait(f"{shown}.length === 2")
-    assert [row for row in column(live, 0) if not row.startswith("alpha")] == live.page.evaluate(
-        f"{shown}.map((row) => row.cells[0].textContent.trim())"
-    )
 
 
 @pytest.mark.drill

@@ -16,7 +16,6 @@ from folded import whole
 from rich.console import Console
 
 from proofroll.core.convergence import Limit, richardson
-from proofroll.core.engine_abilities import Level
 from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.conclusions import conclusions
 from proofroll.report.comparison.plots import point_curves
@@ -24,16 +23,14 @@ from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.comparison.verdict_matrix import counted, rows_by_engine, title
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
-from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, choice_matrix
 from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.html import page
 from proofroll.report.page.records import report_content
 from proofroll.report.terminal.verdicts import verdict_parts
 from proofroll.running.case import Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
+from proofroll.studies.comparison.outcome import Outcome, Run
 
-NOTHING = choice_matrix([], {})
 TRUE = np.sin(np.linspace(0, 2, 21))
 OTHER = Limit(TRUE + 0.05, 2e-4, 1.0)
 SCATTERED = richardson([TRUE + off for off in (0.05, -0.04, 0.06)], (4, 2, 1), 1)
@@ -141,11 +138,11 @@ def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
     result = Result(Status.REFUSED, "no wall, no ball")
     refused = dataclasses.replace(run, result=result, judgements=[], contradictions=[], missing=[])
     content = outcome_content(with_runs(made[0], {number: [refused]}))
-    found = conclusions(content, NOTHING, [], None)
+    found = conclusions(content, [], None)
     assert "1 refuses the scene, or some case of it, with the reason" in found.answer
     assert "did not even finish" not in " ".join(found.sentences)
     assert "⊘ 1 refused" in counted(content)
-    assert "1 refuses the scene, or some case of it" in three_sentences([content], {}, NOTHING)[0]
+    assert "1 refuses the scene, or some case of it" in three_sentences([content], {}, [])[0]
     text = whole(page(report_content([with_runs(made[0], {number: [refused]})], ""), [[]], {}, None))
     assert '<p class="status refused"><b>refused</b>: no wall, no ball</p>' in text
 
@@ -190,13 +187,13 @@ def test_what_could_not_be_judged_is_not_said_to_be_as_expected(made: tuple[Outc
     runs = {rows.index(run.row): [answered(run)] for run in made[0].runs}
     content = outcome_content(with_runs(made[0], runs))
     assert "As the file expects." in told(content)
-    assert "All of this was expected." in conclusions(content, NOTHING, [], None).answer
+    assert "All of this was expected." in conclusions(content, [], None).answer
     assert counted(content).endswith("; as expected")
     nothing = Result(Status.NO_TRUTH, "there is no truth here")
     runs[0] = [dataclasses.replace(run, result=nothing, judgements=[]) for run in runs[0]]
     content = outcome_content(with_runs(made[0], runs))
     assert "Nothing contradicts the file; 1 of its runs could not be judged." in told(content)
-    assert "Nothing of it was unexpected." in conclusions(content, NOTHING, [], None).answer
+    assert "Nothing of it was unexpected." in conclusions(content, [], None).answer
     assert counted(content).endswith("; nothing is contradicted")
     away = Result(Status.MISSING, "beta is not installed here")
     runs[0] = [dataclasses.replace(run, result=away) for run in runs[0]]
@@ -211,7 +208,7 @@ def test_where_nothing_is_claimed_nothing_is_said_to_be_expected(made: tuple[Out
     runs = [dataclasses.replace(run, row=row, contradictions=[]) for run, row in zip(made[0].runs, own, strict=True)]
     open_to_all = dataclasses.replace(comparison, rows=rows)
     content = outcome_content(dataclasses.replace(made[0], comparison=open_to_all, runs=runs))
-    found = conclusions(content, NOTHING, [], None)
+    found = conclusions(content, [], None)
     assert "expected" not in found.answer
     assert found.sentences[-1] == "No file states expectations here, so nothing can contradict them."
     assert not re.search("expected|contradicted", counted(content))
@@ -227,7 +224,7 @@ def test_who_is_silent_or_shares_equations_is_marked(outcome: Outcome) -> None:
     assert row.remarks == ["rests on the same equations as the truth itself (alike)"]
     assert "z 0 of 1e-3 m – does not report F2, N" in told(content)
     assert counted(content) == "4 settings: ✓ 1 agrees, ◐ 1 incomplete, ✗ 2 differs; as expected"
-    said = three_sentences([content], {}, NOTHING)[0]
+    said = three_sentences([content], {}, [])[0]
     assert said.startswith("Of 4 settings in one comparison, 1 agrees with the truth in every observable")
 
 
@@ -282,64 +279,6 @@ def test_rows_of_one_declared_scheme_are_named_whatever_their_errors(
         "alpha fine default, beta: semi-implicit Euler."
     )
     assert (said in told(dataclasses.replace(content, rows=rows))) is shared
-
-
-def test_closest_is_nobody_who_rests_on_the_truth(made: tuple[Outcome, Store]) -> None:
-    """A row that shares the truth's equations is not named as the closest, however small its error is."""
-    content, choice = outcome_content(made[0]), report_content([made[0]], "proofroll report invented").choice
-    assert "closest is alpha fine, matched" in three_sentences([content], {}, choice)[0]
-    content.rows[0] = dataclasses.replace(content.rows[0], shared="rests on the same equations")
-    assert "closest is alpha fine, default" in three_sentences([content], {}, choice)[0]
-
-
-@pytest.mark.parametrize("coarse", [0.19999999, 0.2, 0.20000001])
-def test_the_cheapest_is_the_same_in_each_sentence_and_in_the_matrix(
-    made: tuple[Outcome, Store], coarse: float
-) -> None:
-    """With settings and rungs that cost nearly the same the first page, the comparison and the matrix name one."""
-    runs: dict[int, list[Run]] = {0: [], 1: []}
-    for run in made[0].runs:
-        number = made[0].comparison.rows.index(run.row)
-        if number < 2:
-            fine = dataclasses.replace(run.result, timings=[0.2], seconds_per_second=0.2)
-            rung = dataclasses.replace(run.result, timings=[coarse], seconds_per_second=coarse)
-            step = LadderRun(4e-3, rung, {item.observable: 1e-8 for item in run.judgements})
-            runs[number].append(dataclasses.replace(run, result=fine, rungs=[step]))
-    content = report_content([with_runs(made[0], runs)], "proofroll report invented")
-    (column,) = content.choice.kinds
-    first = content.choice.standings(column, FIRST_TOLERANCE, True)[0]
-    cell = first
-    assert "4e-3 s" in cell.name if coarse < 0.2 else cell.cost == 0.2
-    assert "alpha for rolling balls" in content.findings[2]
-    assert content.comparisons[0].evidence
-    held = "To hold 0.1 mm per metre of the true path and forces within 1e-4 of the largest"
-    answer = content.comparisons[0].evidence.findings.answer
-    assert (
-        f"{held}, the cheapest is {first.engine} {first.formulation}, {first.setting}: {cell.text} real time" in answer
-    )
-
-
-def test_equations_derived_for_a_scene_are_in_no_contest(made: tuple[Outcome, Store]) -> None:
-    """They are the cheapest, and neither the comparison's sentence nor that of the first page names them."""
-    runs: dict[int, list[Run]] = {0: [], 1: []}
-    for run in made[0].runs:
-        number = made[0].comparison.rows.index(run.row)
-        if number < 2:
-            assert run.facts is not None
-            facts = dataclasses.replace(run.facts, level=Level.PROJECTION if number == 0 else Level.CONSTRAINT)
-            engine = "derived" if number == 0 else facts.name
-            seconds = 0.01 if number == 0 else 0.2
-            result = dataclasses.replace(run.result, timings=[seconds], seconds_per_second=seconds)
-            judged = [dataclasses.replace(item, error=1e-9) for item in run.judgements]
-            facts = dataclasses.replace(facts, name=engine)
-            runs[number].append(dataclasses.replace(run, result=result, judgements=judged, facts=facts))
-    content = report_content([with_runs(made[0], runs)], "proofroll report invented")
-    assert {row.engine for row in content.choice.rows if row.own_equations} == {"derived"}
-    assert content.comparisons[0].evidence
-    answer = content.comparisons[0].evidence.findings.answer
-    assert "the cheapest is alpha" in answer
-    (drawn,) = content.precision.values()
-    assert {curve.engine for curve in drawn.curves if curve.own} == {"derived"}
 
 
 def test_every_verdict_is_documented() -> None:

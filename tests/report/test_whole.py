@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-from folded import whole
 from invented import further, stability_study, tradeoff_study
+from invented_answers import reported
 from report_schema import SCHEMA, problems
 
 from proofroll.core.errors import ProofrollError
-from proofroll.report.page.answer import answer
-from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, choice_matrix
 from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.growing import Report, begun
 from proofroll.report.page.html import page
@@ -39,6 +37,8 @@ def report(made: tuple[Outcome, Store]) -> Report:
     for part in further():
         whole.parts.append(part)
         whole._put(part, part.entry())
+    for item in reported():
+        whole.add_answer(item)
     return whole
 
 
@@ -85,9 +85,6 @@ def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     ids = [attributes["id"] for tag, attributes in elements.tags if tag == "section" and "id" in attributes]
     assert ids == [
         "answer",
-        "sec-matrix",
-        "sec-profile",
-        "use",
         "verdicts",
         "evidence-invented",
         "chapter-sphere_in_cylinder",
@@ -108,17 +105,6 @@ def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     )
 
 
-def test_error_against_cost_is_drawn_where_runs_allow_it(report: Report, written_page: str) -> None:
-    """The trade-off and the comparison have pictures, of all their engines, and a choice of their quantities."""
-    found = report.content.precision
-    assert set(found) == {"study-tradeoff", "evidence-invented"}
-    assert {curve.engine for curve in found["evidence-invented"].curves} == {"alpha", "beta"}
-    written_page = whole(written_page)
-    for section, picture in found.items():
-        part = written_page[written_page.index(f'data-precision="{section}"') :]
-        assert part[: part.index("</select>")].count("<option") == len(picture.quantities)
-
-
 def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     """What agrees best, what is silent, what to use; other data give other sentences, none at all still give three."""
     found = report.content.findings
@@ -127,25 +113,14 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
         "Of 4 settings in one comparison, 1 agrees with the truth in every observable and every case, 1 agrees without "
         "reporting all that is judged"
     )
-    assert "closest is alpha fine, matched" in found[0]
     assert found[1].startswith(
         "1 setting differs from the truth and runs to the end without a warning, worst alpha fine, default"
     )
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a warning.")
-    assert found[2] == answer(report.content.choice, FIRST_TOLERANCE, forces=True).sentence
-    nothing = three_sentences([], {}, choice_matrix([], {}))
+    assert found[2] == "The cheapest that holds 1e-4 of the path: alpha for invented."
+    nothing = three_sentences([], {}, [])
     assert len(nothing) == 3
     assert all(sentence.endswith(".") for sentence in nothing)
-
-
-def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(report: Report) -> None:
-    """At a millimetre the cheap one fails, with its reason."""
-    answers = {item.answer.tolerance: item.answer for item in report.content.entries["tradeoffs"][0].advice}
-    answer = answers[1e-3]
-    assert answer.choice.point.engine == "good"
-    assert answer.first_failure.point.engine == "rough"
-    assert "off by 3e-3 m" in answer.first_failure.reason
-    assert answers[1e-2].choice.point.engine == "rough"
 
 
 def test_a_chapter_is_closed_with_its_result_in_its_title(written_page: str, parse: Any) -> None:
@@ -155,7 +130,12 @@ def test_a_chapter_is_closed_with_its_result_in_its_title(written_page: str, par
     assert "Sphere in cylinder" in title
     assert "claims hold" in title
     assert "study-tradeoff" not in written_page[start : written_page.index("</section>", start)], "it is folded"
-    table = parse(written_page).text.partition("holds 1e-4")[2].partition("Price: relative")[0]
+    table = (
+        parse(written_page)
+        .text.partition("Speed against accuracy")[2]
+        .partition("holds 1e-4")[2]
+        .partition("Price: relative")[0]
+    )
     assert "good" in table
     assert "rough" not in table
     assert "do not hold it and are left out" in table

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from proofroll.cli import options
+from proofroll.cli.own_step import answer_steps, stored_sentences
 from proofroll.core.number_format import number as written
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ def compare(
     scheduler: options.Scheduler = None,
     budget: options.Budget = None,
     until: options.Until = None,
+    tolerance: options.Tolerances = None,
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default about a fiftieth of --until.")
     ] = None,
@@ -71,6 +73,9 @@ def compare(
     For a scene or a robot file every formulation that can represent it is run, without claims. --set, --until, --every
     and --budget are for these; runs beyond 60 s of processor time are left out and named. An --engine without a row in
     the file gets a row without claims.
+
+    With --tolerance a scene is judged by it. With --engine, too, the answer is one line for each: whether that step
+    is good enough over the scene's own duration, by how much, and which one would do.
     """
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.screen import WIDTH
@@ -79,10 +84,12 @@ def compare(
     from proofroll.studies.comparison.by_name import comparison_named
 
     comparison, workers = options.controlled(comparison, control), Workers()
+    assigned, bounds = options.assignments(settings), tolerance or []
+    if engine and bounds:
+        runner = options.new_runner(out, fresh, jobs, scheduler, workers)
+        answer_steps(comparison, engine, bounds, assigned, until, runner, out, as_json=as_json)
     with options.spinner(comparison):
-        loaded = comparison_named(
-            comparison, options.assignments(settings), workers, budget, scheduler, engine or [], until, every
-        )
+        loaded = comparison_named(comparison, assigned, workers, budget, scheduler, engine or [], until, every, bounds)
     mention_absent(loaded.absent)
     if control is not None:
         options.doubt_numbers(comparison, settings)
@@ -90,9 +97,9 @@ def compare(
     def show(outcome: Outcome) -> None:
         content = outcome_content(outcome)
         parts = partial(verdict_parts, content, orders=orders, witnesses=witnesses)
-        options.show(content, as_json, parts, widest=WIDTH)
+        options.show(content, as_json, lambda: [*cheapest, *parts()], widest=WIDTH)
 
-    runner = options.new_runner(out, fresh, jobs, scheduler, workers)
+    runner, cheapest = options.new_runner(out, fresh, jobs, scheduler, workers), stored_sentences(loaded, out)
     outcomes = outcomes_of([loaded], engine or [], runner, watched=_Watched(show, moves=not as_json))
     show(outcomes[0])
     raise typer.Exit(exit_code(outcomes))
@@ -136,7 +143,6 @@ def outcomes_of(
     spent: float = 0.0,
     *,
     watched: _Watched | None = None,
-    coarser: bool = False,
 ) -> list[Outcome]:
     """Runs all comparisons with one progress bar, one after the other as far as that leaves no worker idle.
 
@@ -152,7 +158,6 @@ def outcomes_of(
         budget: processor time of all of them [s]. All runs then come before the first ladder, and each comparison has
             an equal share of the time left; what it does not use is for later ones.
         spent: part of the budget that was used before [s].
-        coarser: see :func:`proofroll.studies.comparison.planning.plan`.
         watched: shows a single comparison while it runs, and what has ended if the user ends the command.
     """
     from proofroll.running.process import processor_seconds
@@ -162,7 +167,7 @@ def outcomes_of(
 
     begin = processor_seconds() - spent
     with options.spinner(f"{stage}cases"):
-        plans = [affordable(plan(item, engines, runner.workers, coarser=coarser), runner) for item in comparisons]
+        plans = [affordable(plan(item, engines, runner.workers), runner) for item in comparisons]
     brief = [item.brief for item in plans]
     grown = [(index, item.cases) for index, item in enumerate(plans) if len(item.truths) > len(brief[index].truths)]
     if budget:

@@ -28,9 +28,7 @@ def judge(
         str | None, typer.Option(help="The scene, or the path of its folder.", autocompletion=options.scenes_like)
     ] = None,
     settings: options.Set = None,
-    tolerance: Annotated[
-        list[str] | None, typer.Option(help="variable='1 %' of its scale, or variable='1e-3 m'; repeat.")
-    ] = None,
+    tolerance: options.Tolerances = None,
     columns: Annotated[
         list[str] | None,
         typer.Option("--map", help="Your columns: t=time,theta=q.pivot[deg],x=tip.x[cm]; units are converted."),
@@ -78,7 +76,7 @@ def judge(
     if (named is None) == (not scene):
         raise InputError("scene", scene or "", "name it once: proofroll judge FILE --scene SCENE")
     loaded = load_scene(scene or str(named), **{**written, **options.assignments(settings)})  # type: ignore[arg-type]  # text is checked there
-    bounds = options.assignments(tolerance, "--tolerance") if tolerance else None
+    bounds = _bounds(tolerance, loaded.deciding) if tolerance else None
     with options.spinner(f"the truth of {loaded.name}"), options.wall_limit(time_limit, f"the truth of {loaded.name}"):
         judged = judging.judge(run, loaded, bounds, because=because, columns=_names(columns))
     if as_json:
@@ -88,6 +86,17 @@ def judge(
         lines = _lines(judged, run.name, asked, _names(columns), everything=everything)
         options.show_lines(lines, widest=WIDTH)
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)
+
+
+def _bounds(texts: list[str], deciding: str) -> dict[str, str] | str:
+    """Tolerance of ``--tolerance`` by variable; one text without a name is for what the file gives."""
+    from proofroll.studies.judging.asked_tolerance import in_percent
+
+    if len(texts) == 1 and "=" not in texts[0]:
+        return in_percent(texts[0])
+    return options.assignments(
+        [text if "=" in text else f"{deciding}={in_percent(text)}" for text in texts], "--tolerance"
+    )
 
 
 def _lines(judged: Judged, file: str, asked: str, names: Mapping[str, str], *, everything: bool) -> Iterator[str]:

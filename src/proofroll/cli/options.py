@@ -84,6 +84,10 @@ Until = Annotated[
     float | None,
     typer.Option("--until", help="Last time [s]; by default 2, or the scene's duration where that is shorter."),
 ]
+Tolerances = Annotated[
+    list[str] | None,
+    typer.Option("--tolerance", help="1e-4 of the path (default), '0.1 %' of it, '1 mm', or QUANTITY='1 mm'; repeat."),
+]
 Control = Annotated[
     Path | None,
     typer.Option("--control", help="TOML file of the controller of a robot file: gains, targets or policy, start."),

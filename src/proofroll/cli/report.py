@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
+from proofroll.cli.answering import require_tolerances, search_answers
 from proofroll.cli.comparing import exit_code, list_omitted_engines, outcomes_of
 
 if TYPE_CHECKING:
@@ -48,6 +49,13 @@ def report(
         str | None,
         typer.Option(help="Groups of scenes or folders, as loops,peers: all comparisons of these, no studies."),
     ] = None,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--tolerance",
+            help="Of the first screen: 1e-4 of the path, '0.1 %', '1 mm'; repeat. By default 1e-4 and 1e-2.",
+        ),
+    ] = None,
     against: Annotated[
         Path | None,
         typer.Option(help="An earlier report.json: tells what changed; exit 1 if a verdict, an error or a cost did."),
@@ -64,6 +72,8 @@ def report(
     that is valid is used; otherwise a brief one is made, as of a comparison marked brief, and the report names the
     command that makes it whole. With --budget every comparison is brief first and grows while there is time; when the
     budget is used, no further study begins. What is left out is named. --set is for scenes and robot files.
+
+    For the first screen each engine is searched in each scene as by ``recommend``; 30 s of processor time at most each.
     """
     from dataclasses import replace
 
@@ -95,30 +105,37 @@ def report(
     loaded = [comparison_named(name, assigned, workers, None, scheduler) for name in names]
     if budget or not studies:
         loaded = [replace(item, budget=None) if budget else item.briefly() for item in loaded]
+    require_tolerances(tolerance or [], loaded)
     options.require_pages()
     templates()  # read before the work, during which the files may change
-    runner = options.new_runner(out, fresh, jobs, scheduler, workers)
-    list_omitted_engines(loaded, engine or [])
-    total = len({part.key for part in parts}) + bool(loaded)
-    command = _command(studies or [], engine or [], settings or [], budget, out, only)
+    runner, chosen = options.new_runner(out, fresh, jobs, scheduler, workers), engine or []
+    list_omitted_engines(loaded, chosen)
+    total = len({part.key for part in parts}) + 2 * bool(loaded)
+    command = _command(studies or [], chosen, settings or [], budget, out, only, tolerance or [])
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
         growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out))
         with growing.resumable():
             outcomes: list[Outcome] = []
             if loaded:
                 stage, spent = _begin(1, total, "comparisons"), _processor_seconds() - begin
-                outcomes = outcomes_of(
-                    loaded, engine or [], runner, stage, growing.add, budget, spent, coarser=not budget
-                )
+                outcomes = outcomes_of(loaded, chosen, runner, stage, growing.add, budget, spent)
         made = begun(outcomes, command, left_out=left_out)
-        made.earlier = earlier
-        missing = made.expect(parts, out, fresh=fresh)
-        made.write(out)
+        missing = _expected(made, earlier, parts, out, fresh=fresh)
         rest = (lambda: budget - _processor_seconds() + begin) if budget else None
+        stage = _begin(2, total, "the cheapest of each engine") if outcomes else ""
+        search_answers(made, outcomes, tolerance or [], chosen, runner, out, rest, stage)
         unmade = _make_all(made, parts, missing, runner, out, rest)
         _comment(comment, made.content)
         options.show(made.content, as_json, lambda: report_lines(made.content, out), widest=WIDTH)
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes), unmade))
+
+
+def _expected(made: Report, earlier: EarlierReport | None, parts: list[Part], out: Path, *, fresh: bool) -> list[Part]:
+    """Writes a report of comparisons, with the stored further studies; returns those that must be made."""
+    made.earlier = earlier
+    missing = made.expect(parts, out, fresh=fresh)
+    made.write(out)
+    return missing
 
 
 def _comment(comment: Path | None, content: ReportContent) -> None:
@@ -214,7 +231,13 @@ def _of_groups(names: list[str], only: str) -> list[str]:
 
 
 def _command(
-    studies: list[str], engines: list[str], settings: list[str], budget: float | None, out: Path, only: str | None
+    studies: list[str],
+    engines: list[str],
+    settings: list[str],
+    budget: float | None,
+    out: Path,
+    only: str | None,
+    tolerances: list[str],
 ) -> str:
     """Command that makes the report again."""
     words = ["proofroll", "report", *studies]
@@ -224,6 +247,8 @@ def _command(
         words += ["--set", setting]
     words += ["--budget", f"{budget:g}"] if budget else []
     words += ["--only", only] if only else []
+    for text in tolerances:
+        words += ["--tolerance", text]
     return shlex.join(words if out == Path("out") else [*words, "--out", str(out)])
 
 
@@ -240,7 +265,7 @@ def _make_all(
 ) -> set[str]:
     """Makes the further studies that are missing; returns names of those for which a budget left no ``rest`` [s]."""
     keys = {part.key: part.words for part in parts}
-    start, unmade = 1 + bool(made.content.comparisons), set()
+    start, unmade = 1 + 2 * bool(made.content.comparisons), set()
     for number, (key, words) in enumerate(keys.items(), start=start):
         to_make = [part for part in missing if part.key == key]
         stage = _begin(number, len(keys) + start - 1, words if to_make else f"{words}: kept from before")

@@ -114,6 +114,15 @@ class TellsCaveats(Protocol):
 
 
 @runtime_checkable
+class BringsAPart(Protocol):
+    """Ability of an engine whose adapter computes a part of some formulations, which a user of the engine lacks."""
+
+    @staticmethod
+    def brought(settings: Any) -> str:
+        """Part of the computation with these settings that the adapter brings, as ``integrator``; empty: none."""
+
+
+@runtime_checkable
 class TellsFamily(Protocol):
     """Ability of an engine whose formulations solve different laws (of contact, say), each with a limit of its own.
 

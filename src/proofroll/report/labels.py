@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
@@ -141,6 +142,26 @@ def step(resolution: str | None, value: float | None, digits: int | None = None)
     if not resolution or value is None:
         return ""
     return f"dt {number(value, digits or 3)} s" if resolution == "dt" else f"{resolution} {number(value, digits or 2)}"
+
+
+def scene_words(name: str) -> str:
+    """Name of a scene for a reader."""
+    return name.rpartition("/")[2].replace("_", " ").capitalize()
+
+
+def speed(cost: float, clean: bool, *, at_least: bool = False) -> str:
+    """Seconds of motion per second of computing, as ``90×``; rough ones are marked and rounded to coarse steps.
+
+    ``at_least``: no coarser step was seen to fail; ``≥`` stands before the speed.
+    """
+    if cost <= 0:
+        return "not timed"
+    power = 10.0 ** math.floor(math.log10(1 / cost))
+    leading = 1 / cost / power
+    coarseness = 0.1 if clean or leading < 2 else 0.5 if leading < 5 else 1.0
+    rounded = float(f"{round(leading / coarseness) * coarseness * power:.2g}")
+    sign = "≥ " if at_least else "" if clean else "≈ "
+    return f"{sign}{rounded:.0f}×" if rounded >= 10 else f"{sign}{rounded:g}×"
 
 
 def setting(row: Setting) -> str:

@@ -88,6 +88,7 @@ class EngineFacts:
             :class:`proofroll.core.engine_abilities.LowersOrder`.
         shares: routes of the truth that it shares, see :class:`proofroll.core.engine_abilities.SharesEquations`.
         caveat: part of these settings that is not the engine's own, shown beside its verdicts; empty: none.
+        brought: part of the computation that its adapter brings, as ``integrator``; empty: none.
         families: capability -> law that it solves, see :class:`proofroll.core.engine_abilities.TellsFamily`.
         family: clauses on the laws of its model that the scene requires, in one text; may be empty.
         precision: of its arithmetic, see :func:`proofroll.core.engine.precision_of`.
@@ -110,6 +111,7 @@ class EngineFacts:
     lowered: dict[str, int] = field(default_factory=dict)
     shares: list[str] = field(default_factory=list)
     caveat: str = ""
+    brought: str = ""
     families: dict[str, str] = field(default_factory=dict)
     family: str = ""
     precision: str = "double"
@@ -171,7 +173,7 @@ class Case:
         left_out = {"time_limit", *(name for name in ("asks", "turns", "between") if not getattr(self, name))}
         content = {name: value for name, value in asdict(self).items() if name not in left_out}
         content["engine"]["name"] = plain_name(self.engine.name)
-        for words in ("level", "title", "witness", "provides"):  # for people
+        for words in ("level", "title", "witness", "provides", "brought"):  # for people
             del content["engine"][words]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
 

@@ -65,6 +65,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         return dataclasses.asdict(EngineFacts("truth", truth_version(), _code_of(*load_truths()), {}))
     from proofroll.core.engine import precision_of, scheme_of
     from proofroll.core.engine_abilities import (
+        BringsAPart,
         HasTitle,
         LowersOrder,
         SharesEquations,
@@ -89,6 +90,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         lowered=dict(kind.lowered(settings)) if isinstance(kind, LowersOrder) else {},
         shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
         caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
+        brought=kind.brought(settings) if isinstance(kind, BringsAPart) else "",
         families=laws(kind, settings),
         precision=precision_of(settings),
         scheme=scheme_of(settings),

@@ -60,6 +60,11 @@ class Mujoco:
             return ""
         return "the normal row of each contact is corrected between mj_step1 and mj_step2"
 
+    @staticmethod
+    def brought(settings: MujocoSettings) -> str:
+        """See :class:`proofroll.core.engine_abilities.BringsAPart`."""
+        return "correction of each step" if settings.formulation == "geoms" and settings.cone_correction else ""
+
     family = staticmethod(mechanism_geoms.family)
 
     @staticmethod

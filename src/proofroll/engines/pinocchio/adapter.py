@@ -66,6 +66,11 @@ class Pinocchio:
         around = " around its contact solver" if settings.solver else ""
         return f"integrated by proofroll{around} (Pinocchio has no integrator)"
 
+    @staticmethod
+    def brought(settings: PinocchioSettings) -> str:  # noqa: ARG004 -- of the protocol
+        """See :class:`proofroll.core.engine_abilities.BringsAPart`."""
+        return "integrator"
+
     family = staticmethod(impulses.family)
 
     @staticmethod

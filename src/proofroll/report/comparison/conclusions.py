@@ -5,15 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from proofroll.core.events import EVENT_ORDER
-from proofroll.core.number_format import counted, number
+from proofroll.core.number_format import counted
 from proofroll.report.comparison.records import ReportedComparison, ReportedRow
-from proofroll.report.comparison.scores import closest, furthest_off, scores
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind
-from proofroll.report.labels import names, off_by, unjudged, with_caveat
-from proofroll.report.page.answer import ColumnAnswer, ReaderQuestion, speed_words, told
-from proofroll.report.page.candidates import Candidate
-from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
+from proofroll.report.labels import names, unjudged
 
 
 @dataclass(frozen=True)
@@ -24,15 +20,11 @@ class Conclusions:
     sentences: list[str]
 
 
-def conclusions(
-    content: ReportedComparison, choice: ChoiceMatrix, truths: Sequence[Any], kind: type[ReportKind] | None
-) -> Conclusions:
-    """Conclusions of a comparison and of its matrix; its kind of scene adds a sentence about its truths."""
-    nearness = [] if content.laws_alone else [_closest(content, choice), _obvious(content, scores(content, choice))]
+def conclusions(content: ReportedComparison, truths: Sequence[Any], kind: type[ReportKind] | None) -> Conclusions:
+    """Conclusions of a comparison; its kind of scene adds a sentence about its truths."""
     return Conclusions(
-        _answer(content, choice),
+        _answer(content),
         [
-            *nearness,
             *(item.sentence for item in content.spread),
             *_order(content),
             *(kind.sentences(truths) if kind is not None else ()),
@@ -41,21 +33,15 @@ def conclusions(
     )
 
 
-def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
-    """Sentence: counts of verdicts, whether they were expected, and the cheapest engine at ``FIRST_TOLERANCE``."""
+def _answer(content: ReportedComparison) -> str:
+    """Sentence: counts of verdicts, and whether they were expected."""
     rows, alone = content.rows, content.laws_alone
     unexpected = len(content.contradictions)
     expected = f" Not expected: {counted(unexpected, 'results')}."
     if content.as_expected:
         expected = " Nothing of it was unexpected." if unjudged(content) else " All of this was expected."
     text = f"Of {counted(len(rows), 'engine settings')}, {standings(rows, alone)}.{expected if content.claims else ''}"
-    text = f"{ALONE[0].upper()}{ALONE[1:]}. {text}" if alone else text
-    for column in choice.kinds:
-        asked = ReaderQuestion(FIRST_TOLERANCE, not choice.unjudged[True].issuperset(column.studies))
-        taken = ColumnAnswer(choice, column, asked).taken
-        if taken is not None:
-            text += f" To hold {asked.words}, the cheapest is {told(choice, taken)}: {speed_words(taken)} real time."
-    return text
+    return f"{ALONE[0].upper()}{ALONE[1:]}. {text}" if alone else text
 
 
 def standings(rows: Sequence[ReportedRow], alone: bool) -> str:
@@ -85,54 +71,6 @@ def standings(rows: Sequence[ReportedRow], alone: bool) -> str:
 
 def _joined(parts: list[str]) -> str:
     return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
-
-
-def _closest(content: ReportedComparison, choice: ChoiceMatrix) -> str:
-    """Sentence on the setting closest to the truth."""
-    best = closest(content, choice)
-    if best is None:
-        return "No setting gave motion and forces in every case, so none can be called the closest to the truth."
-    cost = "" if best.cost is None else f", for {number(best.cost)} s of computing per simulated second"
-    return (
-        f"Closest to the truth is {best.name}: its motion stays within {number(best.motion)} of each coordinate's "
-        f"range and its forces within {number(best.forces)} of the largest normal force{cost}; the truth's "
-        "own error bar is in these numbers."
-    )
-
-
-def _obvious(content: ReportedComparison, scored: list[Candidate]) -> str:
-    """Sentence on the price of the obvious model: an engine's default preset against its best one."""
-    rows = content.rows
-    worst: tuple[float, Candidate, Candidate] | None = None
-    lost: list[str] = []
-    for score in scored:
-        row = rows[score.row]
-        others = [
-            rival
-            for rival in scored
-            if rows[rival.row].name == row.name and rows[rival.row].preset != "default" and rival.motion is not None
-        ]
-        if row.preset != "default" or not others:
-            continue
-        best = min(others, key=lambda rival: rival.motion or 0.0)
-        if score.motion is None:
-            if row.verdict != "refused":
-                lost.append(score.name)
-        elif best.motion and (worst is None or score.motion / best.motion > worst[0]):
-            worst = (score.motion / best.motion, score, best)
-    failed = f" {_joined(lost)} did not even finish everywhere." if lost else ""
-    if worst is None:
-        return (
-            "The accuracy that the default model loses is not shown: no default setting stands beside another." + failed
-        )
-    factor, score, best = worst
-    blamed = with_caveat(score.name, rows[score.row].caveat)
-    off = furthest_off(content, content.runs_of(score.row))
-    assert off is not None  # its motion was scored
-    return (
-        f"The obvious model loses most accuracy with {blamed}: {off_by(off)}, which relative to the range is "
-        f"{number(factor, 1)} times the error of {best.name}.{failed}"
-    )
 
 
 def _order(content: ReportedComparison) -> list[str]:

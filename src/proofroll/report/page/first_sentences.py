@@ -4,14 +4,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from proofroll.core.number_format import counted, number
+from proofroll.core.number_format import counted
 from proofroll.report.comparison.conclusions import standings
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.scores import closest, furthest_off
+from proofroll.report.comparison.scores import furthest_off
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.labels import off_by, with_caveat
-from proofroll.report.page.answer import answer
-from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
+from proofroll.report.page.first_screen import ReportedAnswer, answers_sentence
 from proofroll.report.parts import PartEntry, part_kinds
 
 
@@ -58,17 +57,19 @@ def kept(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequen
 
 
 def three_sentences(
-    comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]], choice: ChoiceMatrix
+    comparisons: Sequence[ReportedComparison],
+    entries: Mapping[str, Sequence[PartEntry]],
+    answers: Sequence[ReportedAnswer],
 ) -> list[str]:
-    """Three sentences: the best agreement, silent disagreement (also of the maps in ``entries``), and advice."""
+    """Three sentences: agreement, silent disagreement (also of the maps in ``entries``), and advice."""
     return [
-        _agrees(comparisons, choice),
+        _agrees(comparisons),
         _silent(comparisons, kept(comparisons, entries)),
-        answer(choice, FIRST_TOLERANCE, forces=True).sentence,
+        answers_sentence(answers),
     ]
 
 
-def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
+def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
     if not comparisons:
         return "Nothing was compared with the truth in this report."
     clauses = []
@@ -78,22 +79,9 @@ def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> 
         count = "one comparison" if len(alike) == 1 else f"{len(alike)} comparisons"
         place = f"{ALONE} ({', '.join(item.name for item in alike)})" if alone else f"in {count}"
         if alike:
-            nearest = "" if alone else _nearest(alike, choice)
-            clauses.append(f"of {counted(len(rows), 'settings')} {place}, {standings(rows, alone)}{nearest}")
+            clauses.append(f"of {counted(len(rows), 'settings')} {place}, {standings(rows, alone)}")
     text = "; ".join(clauses)
     return f"{text[0].upper()}{text[1:]}."
-
-
-def _nearest(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
-    """Clause on the setting closest to the truth in the first comparison."""
-    best = closest(comparisons[0], choice)
-    if best is None:
-        return "; none gave motion and forces in every case of the first comparison"
-    which = " in the first" if len(comparisons) > 1 else ""
-    return (
-        f"; closest{which} is {best.name}, whose motion stays within {number(best.motion)} of its range and whose "
-        f"forces within {number(best.forces)} of the largest"
-    )
 
 
 def _silent(comparisons: Sequence[ReportedComparison], counts: Kept) -> str:

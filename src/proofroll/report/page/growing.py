@@ -12,6 +12,7 @@ from proofroll.report.changes import EarlierReport, against
 from proofroll.report.comparison.plots import PointCurves, point_curves
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine
+from proofroll.report.page.first_screen import ReportedAnswer
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.parts import Part, PartEntry, absent, attempt
@@ -32,6 +33,7 @@ class Report:
         parts: the further studies, in the order of the content's lists.
         pictures: markup by name.
         earlier: earlier report to compare this one with, or None.
+        answers: of the scenes, see :class:`ReportContent`.
     """
 
     compared: ReportContent
@@ -40,6 +42,7 @@ class Report:
     parts: list[Part] = field(default_factory=list)
     pictures: dict[str, str] = field(default_factory=dict)
     earlier: EarlierReport | None = None
+    answers: list[ReportedAnswer] = field(default_factory=list)
     _made: dict[int, tuple[Part, PartEntry, Sequence[TableLine]]] = field(default_factory=dict)
 
     @cached_property
@@ -52,7 +55,8 @@ class Report:
             if isinstance(entry.study, dict):  # a stored study was made with the present versions
                 environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
         table = LongTable([*self.compared.table.lines, *(line for *_, lines in made for line in lines)])
-        content = replace(self.compared, entries=entries, environment=environment, table=table).summarised
+        answered = replace(self.compared, answers=[*self.answers])
+        content = replace(answered, entries=entries, environment=environment, table=table).summarised
         if self.earlier is None:
             return content
         return replace(content, against=against(self.earlier, table.lines, environment.machine, environment.versions))
@@ -72,6 +76,11 @@ class Report:
                 entry = absent(part, "It has not been made yet")
             self._put(part, entry)
         return missing
+
+    def add_answer(self, item: ReportedAnswer) -> None:
+        """Adds the answer of a scene for a tolerance."""
+        self.answers.append(item)
+        self.__dict__.pop("content", None)
 
     def make(self, part: Part, how: Callable[[], None]) -> PartEntry:
         """Makes a further study and returns its entry, which tells of a failure, too."""

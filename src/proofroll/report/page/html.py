@@ -15,17 +15,16 @@ from typing import TYPE_CHECKING
 from proofroll.core import number_format
 from proofroll.files.json_data import plain
 from proofroll.report import labels
+from proofroll.report.answer import sentences
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
-from proofroll.report.page import model_lines, profile, verdict_strips
-from proofroll.report.page.answer import LENGTHS, speed_range, told
-from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE
-from proofroll.report.page.first_screen import STATES, FirstScreen, bar, look, word
+from proofroll.report.page import first_screen, model_lines, verdict_strips
 from proofroll.report.pages import environment, folded, packed, rendered, slug
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
+from proofroll.report.tradeoff.tables import FIRST_TOLERANCE
 from proofroll.running.case import host_sentences
 
 if TYPE_CHECKING:
@@ -45,22 +44,18 @@ def page(
 ) -> str:
     """HTML page from content, curves of each comparison, markup of further pictures by name, and the replay if any."""
     drawn = {
-        "precision": content.precision,
         "engines": content.engines,
         "titles": {name: labels.engine_title(name) for name in content.engines},
         "rows": [_drawn_rows(comparison, content.engines) for comparison in content.comparisons],
         "points": [_marked(*pair) for pair in zip(content.comparisons, curves, strict=True)],
     }
-    screen = FirstScreen(content)
     whole = rendered(
         templates(),
         "page.html",
         content=content,
         curves=curves,
         pictures=pictures,
-        choice=content.choice,
-        screen=screen,
-        screen_data=screen.packed(templates()) if content.choice.rows else "",
+        screen=first_screen.FirstScreen(content),
         styles=[styles(comparison.rows, content.engines) for comparison in content.comparisons],
         replay=replay,
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
@@ -136,20 +131,12 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
         "outlines": OUTLINES,
-        "decades": DECADES,
-        "first_decade": FIRST,
         "first_tolerance": FIRST_TOLERANCE,
-        "states": STATES,
-        "look": look,
-        "word": word,
-        "bar": bar,
-        "speed_range": speed_range,
-        "told": told,
+        "first_screen": first_screen,
+        "answer_words": sentences,
         "model_lines": model_lines,
-        "lengths": LENGTHS,
-        "profiles": profile,
         "loop_key": slug,
-        "scene_words": lambda name: name.rpartition("/")[2].replace("_", " ").capitalize(),
+        "scene_words": labels.scene_words,
         "again": _again,
         "host_sentences": host_sentences,
         "report_kinds": report_kinds(),

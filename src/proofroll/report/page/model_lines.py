@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -11,9 +10,9 @@ from typing import Any
 from proofroll.core.engine_abilities import TellsLines
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
-from proofroll.report.page.candidates import Candidate
-from proofroll.report.page.choice_cell import ChoiceCell
+from proofroll.report.answer.sentences import command_of
 from proofroll.report.pages import slug
+from proofroll.studies.answer.records import EngineAnswer, SceneAnswer
 
 
 @dataclass(frozen=True)
@@ -24,39 +23,22 @@ class ModelLines:
     note: str = ""
 
 
-def of(cell: ChoiceCell, tolerance: float, date: str) -> ModelLines:
-    """Lines for a cell that holds a tolerance: the engine's own, a command, and a test; ``date``: of the report."""
-    run = cell.run
-    assert run is not None  # it holds
-    lines, note = _own(run.spec)
-    changed = [word for word in run.place.split(", ") if word and "…" not in word]  # no command has a range
-    words = ["proofroll", "compare", run.scene, "--engine", run.spec, "--until", f"{run.until:g}", *_sampled(run)]
-    scene = f'load_scene("{run.scene}", {", ".join(changed)})' if changed else f'"{run.scene}"'
-    arguments = [scene, f'"{run.spec}"', f'tolerance="{100 * tolerance:g} %"', f'because="report of {date}"']
+def of(made: SceneAnswer, item: EngineAnswer) -> ModelLines:
+    """Lines for an engine that holds a tolerance, for the answer's question: its own, a command, and a test."""
+    lines, note = _own(item.spec)
+    given = ", ".join(f"{name}={value!r}" for name, value in made.parameters.items())
+    scene = f'load_scene("{made.scene}", {given})' if given else f'"{made.scene}"'
+    bounds = {bound.quantity: f"{bound.allowed:.12g} {bound.unit}".removesuffix(" 1") for bound in made.bounds}
+    arguments = [scene, f'"{item.spec}"', f"tolerance={bounds!r}", f'because="{made.tolerance} is close enough"']
     test = [
-        *(["from proofroll import load_scene", "", ""] if changed else []),
-        f"def test_{slug(run.scene).replace('-', '_')}(assert_agrees):",
+        *(["from proofroll import load_scene", "", ""] if given else []),
+        f"def test_{slug(made.scene).replace('-', '_')}(assert_agrees):",
         "    assert_agrees(",
-        *(f"        {argument}," for argument in [*arguments, f"until={run.until:g}"]),
+        *(f"        {argument}," for argument in [*arguments, f"until={made.until:g}", f"every={made.every:g}"]),
         "    )",
     ]
-    return ModelLines(
-        ({"In your model": "\n".join(lines)} if lines else {})
-        | {
-            "Check it": shlex.join([*words, *(part for word in changed for part in ("--set", word))]),
-            "Keep it, pytest": "\n".join(test),
-        },
-        note,
-    )
-
-
-def _sampled(run: Candidate) -> list[str]:
-    """Option for at most 50 samples, whole numbers of fixed steps apart; empty: the step is not fixed, or fits none."""
-    steps = round(run.until / run.step) if run.step and ",dt=" in run.spec else 0
-    if not steps or abs(steps * (run.step or 0.0) - run.until) > 1e-9 * run.until:
-        return []
-    count = max(count for count in range(1, min(50, steps) + 1) if steps % count == 0)
-    return ["--every", f"{run.until / count:.12g}"]
+    own = {"In your model": "\n".join(lines)} if lines else {}
+    return ModelLines(own | {"Check it": command_of(made, item), "Keep it, pytest": "\n".join(test)}, note)
 
 
 def own_lines(name: str, settings: Mapping[str, Any]) -> Sequence[str]:

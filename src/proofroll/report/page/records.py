@@ -21,11 +21,9 @@ from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
-from proofroll.report.long_table import LongTable, TableLine
-from proofroll.report.page.advice import QuestionAnswer, answers_to_all
-from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, choice_matrix
+from proofroll.report.long_table import LongTable
+from proofroll.report.page.first_screen import ReportedAnswer
 from proofroll.report.page.first_sentences import Kept, kept, three_sentences
-from proofroll.report.page.precision import WorkPrecision, work_precision
 from proofroll.report.page.scene_sheet import SceneSheet, sheet_of
 from proofroll.report.parts import PartEntry, part_kinds
 from proofroll.running.environments import shown_name
@@ -91,8 +89,9 @@ class KnownFinding:
     gone: str
 
 
-# Of report.json: 2 has no lines of records in its table; 3 has what a file claims, costs and causes in its own words.
-FORMAT = 3
+# Of report.json: 2 has no lines of records in its table; 3 has what a file claims, costs and causes in its own
+# words; 4 has answers from searches.
+FORMAT = 4
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ class ReportContent:
         environment: command, machine and versions that made it.
         findings: three sentences on the whole report.
         table: every quantity of every run.
-        answers: to each question that the page offers, from the function that page and terminal print.
+        answers: cheapest engine of each scene that holds a tolerance, from a search; by tolerance, then by scene.
         against: changes since an earlier report.
         replay: its cases without their numbers, which can be computed from the named trajectories.
     """
@@ -130,14 +129,20 @@ class ReportContent:
     table: LongTable
     format: int = FORMAT
     replay: Sequence[Any] | None = field(default=None, metadata=OPTIONAL)
-    answers: list[QuestionAnswer] = field(default_factory=list)
+    answers: list[ReportedAnswer] = field(default_factory=list)
     against: Against | None = field(default=None, metadata=OPTIONAL)
 
-    @property
+    @cached_property
+    def witnesses(self) -> set[str]:
+        """Names of the engines that only cross-check the truth."""
+        return {row.name for comparison in self.comparisons for row in comparison.rows if row.witness}
+
+    @cached_property
     def engines(self) -> list[str]:
-        """Names of the engines that are compared, in the page's order: those that may be taken, then witnesses."""
+        """Names of the engines in the page's order: those that may be taken, then witnesses."""
         compared = {row.name for comparison in self.comparisons for row in comparison.rows}
-        return [*(name for name in self.choice.engines if name in compared), *sorted(compared - {*self.choice.engines})]
+        searched = {engine.engine for item in self.answers for engine in item.answer.engines}
+        return sorted(compared | searched, key=lambda name: (name in self.witnesses, name))
 
     @property
     def further(self) -> list[PartEntry]:
@@ -146,26 +151,8 @@ class ReportContent:
 
     @property
     def summarised(self) -> ReportContent:
-        """Content with its three sentences and its answers recomputed."""
-        sentences = three_sentences(self.comparisons, self.entries, self.choice)
-        return dataclasses.replace(self, findings=sentences, answers=answers_to_all(self.choice))
-
-    @cached_property
-    def choice(self) -> ChoiceMatrix:
-        """Choice matrix of the comparisons and of the trade-offs that have results."""
-        studies = {
-            item.name: ChoiceStudy(
-                title=item.title,
-                href=item.section,
-                runs={(run.row, run.point): item.run_id(run.row, run.point) for run in item.runs},
-                requires=frozenset(item.requires),
-                short={n: (row.claim.expect, row.claim.short) for n, row in enumerate(item.rows) if row.claim.short},
-            )
-            for item in self.comparisons
-        }
-        swept = [item for item in self.entries.get("tradeoffs", ()) if item.study]
-        studies |= {item.name: ChoiceStudy(item.title, item.section) for item in swept}
-        return choice_matrix(self.table.lines, studies, self.names, self.provides)
+        """Content with its three sentences made anew."""
+        return dataclasses.replace(self, findings=three_sentences(self.comparisons, self.entries, self.answers))
 
     @property
     def sheets(self) -> dict[str, SceneSheet]:
@@ -199,27 +186,13 @@ class ReportContent:
         ways = f"--only loops,contact those of some kinds of scenes; proofroll report {self.left_out[0]} one"
         return f"Comparisons left out: {many}. proofroll report --budget 3600 runs all, each briefly first; {ways}."
 
-    @cached_property
-    def precision(self) -> dict[str, WorkPrecision]:
-        """Work–precision pictures by the id of their section, in the page's order, where enough runs are timed."""
-        tradeoffs = {item.name: item.section for item in self.entries.get("tradeoffs", ())}
-        others = {item.name: item.section for item in self.comparisons if item.name not in tradeoffs}
-        sections = others | tradeoffs
-        lines: dict[str, list[TableLine]] = {name: [] for name in sections}
-        for line in self.table.lines:
-            lines.get(line.study, []).append(line)
-        pictures = {section: work_precision(lines[name]) for name, section in sections.items()}
-        return {section: item for section, item in pictures.items() if item is not None}
-
 
 def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
     """Content of a report of comparisons; paths of files are relative to its folder."""
-    lines = [lines_of(outcome) for outcome in outcomes]
+    lines = [line for outcome in outcomes for line in lines_of(outcome)]
     asked = [run.facts for outcome in outcomes for run in outcome.runs if run.facts is not None]
     names = {item.name.partition("@")[0]: item.title or item.name for item in asked}
-    comparisons = [
-        _comparison(outcome, outcome_lines, names) for outcome, outcome_lines in zip(outcomes, lines, strict=True)
-    ]
+    comparisons = [_comparison(outcome) for outcome in outcomes]
     facts = machine()
     versions = {"proofroll": proofroll.__version__, "python": platform.python_version()}
     for run in (run for outcome in outcomes for run in outcome.runs):
@@ -240,16 +213,13 @@ def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
         provides=provides,
         environment=MadeWith(command, f"{facts['system']}, {facts['processor']}", versions),
         findings=[],
-        table=LongTable([line for outcome_lines in lines for line in outcome_lines]),
+        table=LongTable(lines),
     )
     return content.summarised
 
 
-def _comparison(outcome: Outcome, lines: Sequence[TableLine], names: Mapping[str, str]) -> ReportedComparison:
-    """Content of a comparison with its evidence: truths, facts from the kind of element, conclusions, costs.
-
-    ``names``: of engines for readers.
-    """
+def _comparison(outcome: Outcome) -> ReportedComparison:
+    """Content of a comparison with its evidence: truths, facts from the kind of element, conclusions, costs."""
     content, truths = outcome_content(outcome), _truths(outcome)
     kind = kind_of(outcome.scene)
     facts = kind.run_facts(truths, outcome.runs) if kind is not None else [None] * len(outcome.runs)
@@ -260,8 +230,7 @@ def _comparison(outcome: Outcome, lines: Sequence[TableLine], names: Mapping[str
     content = dataclasses.replace(content, runs=runs)
     points = outcome.points.values()
     sheet = sheet_of(outcome.file, [item.case.parameters for item in points], [item.scene for item in points])
-    choice = choice_matrix(lines, {content.name: ChoiceStudy(content.title, "")}, names)
-    evidence = ComparisonEvidence(truths, sheet, conclusions(content, choice, truths, kind), growth(content, truths))
+    evidence = ComparisonEvidence(truths, sheet, conclusions(content, truths, kind), growth(content, truths))
     return dataclasses.replace(content, evidence=evidence)
 
 

@@ -98,20 +98,15 @@ const folds = (() => {
   // Print shows what is open; all of it after "Open all".
   addEventListener("beforeprint", () => { if (watch) open(); });
   addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(ready));
-  // What a reader opened is in the address: folds of the class "kept" and rows of the matrix.
-  const opened = () => [...document.querySelectorAll("details.kept[open], [data-unfold][aria-expanded=true]")];
-  const named = (part) => part.dataset.unfold ?? part.id;
+  // What a reader opened is in the address: folds of the class "kept".
+  const opened = () => [...document.querySelectorAll("details.kept[open]")];
   document.addEventListener("toggle", ({ target }) => { if (target.matches("details.kept")) address.note(); }, true);
   address.keep(
-    (words) => { const names = opened().map(named); if (names.length) words.set("open", names.join(",")); },
+    (words) => { const names = opened().map((fold) => fold.id); if (names.length) words.set("open", names.join(",")); },
     (words) => {
       const names = (words.get("open") ?? "").split(",").filter(Boolean), there = opened();
-      there.filter((part) => !names.includes(named(part))).forEach((part) => { if (part.open) part.open = false; else part.click(); });
-      names.filter((name) => !there.some((part) => named(part) === name)).forEach((name) => {
-        const row = document.querySelector(`[data-unfold="${CSS.escape(name)}"]`), fold = document.getElementById(name);
-        if (fold?.matches("details.kept")) fold.open = true;
-        else row?.click();
-      });
+      there.filter((fold) => !names.includes(fold.id)).forEach((fold) => { fold.open = false; });
+      names.map((name) => document.getElementById(name)).forEach((fold) => { if (fold?.matches("details.kept")) fold.open = true; });
     },
   );
   return { find, all };
@@ -125,7 +120,6 @@ const folds = (() => {
     if (!target) return;
     for (let fold = target.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
     for (const fold of target.querySelectorAll(":scope > details:only-of-type")) fold.open = true;
-    if (target.hidden) window.unfoldRow(target);
     target.classList.add("target");
     // A section that is not drawn has no place for what is in it yet.
     target.closest("main > section")?.style.setProperty("content-visibility", "visible");

@@ -9,7 +9,7 @@
     });
     return library;
   }
-  const sorts = (table) => !table.matches("#choice, #uses, #answer-one *") && table.querySelector("tbody tr:not(.group)");
+  const sorts = (table) => table.querySelector("tbody tr:not(.group)");
 
   // A map and a spread rank nothing: they keep the order of their file.
   const ranks = (table) => !table.matches(".heat, .spread");

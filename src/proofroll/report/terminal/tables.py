@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 from proofroll.core.number_format import counted
 from proofroll.core.verdict import Verdict
 from proofroll.report.labels import SYMBOLS
-from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
 from proofroll.report.parts import part_kinds
-from proofroll.report.terminal.answers import answers, kind_sentences
 from proofroll.report.terminal.screen import WIDTH as _COLUMNS
 from proofroll.report.terminal.screen import Screen
 from proofroll.report.terminal.verdicts import verdict_of
@@ -44,8 +42,8 @@ def console() -> Screen:
 def report_lines(content: ReportContent, out: Path) -> Iterator[str]:
     """Lines of a report: the answer, what to look at first, a count for each comparison, further studies, files."""
     rows = [row for item in content.comparisons for row in item.rows]
-    if content.choice.rows:
-        yield from kind_sentences(answers(content.choice, FIRST_TOLERANCE, forces=False))
+    answers = content.answers
+    yield from (f"{x.words}: {x.sentence}" for x in answers if x.answer.tolerance == answers[0].answer.tolerance)
     agree = sum(row.verdict is Verdict.AGREES for row in rows)
     sentence, *others = first_lines(content)
     counts = f"{agree} of {counted(len(rows), 'settings')} {'agrees' if agree == 1 else 'agree'}. " if rows else ""

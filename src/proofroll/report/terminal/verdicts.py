@@ -11,6 +11,7 @@ from rich.text import Text
 
 from proofroll.core.number_format import counted, error, number, spaced
 from proofroll.core.verdict import SEVERITY, LimitResult, Verdict
+from proofroll.report.answer.sentences import measure
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.records import (
     CoarserSteps,
@@ -19,10 +20,8 @@ from proofroll.report.comparison.records import (
     ReportedRun,
     WorstJudgement,
 )
-from proofroll.report.comparison.scores import furthest_off
 from proofroll.report.comparison.spread import ALONE, Spread
-from proofroll.report.labels import SYMBOLS, engine_title, omitted_lines, row_words, symbol, unit, unjudged
-from proofroll.report.page.choice_cell import speed
+from proofroll.report.labels import SYMBOLS, engine_title, omitted_lines, row_words, speed, symbol, unit, unjudged
 from proofroll.report.terminal.screen import WIDTH, numeric, plain_table, unbroken
 from proofroll.running.case import Status, host_sentences
 
@@ -30,7 +29,6 @@ _SETTING, _ERROR, _SPEED = 42, 27, 9  # characters of the columns behind the sig
 _INDENT = 4
 _WIDEST = 8  # largest number of spreads that are listed
 _COMPILES = 10.0  # s before the first step, beyond which the time is told; to compile equations takes one or two
-_PREFIXES = {-3: "m", -6: "µ", -9: "n"}
 _HOLDS = (Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE)
 STYLES = {
     "agrees": "green",
@@ -124,23 +122,21 @@ def worst_of(row: ReportedRow) -> WorstJudgement | None:
 
 
 def answer_lines(content: ReportedComparison, rows: Sequence[ReportedRow]) -> list[str]:
-    """Answer in at most three sentences: what is wrong, what to take at what speed, and what was not expected."""
+    """Answer in at most three sentences: what is wrong, how many agree, and what was not expected."""
     wrong = sorted((row for row in rows if verdict_of(row) is Verdict.DIFFERS), key=lambda row: -_ratio(row))
     agree = [row for row in rows if row.verdict is Verdict.AGREES]
-    best = min((row for row in agree if not row.shared and _cost(row)), key=lambda row: _cost(row) or 0.0, default=None)
     lines = []
     if wrong:
         title, off = ", ".join(row_words(wrong[0])), _off(wrong[0])
         several = f"{len(wrong)} settings are wrong; the worst, {title}: {off}."
         lines.append(several if len(wrong) > 1 else f"{title}, is wrong: {off}.")
     nearest = min((row for row in rows if row.observables), key=_ratio, default=None)
-    if best is not None:
-        taken = f"{', '.join(row_words(best))}: {_speed(best)} real time{_accuracy(content, best)}."
-        all_agree = len(agree) == len(rows) > 1
-        lines.append(f"All {len(rows)} engine settings agree. Cheapest: {taken}" if all_agree else f"Take {taken}")
-    elif not agree and nearest is not None:
+    if agree:
+        some = "The engine setting agrees" if len(rows) == 1 else f"{len(agree)} of {len(rows)} engine settings agree"
+        lines.append(f"All {len(rows)} engine settings agree." if len(agree) == len(rows) > 1 else f"{some}.")
+    elif nearest is not None:
         lines.append(_nearest(nearest))
-    elif not agree:
+    else:
         lines.append(f"No setting of {content.name} could be judged.")
     if content.contradictions:
         more = f" (1 of {len(content.contradictions)})" if len(content.contradictions) > 1 else ""
@@ -162,20 +158,6 @@ def _off(row: ReportedRow) -> str:
         return f"{symbol(worst.observable)}: {worst.reason.partition(';')[0]}"
     at_every_step = ", at every step" if worst.limit is LimitResult.ANOTHER else ""
     return f"{symbol(worst.observable)} is off by {measure(worst.error, worst.unit)}{at_every_step}"
-
-
-def measure(value: float, of: str) -> str:
-    """An error with its unit; lengths below a centimetre with a prefix: ``0.35 mm``."""
-    if of != "m" or not 1e-10 <= value < 1e-2:
-        return f"{error(value)} {unit(of)}".rstrip()
-    power = next((power for power in _PREFIXES if value >= 0.1 * 10.0**power), -9)
-    return f"{float(f'{value / 10.0**power:.2g}'):g} {_PREFIXES[power]}m"
-
-
-def _accuracy(content: ReportedComparison, row: ReportedRow) -> str:
-    """Clause with the largest error of the motion: ``, 0.2 µm off``."""
-    off = furthest_off(content, content.runs_of(content.rows.index(row)))
-    return "" if off is None else f", {measure(off.error, off.unit)} off"
 
 
 def _nearest(row: ReportedRow) -> str:

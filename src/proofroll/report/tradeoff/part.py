@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 from typing_extensions import override
 
-from proofroll.core.comparison import Tolerance
 from proofroll.core.convergence import floor_text
 from proofroll.core.engine_abilities import by_hand
 from proofroll.core.number_format import counted
 from proofroll.core.verdict import LimitResult
-from proofroll.files.json_data import MERGED
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import group_of
 from proofroll.report.long_table import TableLine, case_words, setting_columns
@@ -27,36 +25,19 @@ from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.comparison.planning import point_name
 from proofroll.studies.study_store import valid_study
 from proofroll.studies.tradeoff.claims import STUDY, TradeoffClaims, load_claims
-from proofroll.studies.tradeoff.recommend import Answer, recommend
 from proofroll.studies.tradeoff.records import CurveBudget, TradeoffStudy
-from proofroll.studies.tradeoff.requirements import Requirements
 from proofroll.studies.tradeoff.study import make_tradeoff
 from proofroll.studies.tradeoff.tradeoff import Extent, study_path
 
-# Tolerances, relative to the quantity's scale, for advice without claims: visible errors, engineering, reference
-# solutions, and orders of methods.
-PARTS = (1e-2, 1e-3, 1e-4, 1e-6)
 # A limit of small steps counts as another than the truth if it is off by so many error bars, as for a verdict.
 _SHOWN = 10
 
 
-@dataclass(frozen=True)
-class Advice:
-    """An answer with its relative tolerance; None: the tolerance was given in the quantity's unit.
-
-    Ranges and circumstances, which all answers share, are in the study.
-    """
-
-    relative: float | None
-    answer: Answer = field(metadata=MERGED)
-
-
 @dataclass(frozen=True, kw_only=True)
 class TradeoffEntry(PartEntry):
-    """Entry of a study: quantities to show, advice, and judged claims."""
+    """Entry of a study: quantities to show, and judged claims."""
 
     shown: list[str]
-    advice: list[Advice]
     claims: list[ClaimJudgement]
 
 
@@ -110,7 +91,6 @@ class TradeoffPart(Part):
             **self.head,
             study=study,
             shown=default_quantities(study),
-            advice=advice(study, self.asked),
             claims=[] if self.engines else self.asked.judgements(study),
             contradictions=[] if self.engines else self.asked.contradictions(study),
         )
@@ -164,15 +144,3 @@ def _limit(budget: CurveBudget, unit: str) -> dict[str, Any]:
         return columns
     limit = LimitResult.ANOTHER if budget.model_form > _SHOWN * budget.doubt else LimitResult.WITHIN
     return columns | {"limit": limit, "limit_error": budget.model_form, "limit_doubt": budget.doubt}
-
-
-def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:
-    """Advice for the study's own quantity at the tolerances of its claims, or else at parts of the scale."""
-    claimed = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values())
-    parts = [Tolerance(part, True) for part in PARTS]
-    return [
-        Advice(tolerance.value if tolerance.relative else None, recommend(study, Requirements(name, tolerance)).answer)
-        for name in default_quantities(study)
-        if study.quantities[name].scale is not None  # without a scale no relative tolerance exists
-        for tolerance in (claimed if claimed and name == study.quantity else parts)
-    ]

@@ -11,20 +11,15 @@ from rich.text import Text
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import by_hand
 from proofroll.core.number_format import error, number
-from proofroll.report.labels import engine_words, listed, name_of, omitted_lines, step
-from proofroll.report.page.choice_cell import speed
-from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
+from proofroll.report.labels import engine_words, listed, name_of, speed, step
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
-from proofroll.report.terminal.verdicts import measure
 from proofroll.running.timing import CONFIDENCE
-from proofroll.studies.tradeoff.recommend import holding
-from proofroll.studies.tradeoff.requirements import Requirements
+from proofroll.studies.tradeoff.requirements import Requirements, holding
 
 if TYPE_CHECKING:
-    from proofroll.studies.study_store import Measured
-    from proofroll.studies.tradeoff.recommend import Choice, Recommendation
     from proofroll.studies.tradeoff.records import Corner, MeasuredPoint, TradeoffStudy
 
+FIRST_TOLERANCE = 1e-4  # part of a quantity's size at which the terminal names a setting
 _TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)  # parts of a quantity's size, with a column each
 _SCATTER = 2.0  # ratio of the ends of a cost's interval beyond which it is unknown
 _MOST_COLUMNS = 4  # largest number of quantities that are shown by default
@@ -216,58 +211,3 @@ def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
         return "–", f"{listed(missing[0].parameters)}{more}: {missing[0].message}"
     corner = max(corners, key=lambda c: c.errors[quantity])
     return error(corner.errors[quantity]), listed(corner.parameters)
-
-
-def answer_lines(advice: Recommendation) -> Iterator[str]:
-    """Lines of a recommendation: what to take and what is next, what fails, and over what it was checked."""
-    answer = advice.answer
-    yield from omitted_lines(advice.omitted or [])
-    asked = f"{answer.quantity} to {number(answer.tolerance)} {answer.unit}"
-    if answer.choice is None:
-        yield f"Nothing that was measured holds {asked} with margin."
-        if answer.closest:
-            yield f"Closest: {_line(answer.closest, answer.unit)}; {answer.closest.reason}."
-    else:
-        yield f"Take {_line(answer.choice, answer.unit)}."
-        if not advice.affordable:
-            yield f"That costs more than the {number(advice.max_cost)} s per simulated second of --max-cost."
-    if answer.ties:
-        tie = min(answer.ties, key=lambda t: t.point.envelope_of(answer.quantity))
-        many = f"{len(answer.ties)} others cost the same within the measurement. Most accurate of them"
-        yield f"{many if len(answer.ties) > 1 else 'Tie'}: {_line(tie, answer.unit)}."
-    failure = answer.first_failure
-    for choice, words in (
-        (advice.best_affordable, "Of those that cost no more"),
-        (answer.runner_up, "Next"),
-        (failure, "Cheaper fails"),
-        (answer.least_model, "If this scene is all you need, its own equations do"),
-    ):
-        if choice:
-            yield f"{words}: {_line(choice, answer.unit)}{f'; {choice.reason}' if choice is failure else ''}."
-    named = (answer.choice, answer.closest, answer.runner_up, *answer.ties[:1])
-    caveats = dict.fromkeys(f"{name_of(x.point)}: {x.point.caveat}" for x in named if x and x.point.caveat)
-    yield from ("", f"{asked[0].upper()}{asked[1:]}. {_checked(advice)}")
-    yield from [f"Caveats: {'; '.join(caveats)}."] if caveats else []
-    if advice.not_measured:
-        yield f"Not measured: {', '.join(advice.not_measured)}."
-    yield _measured(advice.measured)
-
-
-def _line(choice: Choice, of: str) -> str:
-    """A point with its speed and error."""
-    off = "without an error" if choice.error is None else f"{measure(choice.error, of)} off"
-    return f"{point_words(choice.point)}: {_speed_of(choice.point)}, {off}"
-
-
-def _checked(advice: Recommendation) -> str:
-    checked = advice.checked
-    over = [f"{name} {low:g} to {high:g}" for name, (low, high) in checked.parameters.items()]
-    text = f"Checked over {checked.until:g} s at {listed(advice.parameters) or 'the default parameters'}"
-    if over:
-        text += f", and at {checked.corners} corners of {', '.join(over)}"
-    return f"{text}."
-
-
-def _measured(measured: Measured) -> str:
-    machine = measured.machine
-    return f"Measured {measured.when[:10]} on {machine['processor']} ({machine['cores']} cores, {machine['system']})."

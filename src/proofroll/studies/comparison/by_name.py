@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.comparison import Comparison
+from proofroll.core.comparison import Band, Comparison
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
@@ -18,6 +18,7 @@ from proofroll.studies.comparison import compare as comparing
 from proofroll.studies.comparison.default_comparison import BUDGET, asked_rows, default_comparison
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import asked_for
+from proofroll.studies.judging.asked_tolerance import AskedTolerance
 
 
 def compare(
@@ -62,6 +63,7 @@ def comparison_named(
     engines: Sequence[str] = (),
     until: float | None = None,
     every: float | None = None,
+    tolerance: Sequence[str] = (),
 ) -> Comparison:
     """Comparison of this name, or the default comparison of a scene, within a budget.
 
@@ -74,6 +76,7 @@ def comparison_named(
         engines: engines of the user; those without a row in the comparison's file get rows that claim nothing.
         until: last time of a scene [s]; None: the default.
         every: sampling interval of a scene [s]; None: the default.
+        tolerance: texts of the tolerance of a scene, as of :class:`AskedTolerance`; empty: the default.
 
     Raises:
         InputError: there is neither, or a budget, times or parameters were given for a comparison, which has its own.
@@ -81,18 +84,32 @@ def comparison_named(
     if budget is not None and not 1 <= budget < math.inf:
         raise InputError("budget", budget, "give the processor time of all runs in seconds, at least 1")
     times = {key: value for key, value in (("until", until), ("every", every)) if value is not None}
-    if means_scene(name, alone=bool(budget or parameters or times)):
+    if means_scene(name, alone=bool(budget or parameters or times or tolerance)):
         if budget and scheduler:
             raise InputError("budget", budget, "runs on a cluster have none; drop --scheduler")
         seconds = None if scheduler else budget or BUDGET
-        return default_comparison(name, parameters, workers, seconds, engines, until, every)
+        made = default_comparison(name, parameters, workers, seconds, engines, until, every)
+        return by_tolerance(made, parameters, tolerance) if tolerance else made
     if budget:
         raise InputError("budget", budget, "a comparison file runs all that it asks for; name a scene, or use report")
     for key, value in parameters.items():
         raise InputError(key, value, "a comparison file has its own points; name a scene instead")
     for key, value in times.items():
         raise InputError(key, value, "a comparison file has its own times; name a scene instead")
+    if tolerance:
+        raise InputError("tolerance", tolerance[0], "a comparison file has its own; name a scene, or an --engine, too")
     return _with_rows_of(load_comparison(name), engines, workers)
+
+
+def by_tolerance(comparison: Comparison, parameters: Mapping[str, Any], texts: Sequence[str]) -> Comparison:
+    """The default comparison of a scene, judged by a person's tolerance.
+
+    Raises:
+        InputError: the tolerance has another form, or bounds nothing of the scene.
+    """
+    asked = AskedTolerance.of(texts, load_scene(comparison.scene, **parameters))
+    bands = {name: Band(f"{asked.text} was asked for", asked.bounds) for name in comparison.bands}
+    return replace(comparison, bands=bands)
 
 
 def _with_rows_of(comparison: Comparison, engines: Sequence[str], workers: Workers) -> Comparison:

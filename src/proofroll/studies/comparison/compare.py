@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -77,11 +77,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
         if reference.ended and reference.dataset.sizes["time"] < _LEAST and not laws & {*band.bounds, *run.row.bound}:
             judged.append(_run(run, replace(result, status=Status.NO_TRUTH, message=reference.ended)))
             continue
-        steps = {1.0, *run.row.ladder}
-        rungs = {factor: dataset for factor, dataset in trajectories.items() if factor in steps}
-        judgements, errors = _judgements(run, band, reference, rungs, _lost(run, results))
-        coarser = {factor: dataset for factor, dataset in trajectories.items() if factor not in steps}
-        errors |= _errors(reference, judgements, trajectories[1.0], coarser)
+        judgements, errors = _judgements(run, band, reference, trajectories, _lost(run, results))
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
         judged_run = _run(
             run,
@@ -262,19 +258,6 @@ def _judgements(
     if remark and judgements and all(item.verdict in {Verdict.AGREES, Verdict.UNCONFIRMED} for item in judgements):
         judgements[0] = replace(judgements[0], remarks=(*judgements[0].remarks, remark))
     return judgements, errors
-
-
-def _errors(
-    reference: Reference, judgements: Sequence[Judgement], main: xr.Dataset, coarser: Mapping[float, xr.Dataset]
-) -> dict[float, dict[str, float]]:
-    """Factor of each coarser step -> observable that is judged of the run ``main`` -> error."""
-    errors: dict[float, dict[str, float]] = {}
-    for factor, dataset in coarser.items():
-        within, spans = reference.common_span({1.0: main, factor: dataset})
-        curves = run_values.observables_of(within, spans[factor])
-        names = [item.observable for item in judgements if item.observable in curves]
-        errors[factor] = {name: run_values.error(within, name, curves[name], spans[factor]) for name in names}
-    return errors
 
 
 def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[str, float]]) -> list[LadderRun]:

@@ -17,7 +17,6 @@ from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_nam
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.core.truth import edge_between
-from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.engine_questions import describe_each, resolve, resolve_with_truth
@@ -51,7 +50,7 @@ def at_point(parameters: dict[str, float]) -> str:
 
 @dataclass(frozen=True)
 class Planned:
-    """A row at a point, with factor on the step -> case of its ladder, and of coarser steps that show no limit.
+    """A row at a point, with factor on the step -> case of its ladder.
 
     The run's own case has the factor 1.
     """
@@ -160,9 +159,7 @@ def _further_steps(runs: Sequence[Planned]) -> list[Case]:
     return [case for run in runs for factor, case in run.ladder.items() if factor != 1]
 
 
-def plan(
-    comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None, *, coarser: bool = False
-) -> Plan:
+def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None) -> Plan:
     """Plan of a comparison, or of its rows of some engines only.
 
     An engine in another interpreter, ``mujoco@3.8.1``, runs the rows of ``mujoco`` there.
@@ -171,7 +168,6 @@ def plan(
         comparison: rows, points and times.
         engines: to which it is restricted; empty: all.
         workers: pool for questions to engines; None: new workers.
-        coarser: True to run settings that should agree with coarser steps, too, for advice on the cheapest one.
 
     Raises:
         InputError: an engine or setting that does not exist.
@@ -199,8 +195,7 @@ def plan(
     times = time_grid(comparison.until, comparison.every)
     steps = [facts.step if isinstance(facts, EngineFacts) else None for facts in resolved]
     rows = [_fitting(row, step, times) for row, step in zip(rows, steps, strict=True)]
-    further = [_coarser(comparison, *pair, times) if coarser else [] for pair in zip(rows, resolved, strict=True)]
-    rungs = _rungs(rows, resolved, workers, further)
+    rungs = _rungs(rows, resolved, workers)
     scenes: dict[str, Scene] = {}
     truths: dict[str, Case] = {}
     runs: list[Planned] = []
@@ -320,36 +315,14 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
                 raise InputError(f"{place.removesuffix('engine')}ladder", ladder, advice)
 
 
-def _coarser(comparison: Comparison, row: Row, facts: EngineFacts | ProofrollError, times: FloatArray) -> list[float]:
-    """Factors on the step of an engine's row that should agree, beyond its ladder.
-
-    They are whole, so that a person can write the steps down, at least double, and end with one step between samples.
-    """
-    if not isinstance(facts, EngineFacts) or facts.witness or facts.step is None or Verdict.AGREES not in row.expect:
-        return []
-    steps_between, factors = round(comparison.every / facts.step), [1]
-    for factor in range(2, steps_between + 1):
-        if steps_between % factor == 0 and factor >= 2 * factors[-1]:
-            factors.append(factor)
-    beyond = [float(factor) for factor in factors if factor > max(row.ladder)]
-    return [factor for factor in beyond if _misfit([factor], facts.step, times) is None]
-
-
 def _rungs(
-    rows: list[Row],
-    resolved: list[EngineFacts | ProofrollError],
-    workers: Workers | None,
-    further: Sequence[Sequence[float]],
+    rows: list[Row], resolved: list[EngineFacts | ProofrollError], workers: Workers | None
 ) -> list[dict[float, EngineFacts]]:
-    """Factor -> facts of each rung of every row's ladder, as far as the engine allows the scaled resolution.
-
-    ``further``: factors of each row beyond its ladder.
-    """
+    """Factor -> facts of each rung of every row's ladder, as far as the engine allows the scaled resolution."""
     asked: list[tuple[int, float, EngineFacts]] = []
-    for index, (row, facts, beyond) in enumerate(zip(rows, resolved, further, strict=True)):
+    for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
-            factors = [*beyond, *row.ladder]
-            asked += [(index, factor, facts) for factor in factors if factor != 1 and _asked(facts, factor)]
+            asked += [(index, factor, facts) for factor in row.ladder if factor != 1 and _asked(facts, factor)]
     scaled = [
         (facts.name, {**facts.settings, facts.resolution: facts.settings[facts.resolution] * _scaled(facts, factor)})
         for _, factor, facts in asked

@@ -24,9 +24,8 @@ from proofroll.files.toml import study_content, study_files
 from proofroll.running.timing import FACTOR, Timing, interval_text, ratio
 from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.tradeoff.curve import Question
-from proofroll.studies.tradeoff.recommend import holding
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.tradeoff.requirements import Requirements
+from proofroll.studies.tradeoff.requirements import Requirements, holding
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,9 @@
 """Pareto front: points that no other point matches or beats in both cost and error."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TypeVar
 
 _Item = TypeVar("_Item")
-
-
-def costs_overlap(cost: Sequence[float] | None, rival: Sequence[float] | None) -> bool:
-    """True if the intervals (low, high) of two costs overlap; False if one is missing."""
-    return cost is not None and rival is not None and cost[0] <= rival[1] and rival[0] <= cost[1]
 
 
 def front(entries: Iterable[tuple[_Item, float, float]]) -> list[_Item]:

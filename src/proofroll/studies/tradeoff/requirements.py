@@ -1,14 +1,16 @@
-"""Requirements of a recommendation, and reasons why a measured point does not meet them."""
+"""Requirements of a tolerance, the measured points that meet them, and reasons why others do not."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.convergence import floor_text
+from proofroll.core.engine_abilities import by_hand
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.number_format import number
+from proofroll.core.plugins import parse_engine
 
 if TYPE_CHECKING:
     from proofroll.studies.tradeoff.records import CurveBudget, MeasuredPoint, SparseRun, TradeoffStudy
@@ -20,21 +22,41 @@ _COARSE = "the step is too coarse"
 
 @dataclass(frozen=True)
 class Requirements:
-    """Requirements of a recommendation.
+    """Requirements of a tolerance.
 
     Attributes:
         quantity: an observable.
         tolerance: largest error of it.
-        max_cost: allowed wall time per simulated second, or None.
         engines: the engines among which to choose; if empty, all but equations derived by hand for the scene.
         levels: the rungs among which to choose; all if empty.
     """
 
     quantity: str
     tolerance: Tolerance
-    max_cost: float | None = None
     engines: tuple[str, ...] = ()
     levels: tuple[str, ...] = ()
+
+
+def holding(study: TradeoffStudy, required: Requirements, *, here: bool = False) -> list[MeasuredPoint]:
+    """All allowed points that hold the tolerance with margin, the cheapest first, untimed ones last.
+
+    With ``here`` only the scene's own parameters matter, not the corners of the range.
+
+    Raises:
+        InputError: a quantity that was not measured, or a percentage of a quantity without a size.
+    """
+    absolute = absolute_tolerance(study, required)
+    within = replace(study, over={}) if here else study
+    points = [p for p in study.points if _asked(p, required) and failure_reason(within, p, required, absolute) is None]
+    return sorted(points, key=lambda p: p.cost)
+
+
+def _asked(point: MeasuredPoint, required: Requirements) -> bool:
+    if required.levels and point.level not in required.levels:
+        return False
+    if not required.engines:
+        return not by_hand(point.level) or bool(required.levels)
+    return any(parse_engine(text).means(point.engine, point.settings) for text in required.engines)
 
 
 def absolute_tolerance(study: TradeoffStudy, required: Requirements) -> float:

@@ -257,10 +257,3 @@ def study_path(folder: Path, question: Question, engines: Sequence[str] = (), *,
     parts = [[scene.digest, question.until], *([sorted(engines)] if engines else [])]
     digests = (hashlib.sha256(json.dumps(part).encode()).hexdigest()[:10] for part in parts)
     return folder / "tradeoff" / f"{'-'.join([scene.name, *digests])}{'-brief' if brief else ''}.json"
-
-
-def restricted_paths(folder: Path, question: Question) -> list[Path]:
-    """Files of the studies of a question that are restricted to some engines."""
-    whole = study_path(folder, question)
-    paths = whole.parent.glob(f"{whole.stem}-*.json")
-    return sorted(path for path in paths if not path.stem.endswith("-brief") and path.suffixes == [".json"])

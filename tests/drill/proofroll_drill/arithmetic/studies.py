@@ -24,8 +24,7 @@ from proofroll.studies.stability.records import BOUNDARIES
 from proofroll.studies.stability.study import stability_study
 from proofroll.studies.tradeoff.claims import Converges, Holds, load_claims
 from proofroll.studies.tradeoff.curve import Question
-from proofroll.studies.tradeoff.recommend import holding
-from proofroll.studies.tradeoff.requirements import Requirements
+from proofroll.studies.tradeoff.requirements import Requirements, holding
 from proofroll.studies.tradeoff.study import tradeoff_study
 from proofroll.studies.tradeoff.tradeoff import Extent, tradeoff
 

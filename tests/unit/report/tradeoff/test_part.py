@@ -11,7 +11,6 @@ from invented import boundary_point, invented_study, measured_point, timed
 
 from proofroll.report.labels import name_of
 from proofroll.report.long_table import TableLine
-from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.tradeoff.part import TradeoffPart
 from proofroll.studies.tradeoff import curve
 
@@ -57,22 +56,16 @@ def settings(curve: str) -> dict[str, Any]:
 
 
 def test_an_option_of_an_engine_is_part_of_its_setting() -> None:
-    """Settings that differ by an option alone are two in the table, in the matrix and in every name."""
+    """Settings that differ by an option alone are two in the table and in every name."""
     lines = lines_of(pyramidal=[1e-5], elliptic=[2e-5])
     assert [line.setting for line in lines] == ["cone=pyramidal", "matched"]
-    matrix = choice_matrix(lines, {lines[0].study: ChoiceStudy("A slope", "c0")})
-    assert [row.setting for row in matrix.rows] == ["", "cone=pyramidal", "matched"]
     points = [boundary_point(engine="engine", curve=curve, settings=settings(curve)) for curve in CONES]
     assert [name_of(point) for point in points] == ["engine free, cone=pyramidal", "engine free, matched"]
 
 
 def test_a_line_has_the_error_of_its_run_and_the_number_of_its_curve() -> None:
-    """The error is the run's own, though finer runs are worse; that such luck is not recommended is judged later."""
+    """The error is the run's own, though finer runs are worse."""
     lines = lines_of(one=[1e-6, 2e-3, 1e-7], other=[1e-4, 1e-5])
     assert [(line.row, line.step, line.error) for line in lines] == [
         (0, 1e-3, 1e-6), (0, 5e-4, 2e-3), (0, 2.5e-4, 1e-7), (1, 1e-3, 1e-4), (1, 5e-4, 1e-5),
     ]  # fmt: skip
-    matrix = choice_matrix(lines, {lines[0].study: ChoiceStudy("A slope", "c0")})
-    row = next(item for item in matrix.rows if item.setting == "cone=pyramidal")
-    cell = matrix.cell(row, matrix.columns[0], 1e-3, forces=False)
-    assert "at dt 2.5e-4 s: within" in cell.title, "the run at 1e-3 s is right by luck"

@@ -203,20 +203,6 @@ def test_a_run_is_judged_by_its_own_ladder(tmp_path: Path) -> None:
     assert "no limit shown: dt 0.00025 diverged: NaN" in run.contradictions[0]  # which step is missing, and why
 
 
-def test_a_coarser_step_for_advice_decides_no_verdict(tmp_path: Path) -> None:
-    """Its error is told beside those of the ladder; where it is far off or diverges, the row agrees as without it."""
-    diverged = Result(Status.DIVERGED, "NaN")
-    beyond: dict[float, Answer] = {8.0: lambda *_: diverged, 4.0: off, 2.0: the_truth, 0.5: the_truth}
-    row = dataclasses.replace(ROW, ladder=[2.0, 1.0, 0.5])
-    (run,) = judged(tmp_path, claim([row], [4.0]), the_truth, rungs=beyond).runs
-    assert run.verdict is Verdict.AGREES
-    errors = {rung.value: rung.errors.get("z") for rung in run.rungs}
-    assert errors == {8e-3: None, 4e-3: pytest.approx(1e-3), 2e-3: 0.0, 5e-4: 0.0}
-    lost = beyond | {0.5: lambda *_: Result(Status.DIVERGED, "at a finer step")}
-    (run,) = judged(tmp_path / "lost", claim([row], [4.0]), the_truth, rungs=lost).runs
-    assert "dt 0.0005 diverged: at a finer step" in run.contradictions[0], "not the coarser one"
-
-
 def test_a_tolerance_that_the_engine_refuses_is_no_rung(tmp_path: Path) -> None:
     """Where a half of the tolerance is tighter than any that the engine takes, those before it are judged."""
     band = Band("round-off", {"q.pivot": Tolerance(1e-9, False, "rad")})

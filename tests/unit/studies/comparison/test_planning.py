@@ -9,7 +9,6 @@ import pytest
 from proofroll.core.comparison import Edge, Row
 from proofroll.core.errors import InputError
 from proofroll.core.observable import Role
-from proofroll.core.verdict import Verdict
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.comparison import default_comparison as first_look
@@ -57,20 +56,6 @@ def test_a_ladder_fits_between_the_samples(step: float, factors: list[float]) ->
     found = planning.plan(dataclasses.replace(comparison, rows=[row]), ["mujoco"])
     assert {tuple(run.row.ladder) for run in found.runs} == {tuple(factors)}
     assert all(run.ladder.keys() == set(factors) for run in found.runs)
-
-
-def test_settings_that_should_agree_are_run_coarser_for_advice() -> None:
-    """Half the steps between samples until one is left, beyond the ladder; none for a witness or what should differ."""
-    comparison = dataclasses.replace(load_comparison("accuracy"), until=0.1, every=0.01)
-    tolerance = comparison.rows[0].tolerance
-    names = ["mujoco[formulation=chart,dt=1e-3]", "projection[formulation=euler,preset=default,dt=1e-3]"]
-    rows = [Row(name, tolerance, ladder=[1.0]) for name in names]
-    rows.append(dataclasses.replace(rows[0], engine="mujoco[formulation=chart,dt=5e-4]", expect=[Verdict.DIFFERS]))
-    found = planning.plan(dataclasses.replace(comparison, rows=rows), coarser=True)
-    factors = {run.row.engine: sorted(run.ladder) for run in found.runs}
-    assert factors[names[0]] == pytest.approx([1.0, 2.0, 5.0, 10.0])
-    assert factors[names[1]] == factors[rows[2].engine] == [1.0]
-    assert all(len(run.ladder) == 1 for run in planning.plan(dataclasses.replace(comparison, rows=rows)).runs)
 
 
 def test_a_comparison_without_motion_is_refused() -> None:

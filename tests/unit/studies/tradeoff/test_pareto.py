@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from proofroll.core.convergence import envelope
-from proofroll.studies.tradeoff.pareto import costs_overlap, front
+from proofroll.studies.tradeoff.pareto import front
 
 NUMBERS = st.floats(min_value=1e-12, max_value=1e6)
 
@@ -38,10 +38,3 @@ def test_envelope_never_promises_less_than_its_finer_neighbours_show(errors: lis
 def test_round_off_of_much_finer_steps_is_not_luck() -> None:
     """A run is believed although round-off grows again where steps are far smaller."""
     assert envelope([1e-3, 1e-6, 1e-9, 2e-9, 1e-8, 1e-7])[:3] == [1e-3, 1e-6, 1e-8]
-
-
-def test_costs_tie_where_their_intervals_overlap() -> None:
-    """A tie is mutual, holds where the intervals touch, and cannot be seen where there is no interval."""
-    for other, expected in (([2.5, 4.0], True), ([3.0, 4.0], True), ([3.1, 4.0], False), (None, False)):
-        assert costs_overlap([1.0, 3.0], other) is expected
-        assert costs_overlap(other, [1.0, 3.0]) is expected

@@ -1,0 +1,1 @@
+"""Answers to a tolerance, in words for page and terminal."""

@@ -1,0 +1,219 @@
+"""Sentences of an answer's records, the same on the page, on the terminal and in JSON."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterator
+
+from proofroll.core.number_format import number
+from proofroll.report.labels import engine_title, engine_words, step, symbol
+from proofroll.report.labels import unit as shown_unit
+from proofroll.running.case import Status
+from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, StepAnswer, StepTried
+from proofroll.studies.answer.setting_search import State
+
+# State -> sign and short word.
+SIGNS = {
+    State.HOLDS: ("✓", "holds"),
+    State.UNCONFIRMED: ("○", "holds, not confirmed"),
+    State.FINER: ("·", "finer not run"),
+    State.ELSEWHERE: ("✗", "leads elsewhere"),
+    State.REFUSED: ("⊘", "refused"),
+    State.CANNOT: ("—", "cannot"),
+    State.SILENT: ("◐", "not reported"),
+    State.NOT_RUN: ("·", "not run"),
+}
+_QUANTITIES = {"p_WB": "body positions"}
+_PREFIXES = {-3: "m", -6: "µ", -9: "n"}
+
+
+def measure(value: float, of: str) -> str:
+    """An error with its unit; lengths below a centimetre with a prefix: ``0.35 mm``."""
+    if of != "m" or not 1e-10 <= value < 1e-2:
+        return f"{number(value, none='∞')} {shown_unit(of)}".rstrip()
+    power = next((power for power in _PREFIXES if value >= 0.1 * 10.0**power), -9)
+    return f"{float(f'{value / 10.0**power:.2g}'):g} {_PREFIXES[power]}m"
+
+
+def speed(cost: float | None) -> str:
+    """Seconds of motion per second of computing: ``94×``; empty if it was not measured."""
+    if not cost:
+        return ""
+    return f"{float(f'{1 / cost:.2g}'):g}×"
+
+
+def error_words(bound: AllowedError, error: float) -> str:
+    """An error beside what is allowed: ``0.12 mm of 1 mm``, or ``6e-5 of 1e-4`` as parts of the size."""
+    if bound.relative and bound.size:
+        return f"{number(error / bound.size)} of {number(bound.allowed / bound.size)}"
+    return f"{measure(error, bound.unit)} of {measure(bound.allowed, bound.unit)}"
+
+
+def off_words(bound: AllowedError, of_allowed: float) -> str:
+    """An error by its part of what is allowed: ``0.12 mm``, or ``6e-5`` as a part of the size."""
+    error = of_allowed * bound.allowed
+    return number(error / bound.size) if bound.relative and bound.size else measure(error, bound.unit)
+
+
+def quantity_words(name: str) -> str:
+    """Name of a quantity for a reader."""
+    return _QUANTITIES.get(name) or symbol(name)
+
+
+def setting_words(item: EngineAnswer) -> str:
+    """Engine, formulation, preset and step of an answer for a reader; ``as installed`` is the preset ``default``."""
+    preset = "as installed" if item.preset == "default" else item.preset
+    words = engine_words(item.engine, item.formulation), preset, step(item.resolution or None, item.step)
+    return ", ".join(filter(None, words))
+
+
+def brought_words(item: EngineAnswer) -> str:
+    """Clause on the part of the computation that is proofroll's; empty: none is."""
+    return f"through proofroll's {item.brought}" if item.brought else ""
+
+
+def sentence(item: EngineAnswer, until: float) -> str:
+    """Answer of one engine over a time [s], in one sentence."""
+    if not item.holds or item.bound is None or item.error is None:
+        name = setting_words(item) if item.spec and item.state is not State.REFUSED else engine_title(item.engine)
+        return f"{name}: {reason(item)}."
+    told = f"{speed(item.seconds_per_second)} real time, {error_words(item.bound, item.error)}"
+    told += f" in {quantity_words(item.bound.quantity)} over {until:g} s"
+    told += f"; not confirmed: {item.why}" if item.state is State.UNCONFIRMED else ""
+    brought = f" ({brought_words(item)})" if item.brought else ""
+    return f"{setting_words(item)}{brought}: {told}."
+
+
+def reason(item: EngineAnswer) -> str:
+    """Clause on why an engine is not shown to hold a tolerance."""
+    clauses = []
+    if item.state in {State.FINER, State.ELSEWHERE} and item.bound is not None and item.error is not None:
+        clauses.append(f"off by {error_words(item.bound, item.error)}")
+    if item.needs_step and item.needs_seconds:
+        needed = step(item.resolution, item.needs_step, 1)
+        clauses.append(f"at best it needs {needed}, {item.needs_seconds:.0f} s of computing")
+    elif item.why:
+        clauses.append(item.why)
+    if item.state in {State.FINER, State.ELSEWHERE} and item.held_until > 0:
+        clauses.append(f"it holds until {number(item.held_until, 3)} s")
+    return "; ".join([SIGNS[item.state][1], *clauses])
+
+
+def coarser_words(item: EngineAnswer) -> str:
+    """Clause on twice the step of an answer that holds; empty if it was not run."""
+    tried = item.coarser
+    if tried is None or item.bound is None:
+        return ""
+    double = "twice the step" if item.resolution == "dt" else "ten times the tolerance"
+    if tried.status != Status.DONE:
+        return f"{double} {ended_words(tried)}"
+    if tried.of_allowed is None or tried.of_allowed <= 1:
+        return ""
+    return f"{double} is off by {off_words(item.bound, tried.of_allowed)}"
+
+
+def ended_words(tried: StepTried) -> str:
+    """Clause on a run that failed: ``ends at 1.35 s``."""
+    if tried.status == Status.TIMEOUT:
+        return "takes too long"
+    return f"ends at {number(tried.reached, 3)} s" if tried.reached else "gives no result"
+
+
+def taken_sentence(made: SceneAnswer) -> str:
+    """First sentence of an answer: what to take, or that nothing was shown to hold the tolerance."""
+    if made.open:
+        return f"Nothing can be advised for {made.tolerance}: {made.open}."
+    if made.taken is None:
+        return f"No engine is shown to hold {tolerance_words(made)} over {made.until:g} s."
+    return f"Take {sentence(made.taken, made.until)}"
+
+
+def tolerance_words(made: SceneAnswer) -> str:
+    """The tolerance for a reader: a part is one of the path."""
+    return f"{made.tolerance} of the path" if _is_number(made.tolerance) else made.tolerance
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def unaided(made: SceneAnswer) -> EngineAnswer | None:
+    """The cheapest that holds without a part of proofroll, where the one to take has such a part; else None."""
+    if made.taken is None or not made.taken.brought:
+        return None
+    return next((item for item in made.engines if item.holds and not item.brought), None)
+
+
+def scope_sentence(made: SceneAnswer | StepAnswer) -> str:
+    """Sentence on what was judged, over which time, and that attitudes were not."""
+    names = ", ".join(quantity_words(bound.quantity) for bound in made.bounds)
+    unjudged = f" Not judged: {' and '.join(made.unjudged)}." if made.unjudged else ""
+    return f"Judged: {names}, every {made.every:g} s over {made.until:g} s.{unjudged}"
+
+
+def answer_lines(made: SceneAnswer) -> Iterator[str]:
+    """An answer in lines: what to take, with or without a part of proofroll, every engine, and what was judged."""
+    yield taken_sentence(made)
+    taken, alone = made.taken, unaided(made)
+    if taken is not None and taken.brought:
+        told = sentence(alone, made.until) if alone else "none is shown to hold it."
+        yield f"Without a part of proofroll: {told}"
+    for item in made.engines:
+        if item not in (taken, alone):
+            yield f"{SIGNS[item.state][0]} {sentence(item, made.until)}"
+    if taken is not None and (text := coarser_words(taken)):
+        yield f"Not good enough: {text}."
+    yield scope_sentence(made)
+    if made.omitted:
+        yield f"Not in the answer: {', '.join(made.omitted)}."
+
+
+def command_of(made: SceneAnswer, item: EngineAnswer) -> str:
+    """Command that asks whether a setting holds the tolerance, with all that the answer was given."""
+    words = ["proofroll", "compare", made.scene, "--engine", item.spec, "--tolerance", made.tolerance]
+    for name, value in made.parameters.items():
+        words += ["--set", f"{name}={value!r}"]
+    return shlex.join([*words, "--until", f"{made.until!r}"])
+
+
+def step_sentence(made: StepAnswer) -> str:
+    """Answer for a person's own step in one sentence: yes or no, by how much, and which step would do."""
+    if made.open:
+        return f"Not judged: {made.open}."
+    item, size = made.advised, step(made.resolution, made.step)
+    if made.bound is None or made.status != Status.DONE or made.error is None:
+        ended = made.message or item.why
+        until = f", it holds until {number(made.held_until, 3)} s" if made.held_until else ""
+        return f"No: {ended}{until}{_would_do(made)}."
+    error = f"{error_words(made.bound, made.error)} over {made.until:g} s"
+    if not made.holds:
+        luck = f" is luck: {made.luck}" if made.luck else ""
+        until = "" if made.luck else f"; it holds until {number(made.held_until, 3)} s"
+        return f"No: {error}{luck}{until}{_would_do(made)}."
+    told = f"Yes: {error} ({size}, {speed(made.seconds_per_second)} real time)"
+    if item.step is not None and item.step > made.step * (1 + 1e-9):
+        ratio = (made.seconds_per_second or 0.0) / (item.seconds_per_second or math.inf)
+        return f"{told}; {step(item.resolution, item.step)} would do, {number(ratio)} times faster."
+    if item.state is State.UNCONFIRMED:
+        return f"{told}; not confirmed: {item.why}."
+    double = "twice the step" if made.resolution == "dt" else "ten times the tolerance"
+    return f"{told}; {double} does not do."
+
+
+def _would_do(made: StepAnswer) -> str:
+    """Clause on the step of the same setting that holds, or on why none was found."""
+    item = made.advised
+    if item.holds and item.step is not None and item.bound is not None and item.error is not None:
+        off = off_words(item.bound, item.error / item.bound.allowed)
+        sure = "" if item.state is State.HOLDS else ", not confirmed"
+        return (
+            f"; {step(item.resolution, item.step)} would do ({off}{sure}), {speed(item.seconds_per_second)} real time"
+        )
+    if item.state is State.FINER and item.needs_step and item.needs_seconds:
+        needed = step(item.resolution, item.needs_step, 1)
+        return f"; at best it needs {needed}, {item.needs_seconds:.0f} s of computing, which was not run"
+    return f"; {item.state}: {item.why}" if item.why and item.why != made.message else ""

@@ -1,0 +1,114 @@
+"""Answer for a person's own step: whether it is good enough for a tolerance, and which one would do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.multi_element import represents
+from proofroll.core.plugins import EngineSpec, parse_engine
+from proofroll.running.case import EngineFacts
+from proofroll.running.engine_questions import resolve_with_truth
+from proofroll.running.process import processor_seconds
+from proofroll.running.runner import Runner
+from proofroll.studies.answer.answers import bounds_of, engine_answer, unanswerable_because
+from proofroll.studies.answer.question import AnswerQuestion
+from proofroll.studies.answer.records import StepAnswer
+from proofroll.studies.answer.search import EngineSearch, SearchesAbreast, searching
+from proofroll.studies.answer.setting_search import SettingSearch
+from proofroll.studies.judging.asked_tolerance import AskedTolerance, orientations_of
+
+# Halvings from the coarsest step that is run to the person's own: samples are at whole steps of its double and of four
+# times it. A relative tolerance is made looser by as many decades, up to the loosest that asks for anything.
+_COARSER = 2
+_LOOSEST = 0.1
+
+
+def engine_facts(engine: str, question: AnswerQuestion, runner: Runner) -> tuple[EngineFacts, EngineFacts]:
+    """Complete settings of an engine for the scene of a question, and those of the truth.
+
+    Raises:
+        ProofrollError: an unknown engine or setting, or a missing engine.
+    """
+    spec = parse_engine(engine)
+    requires = question.loaded.requires
+    (facts,), truth = resolve_with_truth([(spec.name, spec.options)], runner.workers, requires)
+    if isinstance(facts, ProofrollError):
+        raise facts
+    if facts.resolution is None:
+        raise InputError("engine", engine, "it has no step that could be good enough; leave out --tolerance")
+    return facts.on(requires), truth
+
+
+def step_answer(
+    question: AnswerQuestion, asked: AskedTolerance, engine: str, facts: Sequence[EngineFacts], runner: Runner
+) -> StepAnswer:
+    """Answer for the step of an engine: its error, and the coarsest step of the same setting that holds.
+
+    Args:
+        question: whose samples are at whole steps of it.
+        asked: tolerance.
+        engine: ``name[key=value,…]``.
+        facts: complete settings of the engine, and those of the truth.
+        runner: runs the cases.
+
+    Raises:
+        ProofrollError: there is no truth.
+    """
+    begin = processor_seconds()
+    own, truth = facts
+    resolution = own.resolution or ""
+    abreast = SearchesAbreast(question.references(truth, runner), runner)
+    reference = abreast.references[question.every]
+    bounds = bounds_of(asked, reference)
+    spec = parse_engine(engine)
+    options = {key: value for key, value in spec.options.items() if key != resolution}
+    size = float(own.settings[resolution])
+    coarser = _COARSER if own.step is not None else max(0, min(_COARSER, round(math.log10(_LOOSEST / size))))
+    item = SettingSearch(
+        spec=str(EngineSpec(spec.name, options)),
+        facts=own,
+        first=size * (2.0 if own.step is not None else 10.0) ** coarser,
+        until=question.until,
+        allowed={bound.quantity: bound.allowed for bound in bounds},
+        sizes={bound.quantity: bound.size or bound.allowed for bound in bounds},
+        start=coarser,
+    )
+    search = EngineSearch(own.name, [item])
+    unanswerable = unanswerable_because(bounds, reference)
+    formulation = str(own.settings.get("formulation"))
+    if not represents(question.loaded, formulation, own.provides):
+        lacking = ", ".join(sorted(question.loaded.requires - set(own.provides.get(formulation, ()))))
+        search = EngineSearch(own.name, [], f"{formulation.replace('_', ' ')} lacks {lacking}")
+    elif not unanswerable:
+        abreast.run([searching(search, question)])
+    run = item.runs.get(item.divisor(coarser))
+    worst = run.worst(item.allowed) if run else ""
+    error = run.errors.get(worst, math.inf) if run else math.inf
+    within = run is not None and (run.of_allowed(item.allowed) or math.inf) <= 1
+    advised = engine_answer(search, bounds)
+    return StepAnswer(
+        scene=question.scene,
+        parameters=question.parameters,
+        until=min(question.until, float(reference.dataset.variables["time"].values[-1])),
+        every=question.every,
+        tolerance=asked.text,
+        bounds=bounds,
+        unjudged=orientations_of(question.loaded, item.allowed),
+        open=unanswerable,
+        spec=engine,
+        resolution=resolution,
+        step=size,
+        holds=within and advised.holds and item.level is not None and item.level <= coarser,
+        luck="" if not within else item.unsafe.get(coarser, ""),
+        bound=next((bound for bound in bounds if bound.quantity == worst), None),
+        error=error if math.isfinite(error) else None,
+        status=str(run.status) if run else "",
+        message=run.message if run else "",
+        reached=run.reached if run else 0.0,
+        held_until=run.held_until(item.allowed) if run else 0.0,
+        seconds_per_second=run.cost if run and math.isfinite(run.cost) else None,
+        advised=advised,
+        spent=processor_seconds() - begin,
+    )

@@ -1,0 +1,152 @@
+"""The question of an answer: scene, duration and samples, and its cases."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from proofroll.core.dataset import BETWEEN
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.scene import Scene
+from proofroll.core.time_grid import off_grids, time_grid
+from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.runner import Runner
+from proofroll.studies.cases import case_of
+from proofroll.studies.judging.reference import Reference
+
+# Length of the runs of a scene whose file has no duration [s].
+USUAL = 2.0
+# Fewest and most sampling intervals of a run: enough to see its largest error, few enough to end few steps.
+_FEWEST, _MOST = 80, 400
+# Sampling intervals of the second run of a scheme that adapts its steps.
+_SPARSE = 2
+# Limit of the truth's wall time [s].
+_TRUTH_LIMIT = 600.0
+# Halvings of the sampling interval at whose off-grid times the truth has samples, too.
+_HALVINGS = 12
+
+
+def duration_of(scene: str) -> float:
+    """Length of the runs of a scene [s]: its file's duration, or :data:`USUAL`."""
+    return read_scene_file(scene).duration or USUAL
+
+
+def sampling_of(scene: str, until: float) -> float:
+    """Sampling interval of a run [s]: 1, 2 or 5 times a power of ten that divides it into 80 to 400 intervals.
+
+    Where none does it is a hundredth; a file that gives an interval has a multiple of it.
+    """
+    if (base := read_scene_file(scene).every) is not None:
+        return float(f"{base * max(1, round(until / 100 / base)):.12g}")
+    power = math.floor(math.log10(until))
+    choices = [digit * 10.0**exponent for exponent in range(power, power - 5, -1) for digit in (5, 2, 1)]
+    for every in choices:
+        count = until / every
+        if _FEWEST * (1 - 1e-9) <= count <= _MOST and abs(count - round(count)) < 1e-9 * count:
+            return float(f"{every:.12g}")
+    return float(f"{until / 100:.12g}")
+
+
+@dataclass(frozen=True)
+class AnswerQuestion:
+    """Scene, duration and samples of an answer.
+
+    Attributes:
+        scene: name of the scene.
+        parameters: its parameters that differ from the defaults.
+        until: length of every run [s].
+        every: sampling interval [s].
+    """
+
+    scene: str
+    parameters: dict[str, float]
+    until: float
+    every: float
+
+    @classmethod
+    def of(cls, scene: str, parameters: dict[str, float], until: float | None = None) -> AnswerQuestion:
+        """Question about a scene.
+
+        Args:
+            scene: name of the scene.
+            parameters: values that differ from the defaults.
+            until: length of the runs [s]; None: the scene's own duration.
+
+        Raises:
+            InputError: a time makes no sense.
+        """
+        until = duration_of(scene) if until is None else until
+        time_grid(until, until or 1.0)
+        if until <= 0:
+            raise InputError("until", until, "give a positive, finite time in s")
+        return cls(scene, parameters, until, sampling_of(scene, until))
+
+    def sampled_for(self, step: float | None) -> AnswerQuestion:
+        """The same with samples at whole steps of a given one, of its double and of four times it.
+
+        The runs end with such a step.
+
+        Args:
+            step: step [s]; None: it adapts, and the samples stay.
+
+        Raises:
+            InputError: the step is longer than a quarter of the runs.
+        """
+        if step is None:
+            return self
+        longest = 4 * step
+        if not 0 < longest <= self.until:
+            raise InputError("dt", step, f"give a positive step of at most a quarter of the {self.until:g} s")
+        count = math.floor(self.until / longest * (1 + 1e-12) + 1e-9)
+        every = float(f"{longest * max(1, round(self.until / 100 / longest)):.12g}")
+        return replace(self, until=float(f"{longest * count:.12g}"), every=every)
+
+    @cached_property
+    def loaded(self) -> Scene:
+        """The scene with these parameters, read at the first access."""
+        return load_scene(self.scene, **self.parameters)
+
+    @property
+    def sparse(self) -> float:
+        """Sampling interval of the second run of a scheme that adapts its steps [s]."""
+        return float(f"{self.until / _SPARSE:.12g}")
+
+    def case(self, facts: EngineFacts, every: float, limit: float) -> Case:
+        """Case of one run; ``limit``: of its wall time [s]."""
+        return case_of(self.scene, self.loaded, self.parameters, facts, self.until, every, time_limit=limit)
+
+    def truth(self, facts: EngineFacts) -> Case:
+        """Case of the truth, with samples off the grid where runs have theirs."""
+        scene, between = self.loaded.fully_asked, off_grids(time_grid(self.until, self.every), _steps(self.every))
+        return case_of(
+            self.scene, scene, self.parameters, facts, self.until, self.every, time_limit=_TRUTH_LIMIT, between=between
+        )
+
+    def references(self, facts: EngineFacts, runner: Runner) -> dict[float, Reference]:
+        """Sampling interval [s] -> truth.
+
+        Raises:
+            ProofrollError: there is no truth.
+        """
+        case = self.truth(facts)
+        result = runner.run([case])[case.key]
+        if result.status is not Status.DONE:
+            raise ProofrollError(f"there is no truth here: {result.message}")
+        dataset = runner.store.stored(case).dataset
+        times, sparse = dataset["time"].to_numpy(), time_grid(self.until, self.sparse)
+        sparse = sparse[sparse <= times[-1] * (1 + 1e-9)]
+        indices = np.unique(np.abs(times[:, None] - sparse).argmin(axis=0))
+        few = dataset.drop_dims(BETWEEN, errors="ignore").isel(time=indices)
+        return {self.every: Reference.of(self.loaded, dataset), self.sparse: Reference.of(self.loaded, few)}
+
+
+def _steps(every: float) -> Iterator[float | None]:
+    """Steps that a search may run, as far as they have times of their own off the grid, and None: an adapted step."""
+    yield None
+    for halving in range(_HALVINGS):
+        yield from (float(f"{every / (factor * 2**halving):.12g}") for factor in (1, 3, 5))

@@ -1,0 +1,48 @@
+"""One tolerance at every door: the same text at ``compare`` and ``judge``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import proofroll
+from proofroll.core.errors import InputError
+from proofroll.running.idle_workers import Workers
+from proofroll.studies.comparison.by_name import comparison_named
+
+Proofroll = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A table of a pendulum's tip that is off by 0.1 mm."""
+    true = proofroll.simulate(proofroll.load_scene("pendulum"), "truth", until=0.2, every=0.05)
+    path = tmp_path_factory.mktemp("table") / "run.csv"
+    columns = np.column_stack([true["time"].values, true["tip.x"].values + 1e-4])
+    np.savetxt(path, columns, delimiter=",", header="time,tip.x", comments="")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("texts", "code"),
+    [(["1 mm"], 0), (["10 um"], 1), (["1 %"], 0), (["1e-2"], 0), (["1e-6 of path"], 1), (["tip.x=1 mm"], 0)],
+)
+def test_judge_takes_a_tolerance_without_a_name(proofroll: Proofroll, table: Path, texts: list[str], code: int) -> None:
+    """A length, a percentage or a part of the path bounds what the file gives; a name bounds one variable."""
+    options = [part for text in texts for part in ("--tolerance", text)]
+    assert proofroll("judge", str(table), "pendulum", *options)[0] == code
+
+
+def test_a_comparison_of_a_scene_is_judged_by_it() -> None:
+    """The bands of a default comparison bound what the tolerance bounds, and say why; a file keeps its own."""
+    workers = Workers()
+    made = comparison_named("pendulum", {}, workers, None, engines=["projection"], tolerance=["1 mm"])
+    (band,) = made.bands.values()
+    assert set(band.bounds) == {"positions", "p_WB"}
+    assert {bound.value for bound in band.bounds.values()} == {1e-3}
+    assert band.because == "1 mm was asked for"
+    with pytest.raises(InputError, match="has its own"):
+        comparison_named("stick_slip", {}, workers, None, tolerance=["1 mm"])

@@ -1,0 +1,85 @@
+"""Sentences of answers: one from one record, with its measure, its doubts and what was not run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from invented_answers import BOUND, COARSER, FINER, HELD, THROUGH, scene_answer
+
+from proofroll.report.answer.sentences import answer_lines, command_of, measure, sentence, step_sentence, taken_sentence
+from proofroll.studies.answer.records import AllowedError, StepAnswer
+from proofroll.studies.answer.setting_search import State
+
+METRES = AllowedError("positions", "m", 1e-3, 2.0, 1e-12, relative=False)
+OWN = StepAnswer(
+    scene="pendulum", parameters={}, until=5.0, every=0.02, tolerance="1 mm", bounds=[METRES], unjudged=[], open="",
+    spec="alpha[dt=0.002]", resolution="dt", step=2e-3, holds=True, luck="", bound=METRES, error=1.2e-4, status="done",
+    message="", reached=5.0, held_until=5.0, seconds_per_second=1 / 160, advised=replace(HELD, step=2e-3), spent=1.0,
+)  # fmt: skip
+
+
+def test_what_holds_is_told_with_speed_error_and_time() -> None:
+    """Setting, step, speed, error of what is allowed, quantity and time; a part of proofroll is named."""
+    assert sentence(HELD, 2.0) == "alpha fine, matched, dt 1e-3 s: 50× real time, 2.5e-5 of 1e-4 in z over 2 s."
+    assert "(through proofroll's integrator): 100× real time" in sentence(THROUGH, 2.0)
+    unsure = replace(HELD, state=State.UNCONFIRMED, why="the next step takes 9 s")
+    assert sentence(unsure, 2.0).endswith("; not confirmed: the next step takes 9 s.")
+
+
+def test_what_was_not_run_is_no_verdict() -> None:
+    """Finer steps than affordable are told with the error that was seen and the step that is needed at best."""
+    assert sentence(FINER, 2.0) == (
+        "gamma, dt 1e-3 s: finer not run; off by 7e-4 of 1e-4; at best it needs dt 8e-5 s, 21 s of computing; "
+        "it holds until 0.5 s."
+    )
+
+
+def test_an_answer_begins_with_what_to_take() -> None:
+    """Then what does without a part of proofroll, the others, twice the step, and what was judged."""
+    lines = list(answer_lines(scene_answer(THROUGH, HELD, FINER)))
+    assert lines[0].startswith("Take beta only, as installed, dt 1e-3 s (through proofroll's integrator): 100× real")
+    assert lines[1].startswith("Without a part of proofroll: alpha fine, matched, dt 1e-3 s: 50×")
+    assert [line[0] for line in lines[2:]] == ["·", "N", "J"]
+    assert lines[3] == "Not good enough: twice the step is off by 4e-4."
+    assert lines[4] == "Judged: z, every 0.02 s over 2 s. Not judged: attitude."
+    assert taken_sentence(scene_answer(FINER)) == "No engine is shown to hold 1e-4 of the path over 2 s."
+    blurred = replace(scene_answer(), open="the truth itself is known to 1e-3 m of z only")
+    assert taken_sentence(blurred) == "Nothing can be advised for 1e-4: the truth itself is known to 1e-3 m of z only."
+
+
+def test_a_persons_step_is_good_enough_or_not() -> None:
+    """Yes with twice the step, or a coarser one that does; no with the time that it holds, luck, and one that does."""
+    assert step_sentence(OWN) == (
+        "Yes: 0.12 mm of 1 mm over 5 s (dt 2e-3 s, 160× real time); twice the step does not do."
+    )
+    coarser = replace(OWN, advised=replace(HELD, step=8e-3, seconds_per_second=1 / 640))
+    assert step_sentence(coarser).endswith("; dt 8e-3 s would do, 4 times faster.")
+    would = replace(HELD, bound=METRES, error=7.8e-4)
+    no = replace(OWN, holds=False, error=1.7e-3, held_until=1.0, advised=would)
+    assert step_sentence(no) == (
+        "No: 1.7 mm of 1 mm over 5 s; it holds until 1 s; dt 1e-3 s would do (0.78 mm), 50× real time."
+    )
+    lucky = replace(no, error=9e-4, luck="dt 1.6e-3 s is off by 2 times what is allowed")
+    assert step_sentence(lucky).startswith("No: 0.9 mm of 1 mm over 5 s is luck: dt 1.6e-3 s is off by 2 times")
+    lost = replace(no, status="diverged", message="not finite at 1.35 s", error=None, bound=None)
+    assert step_sentence(lost).startswith("No: not finite at 1.35 s, it holds until 1 s; dt 1e-3 s would do")
+
+
+def test_a_command_has_all_that_was_given() -> None:
+    """Scene, engine with its step, tolerance, parameters and length."""
+    assert command_of(scene_answer(HELD), HELD) == (
+        "proofroll compare sphere_in_cylinder --engine 'alpha[formulation=fine,dt=0.001]' --tolerance 1e-4 "
+        "--set speed=3.0 --until 2.0"
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "words"),
+    [(1.2e-4, "m", "0.12 mm"), (3e-8, "m", "30 nm"), (0.5, "m", "0.5 m"), (1e-3, "rad", "1e-3 rad"), (2.0, "1", "2")],
+)
+def test_a_length_has_a_prefix(value: float, unit: str, words: str) -> None:
+    """Lengths below a centimetre are in mm, µm or nm; other quantities in their unit."""
+    assert measure(value, unit) == words
+    assert BOUND.relative
+    assert COARSER.of_allowed == 4.0
