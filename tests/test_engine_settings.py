@@ -72,8 +72,8 @@ def test_a_step_in_brackets_is_the_one_that_is_taken(
     kept = [] if path.startswith(("run", "balance")) else ["--out", str(tmp_path / "out")]
     code, out, err = command_line(*arguments(path), "--engine", ENGINE, *kept, "--json")
     assert code == 0, err
-    steps = set(re.findall(r'"dt": ([0-9.e-]+)', out))
-    assert steps <= {"0.002"}
+    steps = set(map(float, re.findall(r'(?:"dt": |"spec": "[^"]*dt=)([0-9.e-]+)', out)))
+    assert steps <= {0.002}
     assert steps or ENGINE in out
 
 

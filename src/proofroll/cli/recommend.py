@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -58,6 +59,7 @@ def recommend(
 
     scenes = [options.controlled(scene, control) for scene in scenes]
     questions = [question_named(scene, options.assignments(settings), until) for scene in scenes]
+    questions = [item.sampled_for(_given_step(engine or [])) for item in questions]
     asked = [AskedTolerance.of(tolerance or [DEFAULT], item.loaded, forces=forces) for item in questions]
     runner = options.new_runner(out, fresh, jobs, workers=Workers())
     made = []
@@ -72,6 +74,17 @@ def recommend(
     elif lines:
         _print_lines(made)
     raise typer.Exit(options.OK if all(item.taken for item in made) else options.CONTRADICTED)
+
+
+def _given_step(engines: list[str]) -> float | None:
+    """Longest step that engines are given in brackets [s]; None: they are given none that is a number."""
+    from proofroll.core.plugins import parse_engine
+
+    steps = []
+    for text in engines:
+        with suppress(ValueError):  # the engine says what is wrong
+            steps.append(float(parse_engine(text).options.get("dt", "")))
+    return max(steps, default=None)
 
 
 def _answer(
