@@ -133,7 +133,7 @@ BAD = {
 }  # fmt: skip
 
 
-@pytest.mark.drill_of("unknown setting")
+@pytest.mark.drill_of("dt of zero", "unknown setting")
 @pytest.mark.parametrize(("arguments", "code", "words"), BAD.values(), ids=BAD.keys())
 def test_bad_input(proofroll: Proofroll, arguments: list[str], code: int, words: list[str]) -> None:
     """Every bad input gives one line on standard error, nothing on standard output, and its exit code."""
@@ -408,6 +408,7 @@ def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Pa
     assert "1 fails." in out
 
 
+@pytest.mark.drill
 def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--until`` and ``--every`` are those of a scene's comparison; a comparison file has its own."""
     command = ["compare", "sphere_in_cylinder", "--engine", "oracle", "--out", str(tmp_path), "--json"]

@@ -18,6 +18,8 @@ RUN = "(where) => axe.run(where || document, {resultTypes: ['violations']}).then
 
 def grave(visit: Visit, where: str = "") -> list[str]:
     """Violations that are serious, critical or moderate, of the page or of a place, each with the first element."""
+    # colours and places of two frames before would be those of another medium
+    visit.page.evaluate("new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))")
     found: list[dict[str, Any]] = visit.page.evaluate(RUN, where)
     return [
         f"{item['impact']} {item['id']}: {item['nodes'][0]['html'][:200]} ({len(item['nodes'])})"

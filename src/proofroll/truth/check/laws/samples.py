@@ -18,6 +18,7 @@ from proofroll.truth.check.laws.tiles import Places, Tiles
 
 _ARM = 1e-2  # part of the natural length by which a force turns at least, for sizes of moments
 _NOISE = 20 * COUNT * 3e-14  # of a derivative at the end of a tile of unit half length, relative to the values
+_LEAST = 1e-3  # part of the mechanism's natural force that the size of forces on a body has at least, massless or not
 _RANK = 1e-12  # relative singular value below which unknown forces are one
 _IN_PLANE = 1e-12  # component of a direction that is round-off
 
@@ -85,6 +86,7 @@ def _newton_and_euler(
         loads.moment_digits[..., :bodies] + trace * off[1] / half,
     )
     size = loads.force_size[..., :bodies] + mass * (scene.speed * scene.rate + norm(acceleration))
+    size = size + _LEAST * scene.force
     turning = trace * (scene.rate**2 + norm(pieces.w[..., :bodies, :]) ** 2) + size * _ARM * scene.length
     turning = turning + loads.moment_size[..., :bodies]
     left, cancelled = unknown.explained(left, np.stack([size + digits[0], turning + digits[1]], -1))

@@ -37,8 +37,9 @@ _SMOOTH: Mapping[str, Callable[[Any], Any]] = {
 def value_of(signal: Any, time: Array) -> Array:
     """Values of a signal at the points of pieces; a held value is that of the middle of its piece."""
     if hasattr(signal, "text"):
-        names = {"t": time - getattr(signal, "delay", 0.0), **dict(signal.numbers)}
-        value = _formula(signal.text, names)
+        second, factor = getattr(signal, "second", 1.0), getattr(signal, "factor", 1.0)  # of one in other units
+        names = {"t": second * time - getattr(signal, "delay", 0.0), **dict(signal.numbers)}
+        value = factor * _formula(signal.text, names)
     elif hasattr(signal, "times"):
         value = _of_table(signal, (time[:, :1] + time[:, -1:]) / 2 if signal.hold else time)
     else:
@@ -48,7 +49,8 @@ def value_of(signal: Any, time: Array) -> Array:
 
 def pull_by(law: Any, length: Array, rate: Array) -> Array:
     """Pull of a spring with a formula of its own [N], at lengths [m] and their rates [m/s], (pieces, points)."""
-    value = _formula(law.text, {"L": length, "dL": rate, **dict(law.numbers)})
+    metre, speed, newton = law.units
+    value = _formula(law.text, {"L": metre * length, "dL": speed * rate, **dict(law.numbers)}) / newton
     return np.asarray(np.broadcast_to(np.asarray(value, float), length.shape))
 
 
