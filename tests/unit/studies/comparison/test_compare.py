@@ -203,6 +203,7 @@ def test_a_run_is_judged_by_its_own_ladder(tmp_path: Path) -> None:
     assert "no limit shown: dt 0.00025 diverged: NaN" in run.contradictions[0]  # which step is missing, and why
 
 
+@pytest.mark.drill
 def test_a_tolerance_that_the_engine_refuses_is_no_rung(tmp_path: Path) -> None:
     """Where a half of the tolerance is tighter than any that the engine takes, those before it are judged."""
     band = Band("round-off", {"q.pivot": Tolerance(1e-9, False, "rad")})
