@@ -81,9 +81,9 @@ def stored_sentences(comparison: Comparison, out: Path) -> list[str]:
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
 
     point = next(iter(comparison.combinations()), {})
-    given = {name: value for name, value in point.items() if isinstance(value, float)}
+    values = {name: value for name, value in point.items() if isinstance(value, float)}
     until = read_scene_file(comparison.scene).duration or comparison.until
-    question = AnswerQuestion.of(comparison.scene, given, until)
+    question = AnswerQuestion.of(comparison.scene, values, until)
     path = answer_path(out, question, AskedTolerance.of([DEFAULT], question.loaded))
     answer = stored(path, SceneAnswer) if path.is_file() else None
     return [f"To {DEFAULT} of the path: {taken_sentence(answer)}"] if answer is not None else []

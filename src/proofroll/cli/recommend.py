@@ -102,8 +102,8 @@ def _answer(
 
     def begin(names: Sequence[str]) -> None:
         if not quiet:
-            where = f"{question.scene} over {question.until:g} s"
-            options.complain(f"searching {', '.join(names)} in {where}: at most {CELL_CAP:g} s of processor time each")
+            place = f"{question.scene} over {question.until:g} s"
+            options.complain(f"searching {', '.join(names)} in {place}: at most {CELL_CAP:g} s of processor time each")
 
     def tell(item: EngineAnswer) -> None:
         if not quiet:

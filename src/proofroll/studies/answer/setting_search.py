@@ -244,9 +244,9 @@ class SettingSearch:
     def _jump(self, levels: Mapping[int, JudgedRun], finest: int) -> int:
         """Number of halvings to the next step: more than one where the error is far too large and falls."""
         size = self.size(self.divisor(finest))
-        before = self._before(finest)
-        falls = before is None or self._relative(before) > _SOUND
-        falls = falls or size <= self.size(self.divisor(before or 0)) * 2.0 ** (-0.5 * (finest - (before or 0)))
+        level = self._before(finest)
+        falls = level is None or self._relative(level) > _SOUND
+        falls = falls or size <= self.size(self.divisor(level or 0)) * 2.0 ** (-0.5 * (finest - (level or 0)))
         if not (self.fixed_step and falls and math.isfinite(size) and levels[finest].status is Status.DONE):
             return 1
         return max(1, min(_JUMP, int(math.log2(size) / (max(self.order, 2) + 2))))
@@ -265,11 +265,11 @@ class SettingSearch:
 
     def _rate(self, finest: int) -> float | None:
         """Power of the step with which the errors of the last two runs fall; None: they are no such pair."""
-        before = self._before(finest)
-        if before is None or not self.fixed_step or self._relative(before) >= _SOUND:
+        level = self._before(finest)
+        if level is None or not self.fixed_step or self._relative(level) >= _SOUND:
             return None
-        ratio = self.size(self.divisor(before)) / max(self.size(self.divisor(finest)), 1e-300)
-        return math.log2(ratio) / (finest - before) if ratio > 1 else None
+        ratio = self.size(self.divisor(level)) / max(self.size(self.divisor(finest)), 1e-300)
+        return math.log2(ratio) / (finest - level) if ratio > 1 else None
 
     def _fewest(self, finest: int) -> float:
         """Fewest further halvings after which the tolerance can be held."""

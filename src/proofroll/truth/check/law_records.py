@@ -95,8 +95,8 @@ class LawRecorder:
         ``pieces``: of :meth:`pieces`, which are all of a compiled stretch; None: not known.
         """
         if isinstance(stretch, CompiledStretch) and stretch.by is not None:
-            known = self.pieces(stretch, numeric=False) if pieces is None else pieces
-            return joined_tiles([Tiles.of(part, number) for part in known]) if known else None
+            parts = self.pieces(stretch, numeric=False) if pieces is None else pieces
+            return joined_tiles([Tiles.of(part, number) for part in parts]) if parts else None
         cut = list(self._whole(stretch))
         if not cut:
             return None

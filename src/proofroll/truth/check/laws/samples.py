@@ -158,7 +158,7 @@ def _along(
         part = wrench[..., 3:] if axis.turns else wrench[..., :3]
         direction = axis.direction
         said = dot(np.where(np.abs(direction) < _IN_PLANE, 0.0, part), direction)
-        given, size = axis.force, axis.size + _ARM * natural + np.nan_to_num(norm(part))
+        expected, size = axis.force, axis.size + _ARM * natural + np.nan_to_num(norm(part))
         size = size + np.nan_to_num(norm(pieces.force)).sum(-1) * (scene.length if axis.turns else 1.0)
         digits = axis.digits
         if joint.armature:
@@ -170,13 +170,13 @@ def _along(
                 frames.spin if axis.turns else frames.slide, (frames.A if which == "A" else frames.B)[..., number]
             )
             faster = places.rate(rate)[:, None]
-            given = given - joint.armature * faster
+            expected = expected - joint.armature * faster
             size = size + joint.armature * np.abs(faster)
             noise = _NOISE / np.maximum(places.half, np.finfo(float).tiny)[:, None]
             digits = digits + joint.armature * noise * (scene.rate + np.abs(rate).max())
         if axis.turns:
             size = size + np.nan_to_num(norm(wrench[..., :3])) * _ARM * scene.length
-        residuals.note("along", joint.name, said - given, size, pieces.time, digits)
+        residuals.note("along", joint.name, said - expected, size, pieces.time, digits)
 
 
 def kinetic_energy(scene: LawScene, moving: BodyPoses) -> tuple[Array, Array]:

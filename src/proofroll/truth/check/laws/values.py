@@ -173,5 +173,5 @@ def _names(scene: LawScene, published: PublishedValues, residuals: LawResiduals)
 def _same(name: str, both: Sequence[Array], published: PublishedValues, residuals: LawResiduals) -> None:
     size = max((float(np.nanmax(np.abs(item), initial=0.0)) for item in both), default=0.0)
     off = np.abs(both[0] - both[1]).reshape(len(both[0]), -1)
-    known = np.where(np.isnan(off), 0.0, off).max(1, initial=0.0)
-    residuals.note("spelling", name, known[:, None], size, published.pieces.time)
+    rest = np.where(np.isnan(off), 0.0, off).max(1, initial=0.0)
+    residuals.note("spelling", name, rest[:, None], size, published.pieces.time)
