@@ -27,7 +27,7 @@ MAY: dict[str, set[str]] = {
     "files": {"core", "files"},
     "running": {"core", "files", "running"},
     "studies": {"core", "files", "running", "studies"},
-    "conformance": {"core", "files", "conformance"},
+    "conformance": {"core", "files", "running", "conformance"},
     "report": {"core", "files", "running", "studies", "report"},
     "cli": {"core", "files", "running", "studies", "report", "cli"},
     "elements": {"core", "files", "elements"},

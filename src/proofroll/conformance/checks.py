@@ -2,7 +2,6 @@
 
 import atexit
 import itertools
-import multiprocessing
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -23,6 +22,7 @@ from proofroll.conformance.subject import (
     scenes,
     truth_scenes,
 )
+from proofroll.running.in_processes import process_pool
 
 # Outcome of a check in a separate process; these processes, one for each formulation and preset of an engine.
 _PASSED, _SKIPPED, _FAILED = "passed", "skipped", "failed"
@@ -157,7 +157,7 @@ def _run_apart(engine: Any, name: str) -> None:
     """Runs the check of this name in the process of its formulation and preset, which is kept for the next check."""
     key = f"{engine.__module__}.{engine.__qualname__}: {_of_one_process(engine, name)}"
     if key not in _processes:
-        _processes[key] = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
+        _processes[key] = process_pool(1)
         atexit.register(_processes[key].shutdown, wait=False, cancel_futures=True)
     try:
         how, text = _processes[key].submit(_outcome, engine, name).result()

@@ -3,7 +3,9 @@
 import ast
 import math
 import operator
+import re
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 from simpleeval import FeatureNotAvailable, InvalidExpression, SimpleEval
@@ -21,7 +23,37 @@ _OPERATORS = {
 }
 # Names of constants that a formula may have.
 CONSTANTS = {"pi": Quantity(math.pi), "deg": Quantity(math.pi / 180)}
-LONGEST = 500  # characters: far more than a person writes, and few enough that nesting cannot overflow the parser
+_LONGEST = 500  # characters: far more than a person writes, and few enough that nesting cannot overflow the parser
+# What a formula may consist of; everything else that Python's grammar knows is refused.
+_CHARACTERS = re.compile(r"[\w\s.+\-*/^(),]*")
+_NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_LEAVES = (ast.Name, ast.Load, *_OPERATORS, ast.Pow)
+
+
+@cache
+def parsed_formula(text: str) -> ast.expr:
+    """Tree of a formula without its sign: numbers, names, + - * / ^ ** ( ) and calls of functions by their name.
+
+    Raises:
+        FeatureNotAvailable: anything else, or more than 500 characters.
+        SyntaxError: an end that is missing.
+    """
+    source = text.replace("^", "**").strip()
+    if len(text) > _LONGEST or not _CHARACTERS.fullmatch(text):
+        raise FeatureNotAvailable(f"a formula has at most {_LONGEST} characters, each of which arithmetic needs")
+    tree = ast.parse(source, mode="eval").body
+    for node in ast.walk(tree):
+        if not _is_arithmetic(node, source):
+            raise FeatureNotAvailable(f"{type(node).__name__} is no arithmetic")
+    return tree
+
+
+def _is_arithmetic(node: ast.AST, source: str) -> bool:
+    if isinstance(node, ast.Constant):
+        return type(node.value) in (int, float) and bool(_NUMBER.fullmatch(ast.get_source_segment(source, node) or ""))
+    if isinstance(node, ast.Call):
+        return isinstance(node.func, ast.Name) and not node.keywords
+    return isinstance(node, (ast.BinOp, ast.UnaryOp, *_LEAVES))
 
 
 def evaluator(
@@ -58,14 +90,13 @@ def evaluated(
         InputError: the expression cannot be read, has an unknown name or function, divides by zero, overflows, adds
             different units, or its result has another unit.
     """
-    if len(text) > LONGEST:
-        raise InputError(field, text, f"an expression may have at most {LONGEST} characters")
+    if len(text) > _LONGEST:
+        raise InputError(field, text, f"an expression may have at most {_LONGEST} characters")
     constants = {**CONSTANTS, **names}
     further = {name: _of_ratio(name, item) for name, item in (functions or {}).items() if name not in FUNCTIONS}
     called = {**FUNCTIONS, **further}
     try:
-        source = text.replace("^", "**").strip()
-        value = evaluator(constants, called, _power).eval(source, ast.parse(source, mode="eval").body)
+        value = evaluator(constants, called, _power).eval(text, parsed_formula(text))
         quantity = Quantity(0.0) + value
         number = float(quantity.value)
     except ZeroDivisionError:

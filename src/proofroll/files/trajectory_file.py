@@ -12,7 +12,6 @@ import math
 import sys
 import weakref
 import zipfile
-import zlib
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -38,8 +37,26 @@ MOST_HELD = 128 * 2**20
 _ABOUT = "about.json"
 # True if xarray was imported without dask; then dask is hidden, too, when xarray asks for a scheduler to write.
 _without_dask = False
-# Exceptions of numpy for a file of another format, or a damaged one.
-_NO_SUCH_FILE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, RecursionError, TypeError, ValueError)
+_LONGEST = 200  # characters shown of the error of a library that reads a file
+
+
+@contextlib.contextmanager
+def reading(what: str) -> Iterator[None]:
+    """Context manager for a library that reads somebody's file: any error of it becomes a ValueError.
+
+    Args:
+        what: clause about the file, as in ``run.npz is no stored trajectory``.
+
+    Raises:
+        OSError, MemoryError: of the library.
+        ValueError: any other error of it; a damaged file may make it raise anything.
+    """
+    try:
+        yield
+    except (OSError, MemoryError):
+        raise
+    except Exception as error:
+        raise ValueError(f"{what} ({' '.join(str(error).split())[:_LONGEST]})" if str(error) else what) from error
 
 
 def import_xarray() -> None:
@@ -132,12 +149,9 @@ def read(path: Path) -> xr.Dataset:
     import xarray as xr
 
     # Times stay numbers of seconds, and no number is a mark for missing values.
-    try:
-        dataset = xr.load_dataset(
-            io.BytesIO(ordinary_content(path)), engine="scipy", decode_times=False, mask_and_scale=False
-        )
-    except (TypeError, LookupError):
-        raise ValueError(f"{path} is cut off, or no netCDF-3") from None
+    content = ordinary_content(path)
+    with reading(f"{path} is cut off, or no netCDF-3"):
+        dataset = xr.load_dataset(io.BytesIO(content), engine="scipy", decode_times=False, mask_and_scale=False)
     return dataset.assign({name: item.astype(str) for name, item in dataset.variables.items() if item.dtype == object})
 
 
@@ -176,41 +190,48 @@ def read_columns(path: Path) -> Columns:
         OSError, ValueError: the file cannot be read, or has another format.
     """
     content = ordinary_content(path)
-    _require_numbers_of_headers(content, path)
-    try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            about, attrs = map(dict, json.loads(file[_ABOUT]))
-            variables = {name: Variable(tuple(dims), file[name], dict(its)) for name, (dims, its) in about.items()}
-    except _NO_SUCH_FILE as error:
-        raise ValueError(f"{path} is no stored trajectory") from error
+    what = f"{path} is no stored trajectory"
+    _require_rows(content, what)
+    with reading(what), np.load(io.BytesIO(content), allow_pickle=False) as file:
+        about, attrs = map(dict, json.loads(file[_ABOUT]))
+        variables = {name: Variable(tuple(dims), file[name], dict(its)) for name, (dims, its) in about.items()}
     return Columns(variables, attrs)
 
 
-def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
+def read_arrays(path: Path, times: str = "time") -> dict[str, npt.NDArray[Any]]:
     """Arrays from a file made by ``numpy.savez``, by name.
 
+    Args:
+        path: file of numpy.
+        times: name of the array of times; every other array has a row for each of them.
+
     Raises:
-        OSError, ValueError: the file cannot be read, or has another format.
+        OSError, ValueError: the file cannot be read, has another format, or an array other rows.
     """
     content = ordinary_content(path)
-    _require_numbers_of_headers(content, path)
-    try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            return dict(file)
-    except _NO_SUCH_FILE as error:
-        raise ValueError(f"{path.name} is no file of numpy's arrays") from error
+    what = f"{path.name} is no file of numpy's arrays"
+    _require_rows(content, what, times)
+    with reading(what), np.load(io.BytesIO(content), allow_pickle=False) as file:
+        return dict(file)
 
 
-def _require_numbers_of_headers(content: bytes, path: Path) -> None:
-    """Raises OSError if an array's header promises more numbers than follow; numpy would ask for their memory."""
-    with contextlib.suppress(*_NO_SUCH_FILE), zipfile.ZipFile(io.BytesIO(content)) as archive:
-        headers = {(1, 0): np.lib.format.read_array_header_1_0}
+def _require_rows(content: bytes, what: str, times: str = "") -> None:
+    """Raises ValueError if a header promises what does not follow, or other rows than the times; nothing is unpacked.
+
+    numpy would ask for the memory that a header promises.
+    """
+    shapes = {}
+    with reading(what), zipfile.ZipFile(io.BytesIO(content)) as archive:
+        readers = {(1, 0): np.lib.format.read_array_header_1_0}
         for entry in [item for item in archive.infolist() if item.filename.endswith(".npy")]:
             with archive.open(entry) as array:
                 version = np.lib.format.read_magic(array)
-                shape, _, kind = headers.get(version, np.lib.format.read_array_header_2_0)(array)
-                promised = math.prod(shape)
-                if promised * kind.itemsize > entry.file_size:
-                    name = entry.filename.removesuffix(".npy")
-                    lie = f"the header of {name} promises {promised:.3g} numbers, which do not follow"
-                    raise OSError(f"{path.name}: {lie}")
+                shape, _, kind = readers.get(version, np.lib.format.read_array_header_2_0)(array)
+                shapes[entry.filename.removesuffix(".npy")] = shape, kind.itemsize, entry.file_size
+    for name, (shape, size, follow) in shapes.items():
+        promised = math.prod(shape)
+        if promised * size > follow:
+            raise ValueError(f"the header of {name} promises {promised:.3g} numbers, which do not follow")
+        rows = shapes[times][0] if times in shapes else shape
+        if shape[:1] != rows[:1]:
+            raise ValueError(f"{name} has the shape {shape}; give one row for each of {rows[0] if rows else 1} times")

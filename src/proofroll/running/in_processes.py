@@ -19,8 +19,7 @@ def in_processes(function: Callable[[Item], Found], items: Sequence[Item], worke
     if workers == 1:
         yield from map(function, items)
         return
-    # Spawned, not forked: a parent that shows progress has threads, and a fork would copy their held locks.
-    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=end_with_pool) as pool:
+    with process_pool(workers) as pool:
         try:
             # Not pool.map: when interrupted it cancels the rest, and the pool complains when its processes are killed.
             with interrupt_held():
@@ -33,8 +32,16 @@ def in_processes(function: Callable[[Item], Found], items: Sequence[Item], worke
             raise
 
 
-def end_with_pool() -> None:
-    """Makes a process of a ``ProcessPoolExecutor`` end with its parent (:func:`.process_end.end_with`).
+def process_pool(workers: int) -> ProcessPoolExecutor:
+    """Pool of processes that end with this process.
+
+    They are spawned, not forked: a parent that shows progress has threads, and a fork would copy their held locks.
+    """
+    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_with_pool)
+
+
+def _end_with_pool() -> None:
+    """Makes a process of a pool end with its parent.
 
     Otherwise it would wait for ever, on a pipe that all of the pool's processes hold open, if the parent is killed.
     """

@@ -11,6 +11,7 @@ from proofroll.core.errors import InputError, Missing, ProofrollError, choices
 from proofroll.core.limits import HELLO_TIME_LIMIT
 from proofroll.core.plugins import place_of, plain_name
 from proofroll.running import environments
+from proofroll.running.bound_program import printed_by
 from proofroll.running.case import Status
 from proofroll.running.handshake import mismatch
 from proofroll.running.process import Worker, WorkerDied, environment_of_another
@@ -99,16 +100,9 @@ def _explained(engine: str, python: Path, error: ProofrollError) -> ProofrollErr
     if isinstance(error, WorkerDied) and error.status == Status.TIMEOUT:
         return WorkerDied(error.status, f"{engine}: {python} did not answer within {HELLO_TIME_LIMIT:g} s")
     with contextlib.suppress(OSError, subprocess.SubprocessError, ValueError, TypeError, LookupError):
-        told = subprocess.run(
-            [python, "-c", _PROBE],
-            capture_output=True,
-            text=True,
-            timeout=_PROBE_SECONDS,
-            env=environment_of_another(),
-            cwd=os.sep,
-            stdin=subprocess.DEVNULL,
-            check=True,
-        ).stdout
+        code, told, _ = printed_by([python, "-c", _PROBE], environment_of_another(), _PROBE_SECONDS, os.sep)
+        if code:
+            raise OSError(code)
         version, has = json.loads(told.splitlines()[-1])
         written = ".".join(map(str, version))
         if tuple(version[:2]) < OLDEST:

@@ -2,11 +2,8 @@
 
 import contextlib
 import json
-import os
 import re
 import shutil
-import signal
-import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
@@ -17,6 +14,7 @@ from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP, distribution_of, engine_names, release
 from proofroll.running import environments
+from proofroll.running.bound_program import printed_by
 from proofroll.running.engine_questions import describe
 from proofroll.running.environments import Environment
 from proofroll.running.process import environment_of_another
@@ -180,30 +178,14 @@ def _carried(name: str, site: Path) -> list[str]:
 def _call(command: Sequence[str | Path]) -> str:
     """Output of a program; when this process is interrupted, the program and all that it started are killed."""
     try:
-        process = subprocess.Popen(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            stdin=subprocess.DEVNULL,
-            env=environment_of_another(),
-            start_new_session=True,
-            text=True,
-            errors="replace",
-        )
+        code, printed, errors_printed = printed_by(command, environment_of_another())
     except OSError as error:
         raise ProofrollError(f"{command[0]} cannot be started ({error.strerror or error})") from None
-    try:
-        printed, errors_printed = process.communicate()
-    except BaseException:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        raise
-    if process.returncode:
+    if code:
         errors = [line for line in errors_printed.splitlines() if line.startswith("ERROR:")]
         words = " ".join(" ".join(errors or errors_printed.splitlines() or printed.splitlines()).split())
         words = _VERSIONS.sub(r"(the last versions are \1)", words)[-_WORDS:]
         program = Path(str(command[0])).name
         what = " ".join(str(item) for item in command[1:4] if str(item).isascii() and len(str(item)) < 20)
-        raise ProofrollError(f"{program} {what} failed ({process.returncode}): {words}")
+        raise ProofrollError(f"{program} {what} failed ({code}): {words}")
     return printed

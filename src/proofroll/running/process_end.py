@@ -64,35 +64,10 @@ def end_with_pipe(pipe: int) -> None:
     Args:
         pipe: reading end of a pipe into which nothing is ever written.
     """
-    global _life  # noqa: PLW0603 -- a fact about the process, set once when it starts
-    _life = pipe
+    if not hasattr(fcntl, "F_SETSIG"):
+        return
     with contextlib.suppress(OSError):
-        _kill_at_its_end(pipe, -os.getpid() if os.getpgrp() == os.getpid() else os.getpid())
-
-
-# Pipe that ends this process, see :func:`end_with_pipe`.
-_life: int | None = None
-
-
-def bound_to_life(group: int) -> int | None:
-    """Makes the kernel kill a further group of processes together with this process's own (Linux only).
-
-    Returns:
-        Descriptor to be closed when the group has ended; None: this process has no such pipe.
-    """
-    if _life is None:
-        return None
-    with contextlib.suppress(OSError):
-        bond = os.open(f"/proc/self/fd/{_life}", os.O_RDONLY | os.O_NONBLOCK)  # which has an owner of its own
-        _kill_at_its_end(bond, -group)
-        return bond
-    return None
-
-
-def _kill_at_its_end(pipe: int, owner: int) -> None:
-    """Sends SIGKILL to a process, or to a group by its negative number, when a pipe has no writer any more."""
-    if hasattr(fcntl, "F_SETSIG"):
-        fcntl.fcntl(pipe, fcntl.F_SETOWN, owner)
+        fcntl.fcntl(pipe, fcntl.F_SETOWN, -os.getpid() if os.getpgrp() == os.getpid() else os.getpid())
         fcntl.fcntl(pipe, fcntl.F_SETSIG, signal.SIGKILL)
         fcntl.fcntl(pipe, fcntl.F_SETFL, fcntl.fcntl(pipe, fcntl.F_GETFL) | os.O_ASYNC)
 

@@ -1,11 +1,9 @@
 """Engines that are programs in any language: ``NAME@program:PATH``. See docs/worker_protocol.md."""
 
-import contextlib
 import dataclasses
 import json
 import math
 import os
-import signal
 import subprocess
 from collections.abc import Mapping
 from functools import cache
@@ -21,12 +19,12 @@ from proofroll.core.multi_element import REQUIRED
 from proofroll.core.plugins import place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.files.json_data import plain
-from proofroll.running.process_end import bound_to_life
+from proofroll.running.bound_program import BoundProgram
 
 PREFIX = "program:"
 PROTOCOL = 1
-# Length of an invalid answer that is shown [characters].
-_SHOWN = 80
+# Lengths of an invalid answer that is shown, and of the longest that is read [characters].
+_SHOWN, _LONGEST = 80, 2**26
 
 
 def path_of(name: str) -> Path | None:
@@ -57,18 +55,9 @@ class Pipe:
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
-            self._process = subprocess.Popen(
-                [path],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                text=True,
-                encoding="utf-8",
-                errors="replace",
-                start_new_session=True,
-            )
+            self._process = BoundProgram([path], stdin=subprocess.PIPE)
         except OSError as error:
             raise ProofrollError(f"{path} cannot be started ({error.strerror or error})") from None
-        self._bond = bound_to_life(self._process.pid)
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Answer to one request.
@@ -83,7 +72,7 @@ class Pipe:
         try:
             process.stdin.write(json.dumps(request) + "\n")
             process.stdin.flush()
-            line = process.stdout.readline()
+            line = process.stdout.readline(_LONGEST)
         except (OSError, ValueError):
             line = ""
         if not line:
@@ -91,7 +80,7 @@ class Pipe:
             raise ProofrollError(f"{self._path.name} ended ({code}) instead of answering {request['do']}")
         try:
             answer = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             answer = None
         if not isinstance(answer, dict):
             shown = line.strip()[:_SHOWN]
@@ -104,17 +93,7 @@ class Pipe:
 
     def close(self) -> None:
         """Ends the program with all that it started; what still holds its pipe is not waited for."""
-        process = self._process
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        for pipe in (process.stdin, process.stdout):
-            if pipe is not None:
-                with contextlib.suppress(OSError):  # an unsent request
-                    pipe.close()
-        if self._bond is not None:
-            os.close(self._bond)
-            self._bond = None
+        self._process.end()
 
 
 def _in_arrays(record: Mapping[str, Any]) -> dict[str, Any]:

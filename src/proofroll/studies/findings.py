@@ -1,10 +1,7 @@
 """Findings about engines: files under ``findings/``, each with a program that uses only the engine."""
 
-import contextlib
 import json
-import os
 import re
-import signal
 import subprocess
 import sys
 import tempfile
@@ -17,6 +14,7 @@ from pathlib import Path
 from proofroll.core.errors import InputError, Missing, require_known
 from proofroll.core.limits import PROGRAM_TIME_LIMIT
 from proofroll.files.data_folders import data_folder
+from proofroll.running.bound_program import printed_by
 from proofroll.running.process import safe_environment
 
 # Exit code of a program whose finding still shows; 0: it is gone; any other: the program could not tell.
@@ -158,27 +156,9 @@ def run_findings(
 
 
 def _run(command: list[str], time_limit: float, folder: str | None = None) -> tuple[int, str]:
-    """Exit code and output of a command, or standard error if it printed nothing else; it runs in ``folder``.
-
-    It runs in a session of its own, and ends with all that it started.
-    """
-    process = subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-        cwd=folder,
-        env=safe_environment(),
-        start_new_session=True,
-    )
+    """Exit code and output of a command, or standard error if it printed nothing else; it runs in ``folder``."""
     try:
-        printed, errors = process.communicate(timeout=time_limit)
+        code, printed, errors = printed_by(command, safe_environment(), time_limit, folder)
     except subprocess.TimeoutExpired:
         return -1, f"it did not end within {time_limit:g} s"
-    finally:
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-    return process.returncode, printed.strip() or errors
+    return code, printed.strip() or errors

@@ -19,13 +19,11 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="th
 
 POOL = """
 import sys, time
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
-from proofroll.running.in_processes import end_with_pool
+from proofroll.running.in_processes import process_pool
 
 if __name__ == "__main__":
-    with ProcessPoolExecutor(2, get_context("spawn"), initializer=end_with_pool) as pool:
+    with process_pool(2) as pool:
         pool.submit(abs, 1).result()
         Path(sys.argv[1]).touch()
         pool.submit(time.sleep, 600).result()
@@ -49,6 +47,17 @@ end_with_pipe(int(sys.argv[2]))
 subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
 Path(sys.argv[1]).touch()
 ctypes.PyDLL(None).sleep(600)
+"""
+PROGRAM = """
+import sys
+from pathlib import Path
+from proofroll.running.bound_program import BoundProgram
+
+begin = "import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])"
+program = BoundProgram([sys.executable, "-c", begin + "; print(1, flush=True); time.sleep(600)"])
+program.stdout.readline()
+Path(sys.argv[1]).touch()
+program.wait()
 """
 HOLDER = """
 import os, subprocess, sys
@@ -110,8 +119,13 @@ def test_an_interrupt_waits_until_processes_have_begun() -> None:
 
 @pytest.mark.parametrize(
     ("code", "before"),
-    [(POOL, []), (CHILD, ["-c", PARENT]), (PIPED, ["-c", HOLDER])],
-    ids=["a pool", "a process with a child of its own", "a process in which no thread can run, and its child"],
+    [(POOL, []), (PROGRAM, []), (CHILD, ["-c", PARENT]), (PIPED, ["-c", HOLDER])],
+    ids=[
+        "a pool",
+        "a program",
+        "a process with a child of its own",
+        "a process in which no thread can run, and its child",
+    ],
 )
 def test_nothing_outlives_a_parent_that_is_killed(tmp_path: Path, code: str, before: list[str]) -> None:
     """When the parent is killed its processes, and what they started, end, and before that they do not."""

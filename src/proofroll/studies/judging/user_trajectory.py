@@ -76,7 +76,7 @@ class GivenRun:
                 _require_numbers(str(column), item)
 
 
-def _require_numbers(name: str, item: xr.Variable) -> None:
+def _require_numbers(name: str, item: xr.Variable | np.ndarray[Any, Any]) -> None:
     """Raises InputError unless a variable holds real numbers."""
     if item.dtype.kind not in "iuf":
         kinds = {"c": "complex numbers", "b": "truth values", "U": "text", "S": "text", "M": "dates", "m": "durations"}
@@ -191,13 +191,15 @@ def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
 
 
 def _converted(run: xr.Dataset) -> xr.Dataset:
-    """The trajectory with numbers in SI units where their units are known."""
+    """The trajectory with numbers in SI units where their units are known, none longer than float64."""
     changes: dict[Any, Any] = {}
     for name, item in run.variables.items():
         written = str(item.attrs.get("units", "")).strip()
         unit, factor = in_si(written)
-        if factor != 1.0 and item.dtype.kind in "iuf":
-            changes[name] = (item.dims, item.values * factor, {**item.attrs, "units": unit})
+        longer = item.dtype.kind == "f" and item.dtype.itemsize > np.dtype(float).itemsize
+        if item.dtype.kind in "iuf" and (factor != 1.0 or longer):
+            values = item.values.astype(float) if longer else item.values
+            changes[name] = (item.dims, values * factor, {**item.attrs, "units": unit} if written else item.attrs)
     times = {"time": changes.pop("time")} if "time" in changes else {}
     converted: xr.Dataset = run.assign_coords(times).assign(changes)
     return converted
@@ -253,11 +255,14 @@ def _dataset(run: RunInput, columns: Mapping[str, str]) -> xr.Dataset:
     for name, text in columns.items():
         require_known("columns", name, run, "the trajectory has")
         new, unit = name_and_unit(text)
-        values = xr.DataArray(np.asarray(run[name]), attrs={"units": unit} if unit else {})
-        run = {key: item for key, item in run.items() if key != name} | {new: values}
+        renamed = xr.DataArray(np.asarray(run[name]), attrs={"units": unit} if unit else {})
+        run = {key: item for key, item in run.items() if key != name} | {new: renamed}
     arrays = {str(name): np.asarray(run[name]) for name in run}
     if "time" not in arrays:
         raise InputError("run", ", ".join(arrays), "it has no time; add the times in s as time")
+    for column, values in arrays.items():
+        if column == "time" or (values.dtype.kind in "mM" and np.datetime_data(values.dtype)[0] == "generic"):
+            _require_numbers(column, values)  # of dates without a unit numpy cannot even make a text
     _check_lengths(arrays)
     attrs = {str(name): dict(getattr(run[name], "attrs", {})) for name in run}
     dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in arrays.items()}
@@ -278,7 +283,8 @@ def _from_file(path: Path, columns: Mapping[str, str]) -> RunInput:
     except ValueError:
         if path.suffix != STORED:
             raise
-        return read_arrays(path)
+        times = next((name for name, text in columns.items() if name_and_unit(text)[0] == "time"), "time")
+        return read_arrays(path, times)
 
 
 def _check_lengths(arrays: Mapping[str, Any]) -> None:

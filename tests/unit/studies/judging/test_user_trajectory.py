@@ -27,6 +27,8 @@ TIMES = np.linspace(0, 1, 11)
             "time.*holds durations; give seconds",
         ),
         ({"time": TIMES.astype("m8[s]"), "q.pivot": np.zeros(11)}, "time.*holds durations; give seconds"),
+        ({"time": np.arange(11).astype("M8"), "q.pivot": np.zeros(11)}, "time.*holds dates; give seconds"),
+        ({"time": TIMES, "q.pivot": np.arange(11).astype("M8")}, "q.pivot.*holds dates; give seconds"),
         ({"time": TIMES, "q.pivot": TIMES.astype("m8[s]")}, "q.pivot.*holds durations; give seconds as real"),
         ({"time": TIMES.astype(str), "q.pivot": np.zeros(11)}, "time.*it holds text; give real numbers"),
         ({"time": 3e299 * TIMES, "q.pivot": np.zeros(11)}, "time up to 3e.299 s.*no motion is followed beyond 1e.09 s"),
@@ -47,6 +49,43 @@ def test_a_header_that_promises_more_numbers_than_follow(tmp_path: Path) -> None
         archive.writestr("p_WB.npy", header.getvalue() + bytes(64))
     with pytest.raises(InputError, match=r"the header of p_WB promises 1e\+15 numbers, which do not follow"):
         proofroll.judge(run, "pendulum")
+
+
+def test_numbers_of_more_digits_are_judged(tmp_path: Path) -> None:
+    """A file of longdouble has the verdict of the same numbers as float64."""
+    angles = np.full(11, 2.8)
+    long, short = tmp_path / "long.npz", tmp_path / "short.npz"
+    np.savez(long, time=TIMES.astype(np.longdouble), **{"q.pivot": angles.astype(np.longdouble)})  # type: ignore[arg-type]  # its keywords are arrays
+    np.savez(short, time=TIMES, **{"q.pivot": angles})  # type: ignore[arg-type]  # its keywords are arrays
+    judged = [proofroll.judge(file, "pendulum").compared[0].judgement.error for file in (long, short)]
+    assert judged[0] == judged[1]
+
+
+@pytest.mark.parametrize(("place", "value"), [(b"PK\x01\x02", 1), (b"PK\x01\x02", 99), (b"\x93NUMPY", 40)])
+def test_a_file_that_its_library_cannot_read(tmp_path: Path, place: bytes, value: int) -> None:
+    """Encrypted entries, unknown compressions and endless headers are one line."""
+    run = tmp_path / "run.npz"
+    np.savez(run, time=TIMES, **{"q.pivot": np.zeros(11)})  # type: ignore[arg-type]  # its keywords are arrays
+    content = bytearray(run.read_bytes())
+    at = content.find(place)
+    if value == 1:
+        content[at + 8] = content[content.find(b"PK\x03\x04") + 6] = value
+    elif value == 99:
+        content[at + 10] = value
+    else:
+        content[at + 10 : at + 50] = b"(" * value
+    run.write_bytes(content)
+    with pytest.raises(InputError, match="no file of numpy's arrays") as caught:
+        proofroll.judge(run, "pendulum")
+    assert "\n" not in str(caught.value)
+
+
+def test_rows_are_counted_before_anything_is_unpacked(tmp_path: Path) -> None:
+    """An array of other rows than the times is told from its header."""
+    run = tmp_path / "run.npz"
+    np.savez_compressed(run, t=TIMES, angle=np.zeros(10**6))
+    with pytest.raises(InputError, match=r"angle has the shape \(1000000,\); give one row for each of 11 times"):
+        proofroll.judge(run, "pendulum", columns={"t": "time", "angle": "q.pivot"})
 
 
 def test_judge_has_a_limit_of_time(command_line: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:

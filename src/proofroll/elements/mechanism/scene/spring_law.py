@@ -8,10 +8,10 @@ from functools import cached_property
 from typing import Any
 
 from proofroll.core.errors import InputError, require_known
-from proofroll.core.expressions import LONGEST
+from proofroll.core.expressions import parsed_formula
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism.scene.kinks import beside, functions_of, kinks_in
-from proofroll.elements.mechanism.scene.signal import FUNCTIONS, NO_NUMBER, formula_value, names_in, parsed_formula
+from proofroll.elements.mechanism.scene.signal import FUNCTIONS, NO_NUMBER, formula_value, names_in
 
 LENGTH, RATE = "L", "dL"
 # Units of coefficients that no key of a scene file has.
@@ -39,8 +39,6 @@ class SpringLaw:
         except NO_NUMBER:
             advice = f"is no number; use {LENGTH}, {RATE}, parameters, + - * / ^ ( ), pi and " + ", ".join(FUNCTIONS)
             raise InputError("force", f"= {self.text}", advice) from None
-        if len(self.text) > LONGEST:
-            raise InputError("force", f"= {self.text}", f"a formula may have at most {LONGEST} characters")
 
     def pull(
         self, length: Any, rate: Any, functions: Mapping[str, Callable[..., Any]] = FUNCTIONS, spring: str = ""

@@ -253,7 +253,7 @@ BAD = {
     "attribute": (SLIDER_CRANK.replace("= crank/2", "= crank.real"), "bodies.0.com.0.*crank.real.*is no arithmetic"),
     "huge power": (SLIDER_CRANK.replace("= crank/2", "= 9^9^9^9^9"), "bodies.0.com.0"),
     "velocity beyond numbers": (SLIDER_CRANK.replace("v0 = 10", "v0 = 1e200", 1), "v0 = 1e.200: its size is beyond"),
-    "assignment": (SLIDER_CRANK.replace("= crank/2", "= m = crank/2"), "is not complete"),
+    "assignment": (SLIDER_CRANK.replace("= crank/2", "= m = crank/2"), "is no arithmetic"),
     "complex": (SLIDER_CRANK.replace("= crank/2", "= (0-1)^0.5"), "no finite real number"),
     "text": (
         SLIDER_CRANK.replace("mass = 0.6", 'mass = "heavy"'),
