@@ -188,7 +188,9 @@ def main() -> None:
     for warning in broken.values():
         complain(warning)
     if code == INTERRUPTED:
-        complain("interrupted; cases that were finished and stored will be reused")
+        stores = sys.modules.get("proofroll.running.store")  # imported by commands that keep results
+        kept = stores is not None and stores.Store.opened
+        complain("interrupted" + "; cases that were finished and stored will be reused" * kept)
     sys.exit(code or OK)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from proofroll.cli import options
 from proofroll.core.entry_points import announced
@@ -20,18 +21,19 @@ def is_text_check(name: Path) -> bool:
     return name.suffix in {"", ".toml"} or name.is_dir()
 
 
-def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
+def check_text(name: str, as_json: bool, plot: Path | None = None, settings: list[str] | None = None) -> None:
     """Prints one line on the content of a scene or of the file of a study, and below it how a scene starts.
 
     Args:
         name: of a scene or the file of a study, or a path.
         as_json: True for one JSON document instead.
         plot: page to which a scene is drawn.
+        settings: parameters of a scene, as ``--set`` has them.
 
     Raises:
         InputError: the first mistake in it.
     """
-    sound = checked_file(name)
+    sound = checked_file(name, options.assignments(settings))
     if plot is not None:
         _draw(sound, plot)
     counts = ", ".join(counted(count, what) for what, count in sound.counts.items())
@@ -74,11 +76,11 @@ class SoundFile:
     warnings: list[str] = dataclasses.field(default_factory=list)
 
 
-def checked_file(name: str) -> SoundFile:
+def checked_file(name: str, parameters: Mapping[str, Any]) -> SoundFile:
     """Content of a scene (a name, the path of its folder or of its ``scene.toml``) or of the file of a study.
 
     Raises:
-        InputError: there is no such scene or file, or the first mistake in it.
+        InputError: there is no such scene or file, or the first mistake in it; a study has no parameters.
     """
     from proofroll.files.comparison_file import comparison_names
     from proofroll.files.scene_file import scene_folder, scene_names
@@ -96,15 +98,17 @@ def checked_file(name: str) -> SoundFile:
                 f"the comparisons {choices(comparison_names(), name)}"
             )
             raise InputError("check", name, advice) from None
+        for key, value in parameters.items():
+            raise InputError(f"--set {key}", value, "this is for scenes, and a study has its own points") from None
         return _comparison(file) if study_of(file) is None else _study(file, str(study_of(file)))
-    return _scene(name)
+    return _scene(name, parameters)
 
 
-def _scene(name: str) -> SoundFile:
+def _scene(name: str, parameters: Mapping[str, Any]) -> SoundFile:
     from proofroll.core.element_abilities import DoubtsNumbers, TellsStart
     from proofroll.files.scene_file import load_scene, read_scene_file
 
-    file, scene = read_scene_file(name), load_scene(name)
+    file, scene = read_scene_file(name), load_scene(name, **parameters)
     tables = {f"[[{key}]]": len(value) for key, value in file.tables.items() if isinstance(value, list)}
     counts = {"parameters": len(file.parameters)} | tables
     start = [line for element in scene.elements if isinstance(element, TellsStart) for line in element.start_facts]

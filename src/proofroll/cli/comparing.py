@@ -38,6 +38,7 @@ def compare(
         typer.Argument(
             help="A comparison file or its name, e.g. stick_slip; or a scene, a robot file.",
             autocompletion=options.compared_like,
+            callback=options.own_first,
         ),
     ],
     engine: Annotated[
@@ -91,7 +92,7 @@ def compare(
     with options.spinner(comparison):
         loaded = comparison_named(comparison, assigned, workers, budget, scheduler, engine or [], until, every, bounds)
     mention_absent(loaded.absent)
-    if control is not None:
+    if control is not None or settings:
         options.doubt_numbers(comparison, settings)
 
     def show(outcome: Outcome) -> None:

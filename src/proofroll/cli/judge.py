@@ -23,9 +23,17 @@ def judge(
     run: Annotated[
         Path, typer.Argument(help="File (.nc, .csv, .npz) with time [s] and the state, or variables of the truth.")
     ],
-    named: Annotated[str | None, typer.Argument(metavar="SCENE", help="The scene, unless --scene has it.")] = None,
+    named: Annotated[
+        str | None,
+        typer.Argument(metavar="SCENE", help="The scene, unless --scene has it.", callback=options.own_first),
+    ] = None,
     scene: Annotated[
-        str | None, typer.Option(help="The scene, or the path of its folder.", autocompletion=options.scenes_like)
+        str | None,
+        typer.Option(
+            help="The scene, or the path of its folder.",
+            autocompletion=options.scenes_like,
+            callback=options.own_first,
+        ),
     ] = None,
     settings: options.Set = None,
     tolerance: options.Tolerances = None,

@@ -18,7 +18,12 @@ if TYPE_CHECKING:
 
 def scenes(
     name: Annotated[
-        str | None, typer.Argument(help="Scene of which all parameters are listed.", autocompletion=options.scenes_like)
+        str | None,
+        typer.Argument(
+            help="Scene of which all parameters are listed.",
+            autocompletion=options.scenes_like,
+            callback=options.own_first,
+        ),
     ] = None,
     as_json: options.Json = False,
 ) -> None:

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -35,6 +35,27 @@ def scenes_like(incomplete: str) -> list[str]:
     from proofroll.files.scene_file import scene_names
 
     return [name for name in scene_names() if name.startswith(incomplete)]
+
+
+def own_first(named: Any) -> Any:
+    """Names as given; in place of one of a shipped scene the path of a folder here that is called so, with a line.
+
+    It is the callback of arguments; who calls functions of proofroll reads the shipped scene by its name.
+
+    Args:
+        named: a name, several, or None.
+    """
+    if isinstance(named, list):
+        return [own_first(name) for name in named]
+    if not named or Path(named).name != named or not (Path(named) / "scene.toml").is_file():
+        return named
+    from proofroll.files.data_folders import data_folder
+
+    shipped = data_folder("models") / named
+    if not shipped.is_dir() or shipped.samefile(named):
+        return named
+    complain(f"{named} is read from the folder ./{named} here; proofroll has a scene of that name, too")
+    return f"./{named}"
 
 
 def compared_like(incomplete: str) -> list[str]:
@@ -72,7 +93,11 @@ Engines = Annotated[
 ]
 SceneName = Annotated[
     str,
-    typer.Argument(help="A scene: its name, a folder with a scene.toml, or a robot file.", autocompletion=scenes_like),
+    typer.Argument(
+        help="A scene: its name, a folder with a scene.toml, or a robot file.",
+        autocompletion=scenes_like,
+        callback=own_first,
+    ),
 ]
 Budget = Annotated[
     float | None,

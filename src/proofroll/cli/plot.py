@@ -32,7 +32,10 @@ def replay(
     trajectory: Annotated[Path, typer.Argument(help="A file of proofroll run --out, or one of a report.")],
     out: Annotated[Path | None, typer.Option(help="Page to write; RUN-replay.html by default.")] = None,
     scene: Annotated[
-        str | None, typer.Option(help="The scene, or the path of its folder; by default where it lay at the run.")
+        str | None,
+        typer.Option(
+            help="The scene, or the path of its folder; by default where it lay at the run.", callback=options.own_first
+        ),
     ] = None,
     control: options.Control = None,
 ) -> None:

@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 def recommend(
     scenes: Annotated[
         list[str],
-        typer.Argument(help="A scene, a robot file, or a comparison; several.", autocompletion=options.compared_like),
+        typer.Argument(
+            help="A scene, a robot file, or a comparison; several.",
+            autocompletion=options.compared_like,
+            callback=options.own_first,
+        ),
     ],
     tolerance: options.Tolerances = None,
     settings: options.Set = None,

@@ -33,7 +33,10 @@ _WRITING = 0.03
 def report(
     studies: Annotated[
         list[str] | None,
-        typer.Argument(help="Comparisons, other studies, scenes, robot files; by default the main ones, see below."),
+        typer.Argument(
+            help="Comparisons, other studies, scenes, robot files; by default the main ones, see below.",
+            callback=options.own_first,
+        ),
     ] = None,
     engine: options.Engines = None,
     settings: options.Set = None,

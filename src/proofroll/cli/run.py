@@ -78,7 +78,7 @@ def run(
 
     chosen, asks = options.assignments(settings), tuple(dict.fromkeys(ask or []))
     scene_of_run(scene, chosen, asks)  # a mistyped name is answered before more is imported
-    if control is not None:
+    if control is not None or settings:
         options.doubt_numbers(scene, settings)
 
     from proofroll.core.time_grid import EVERY, time_grid

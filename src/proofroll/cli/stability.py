@@ -10,7 +10,11 @@ from proofroll.cli import options
 
 def stability(
     scene: Annotated[
-        str, typer.Argument(help="A scene, or the file, or its name, that asks for a map of it, e.g. stability.")
+        str,
+        typer.Argument(
+            help="A scene, or the file, or its name, that asks for a map of it, e.g. stability.",
+            callback=options.own_first,
+        ),
     ],
     engine: options.Engines = None,
     axis: Annotated[list[str] | None, typer.Option(help="Axis of the map, e.g. V0; repeat. All by default.")] = None,

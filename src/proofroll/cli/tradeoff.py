@@ -19,7 +19,12 @@ if TYPE_CHECKING:
     from proofroll.studies.tradeoff.records import TradeoffStudy
     from proofroll.studies.tradeoff.tradeoff import Extent
 
-SceneOrFile = Annotated[str, typer.Argument(help="A scene, or the file, or its name, of a trade-off, e.g. tradeoff.")]
+SceneOrFile = Annotated[
+    str,
+    typer.Argument(
+        help="A scene, or the file, or its name, of a trade-off, e.g. tradeoff.", callback=options.own_first
+    ),
+]
 Over = Annotated[
     list[str] | None, typer.Option(help="parameter=low:high over which the best points are checked; repeat.")
 ]

@@ -28,7 +28,10 @@ def versions(
     old: Annotated[str, typer.Argument(help="A version, a label of `proofroll engines`, or the path of a Python.")],
     new: Annotated[str, typer.Argument(help="The version to which it is compared, likewise.")] = "",
     subject: Annotated[
-        str, typer.Argument(help="A comparison, a scene or a robot file; by default all comparisons.")
+        str,
+        typer.Argument(
+            help="A comparison, a scene or a robot file; by default all comparisons.", callback=options.own_first
+        ),
     ] = "",
     rounds: Annotated[int, typer.Option(min=0, help="Rounds of timing; 0: no speed.")] = _ROUNDS,
     out: options.Out = Path("out"),

@@ -91,8 +91,17 @@ def error_location(place: str) -> Iterator[None]:
 
 
 def no_such_key(field: str, value: object, keys: Iterable[str]) -> InputError:
-    """Error for an unknown key of a file, with the known keys."""
-    return InputError(field, value, f"there is no such key here; the keys are {', '.join(keys)}")
+    """Error for an unknown key of a file, with the known keys and the one that is probably meant.
+
+    Args:
+        field: for the message; the key follows its last dot.
+        value: of the key.
+        keys: known keys.
+    """
+    known = list(keys)
+    meant = get_close_matches(field.rpartition(".")[2].rpartition(" ")[2], known, 1)
+    hint = f"; did you mean {meant[0]}?" if meant else ""
+    return InputError(field, value, f"there is no such key here; the keys are {', '.join(known)}{hint}")
 
 
 def require_known(

@@ -117,7 +117,8 @@ def scene_folder(name: str) -> Path:
     """Folder of a scene. Raises InputError if there is no such scene."""
     missing = "there is no such scene"
     beside = Path(name).parent if Path(name).name == "scene.toml" else Path(name)
-    for folder in (data_folder("models") / name, beside):
+    is_path = str(name) != beside.name  # a path never means a shipped scene
+    for folder in (beside,) if is_path else (data_folder("models") / name, beside):
         try:
             if folder.suffix == ".toml" and folder.name != "scene.toml" and folder.is_file():
                 raise InputError("scene", name, SCENE_IS_A_FOLDER)
@@ -179,7 +180,23 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
             omitted=omitted,
         )
     except InputError as error:
-        raise error if error.field == "asks" and error.value in requirements else error.of(place) from None
+        if error.field == "asks" and error.value in requirements:
+            raise
+        wrong = error.of(place)
+        if not parameters or not _loads(name, asks):
+            raise wrong from None
+        *others, last = parameters
+        besides = "".join(f", {key} = {values[key]:g}" for key in others)
+        raise InputError(last, values[last], f"with this{besides} {wrong}") from None
+
+
+def _loads(name: str, asks: Any) -> bool:
+    """True if a scene is right with its own parameters."""
+    try:
+        load_scene(name, asks=asks)
+    except InputError:
+        return False
+    return True
 
 
 def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, place: str) -> tuple[Element, ...]:

@@ -34,6 +34,7 @@ def check(
         list[str] | None,
         typer.Option(help="Accepted causes of differences: damping_left_out,friction_left_out; or repeat."),
     ] = None,
+    settings: options.Set = None,
     plot: Annotated[Path | None, typer.Option(help="Draw a scene at its start to this page (.html).")] = None,
     as_json: options.Json = False,
 ) -> None:
@@ -45,8 +46,11 @@ def check(
     """
     if is_text_check(file):
         _require_none_for_robots(context)
-        check_text(str(file), as_json, plot)
+        check_text(options.own_first(str(file)), as_json, plot, settings)
         return
+    if settings:
+        advice = "this is for scenes; `proofroll run FILE --engine truth --set …` runs the scene of a robot file"
+        raise InputError("--set", ", ".join(settings), advice)
     if plot is not None:
         raise InputError("--plot", plot, "this is for scenes; --out FOLDER writes a page about a robot file")
     from proofroll.robots.check.check import check as checked
@@ -95,7 +99,7 @@ def _partners(texts: Sequence[str]) -> dict[str, str]:
 def _require_none_for_robots(context: typer.Context) -> None:
     """Raises InputError for the first given option that is for robot files only: it would be ignored."""
     for parameter in context.command.params:
-        if parameter.name in {"file", "plot", "as_json", "help"}:
+        if parameter.name in {"file", "plot", "settings", "as_json", "help"}:
             continue
         source = context.get_parameter_source(str(parameter.name))
         if source is not None and source.name == "COMMANDLINE":

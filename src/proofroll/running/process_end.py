@@ -47,7 +47,7 @@ def interrupt_held() -> Iterator[None]:
 
 def end_at_once(*_: object) -> None:
     """Handler of a second interrupt: ends this process, and with it those that it started, after a line of text."""
-    os.write(2, b"proofroll: interrupted again, ended at once; cases that were finished and stored will be reused\n")
+    os.write(2, b"proofroll: interrupted again, ended at once\n")
     os._exit(130)
 
 

@@ -11,6 +11,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import ClassVar
 from weakref import WeakValueDictionary
 
 from proofroll.core.errors import ProofrollError, Unwritable
@@ -34,10 +35,16 @@ _INCOMING = ".incoming-"
 
 
 class Store:
-    """Results under one folder."""
+    """Results under one folder.
+
+    Attributes:
+        opened: True in a process that has opened such a folder.
+    """
+
+    opened: ClassVar[bool] = False
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        self.folder, Store.opened = folder, True
         self._held: WeakValueDictionary[str, StoredTrajectory] = WeakValueDictionary()
         absolute = folder.absolute()
         if made := [missing for missing in (absolute, *absolute.parents) if not missing.exists()]:

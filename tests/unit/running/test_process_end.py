@@ -64,7 +64,7 @@ import os, subprocess, sys
 life, held = os.pipe()
 subprocess.run([sys.executable, *sys.argv[1:], str(life)], pass_fds=[life], start_new_session=True)
 """
-ENDED_AT_ONCE = "proofroll: interrupted again, ended at once; cases that were finished and stored will be reused\n"
+ENDED_AT_ONCE = "proofroll: interrupted again, ended at once\n"
 PARENT = "import subprocess, sys; subprocess.run([sys.executable, *sys.argv[1:]])"
 
 

@@ -26,7 +26,7 @@ from proofroll.robots.files.urdf import extra_dynamics
 from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotJoint, RobotLoop, Tie
 from proofroll.robots.states import RobotStates
 
-ENDINGS = (".urdf", ".xml")  # of robot files
+ENDINGS = (".urdf", ".xml", ".sdf")  # of robot files; the reader says which it cannot read
 _NEAR = 0.2  # part of a random coordinate that a guess of a closed pose is away from the file's pose, which is closed
 # Parameters: default, unit, meaning, bounds.
 ParameterRow = tuple[float, str, str, dict[str, Any]]

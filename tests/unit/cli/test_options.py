@@ -1,0 +1,81 @@
+"""Names of scenes and values of parameters as a person types them."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.files.data_folders import data_folder
+from proofroll.files.scene_file import load_scene, scene_folder
+
+CommandLine = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Folder of work in which ``pendulum`` is a scene of one's own, with a parameter more."""
+    (tmp_path / "pendulum").mkdir()
+    text = (data_folder("models") / "pendulum" / "scene.toml").read_text()
+    extra = '[parameters.extra]\nvalue = 1.0\nunit = "1"\nmeaning = "none"\nsource = "here"\n\n[parameters.mass]'
+    (tmp_path / "pendulum" / "scene.toml").write_text(text.replace("[parameters.mass]", extra))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_path_never_means_a_shipped_scene(own: Path) -> None:
+    """With a separator the name is a path; without one a function reads the shipped scene."""
+    assert "extra" in load_scene("./pendulum").parameters
+    assert "extra" in load_scene(str(own / "pendulum")).parameters
+    assert "extra" not in load_scene("pendulum").parameters
+    shutil.rmtree(own / "pendulum")
+    with pytest.raises(InputError, match="no such scene"):
+        scene_folder("./pendulum")
+
+
+def test_a_command_reads_the_folder_here(own: Path, command_line: CommandLine) -> None:
+    """A name that a folder here and a shipped scene share is the folder's, with a line that says so."""
+    for words in (["check", "pendulum"], ["scenes", "pendulum"]):
+        code, out, err = command_line(*words)
+        assert code == 0, err
+        assert "pendulum is read from the folder ./pendulum here" in err
+    shutil.rmtree(own / "pendulum")
+    code, out, err = command_line("scenes", "pendulum")
+    assert (code, err) == (0, "")
+    assert "extra" not in out
+
+
+def test_a_shipped_scene_in_its_own_folder(monkeypatch: pytest.MonkeyPatch, command_line: CommandLine) -> None:
+    """In the folder of the shipped scenes nothing is said."""
+    monkeypatch.chdir(data_folder("models"))
+    assert command_line("scenes", "pendulum")[2] == ""
+
+
+def test_a_mistyped_key_has_the_one_that_is_meant(own: Path, command_line: CommandLine) -> None:
+    """An unknown key of a scene's file is answered with the known key that resembles it."""
+    file = own / "pendulum" / "scene.toml"
+    file.write_text(file.read_text().replace("\nmass = ", "\nmasss = ", 1))
+    assert "did you mean mass?" in command_line("check", "./pendulum")[2]
+
+
+@pytest.mark.drill
+def test_given_parameters_are_blamed(command_line: CommandLine) -> None:
+    """A body that a given parameter makes impossible is told with the parameter; angles that turn often are doubted."""
+    code, _, err = command_line("check", "pendulum", "--set", "length=2 mm")
+    assert code == 2
+    assert err.startswith("proofroll: length = 0.002: with this ")
+    code, out, _ = command_line("check", "pendulum", "--set", "angle=60")
+    assert code == 0
+    assert "60 rad is 9.5 turns" in " ".join(out.split())
+    asked = ["run", "pendulum", "--engine", "truth", "--until", "0.1", "--set", "angle=60"]
+    assert "60 rad is 9.5 turns" in command_line(*asked)[2]
+
+
+def test_an_sdf_is_called_so(tmp_path: Path, command_line: CommandLine) -> None:
+    """Every command that reads a robot file says of an SDF that it is one."""
+    file = tmp_path / "world.sdf"
+    file.write_text('<?xml version="1.0"?><sdf version="1.9"><world name="w"/></sdf>')
+    said = {command_line(*words.split())[2] for words in (f"check {file}", f"compare {file}", f"recommend {file}")}
+    assert said == {command_line("run", str(file), "--engine", "truth")[2]}
+    assert "<sdf> is neither a URDF (<robot>) nor an MJCF (<mujoco>)" in said.pop()
