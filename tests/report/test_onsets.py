@@ -26,7 +26,7 @@ from proofroll.report.labels import MEANINGS, SYMBOLS
 from proofroll.report.page.growing import begun
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, ReportedTruth, report_content
-from proofroll.report.terminal.tables import console
+from proofroll.report.terminal.screen import console
 from proofroll.report.terminal.verdicts import verdict_parts
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store

@@ -13,7 +13,8 @@ from folded import whole
 from proofroll.core.verdict import Verdict
 from proofroll.report.page.records import ReportContent
 from proofroll.report.parts import PartEntry
-from proofroll.report.terminal.tables import WIDTH, console, first_lines, part_lines
+from proofroll.report.terminal.screen import WIDEST, console
+from proofroll.report.terminal.tables import first_lines, part_lines
 from proofroll.report.terminal.verdicts import verdict_parts
 
 
@@ -41,7 +42,7 @@ def test_the_console_is_as_wide_in_a_pipe_as_at_most_on_a_terminal(
 ) -> None:
     """What stands in a log does not depend on the window it was made in, unless COLUMNS says so."""
     monkeypatch.delenv("COLUMNS", raising=False)
-    assert console().width == WIDTH
+    assert console().width == WIDEST
 
 
 def entry(**more: Any) -> PartEntry:

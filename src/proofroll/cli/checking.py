@@ -82,13 +82,14 @@ def checked_file(name: str, parameters: Mapping[str, Any]) -> SoundFile:
     Raises:
         InputError: there is no such scene or file, or the first mistake in it; a study has no parameters.
     """
-    from proofroll.files.comparison_file import comparison_names
     from proofroll.files.scene_file import scene_folder, scene_names
-    from proofroll.files.toml import named_file, study_of
 
     try:
         scene_folder(name)
     except InputError as error:
+        from proofroll.files.comparison_file import comparison_names
+        from proofroll.files.toml import named_file, study_of
+
         file = named_file(name)
         if Path(name).is_dir():
             raise error from None

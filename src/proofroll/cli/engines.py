@@ -34,7 +34,7 @@ def listed(context: typer.Context, as_json: options.Json = False) -> None:
         return
     from rich.table import Table
 
-    from proofroll.report.terminal.tables import console
+    from proofroll.report.terminal.screen import console
 
     installed = Table("engine", "version", "formulations (presets)", box=None, pad_edge=False)
     for item in described:

@@ -28,24 +28,27 @@ def scenes(
     as_json: options.Json = False,
 ) -> None:
     """List the scenes, or the parameters of one scene."""
-    from proofroll.files.scene_file import read_scene_file, scene_names
+    from proofroll.files.scene_file import read_scene_file, scene_names, scene_titles
 
+    if name is None and not as_json:
+        options.show(None, as_json, lambda: _titles(scene_titles()))
+        return
     files = {scene: read_scene_file(scene) for scene in (scene_names() if name is None else [name])}
     content = [
         {"name": name, "title": file.title, "source": file.source, "parameters": file.parameters}
         for name, file in files.items()
     ]
-    options.show(content, as_json, lambda: _titles(files) if name is None else _tables(files))
+    options.show(content, as_json, lambda: _tables(files))
 
 
 _LINE = 80  # characters
 
 
-def _titles(files: Mapping[str, SceneFile]) -> Iterator[str]:
+def _titles(titles: Mapping[str, str]) -> Iterator[str]:
     """Lines of name and title for each scene; a title that is too long is cut at a comma or colon."""
-    wide = max(map(len, files))
-    for name, file in files.items():
-        line = f"{name:{wide}}  {file.title}"
+    wide = max(map(len, titles))
+    for name, title in titles.items():
+        line = f"{name:{wide}}  {title}"
         yield line if len(line) <= _LINE else re.split("[,:]", line)[0]
     yield "proofroll scenes NAME lists the parameters of one."
 

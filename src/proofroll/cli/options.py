@@ -332,12 +332,12 @@ def show(
         content: records, or plain data.
         as_json: True for JSON.
         parts: makes the tables and lines.
-        widest: columns; None: as many as :func:`proofroll.report.terminal.tables.console` has.
+        widest: columns; None: as many as :func:`proofroll.report.terminal.screen.console` has.
     """
     if as_json:
         write_json(content)
         return
-    from proofroll.report.terminal.tables import console
+    from proofroll.report.terminal.screen import console
 
     out = console()
     out.width = min(out.width, widest or out.width)
@@ -350,7 +350,7 @@ def show_lines(lines: Iterable[str], *, widest: int | None = None) -> None:
 
     ``widest``: as of :func:`show`.
     """
-    from proofroll.report.terminal.tables import console
+    from proofroll.report.terminal.screen import console
 
     out = console()
     out.width = min(out.width, widest or out.width)

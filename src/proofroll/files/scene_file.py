@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -81,6 +82,13 @@ def _units() -> tuple[str, ...]:
 def scene_names() -> list[str]:
     """Names of all scenes, sorted."""
     return sorted(path.parent.name for path in data_folder("models").glob("*/scene.toml"))
+
+
+def scene_titles() -> dict[str, str]:
+    """Title of each scene under ``models/``, of which no more is read."""
+    folder = data_folder("models")
+    heads = {name: (folder / name / "scene.toml").read_text(encoding="utf-8") for name in scene_names()}
+    return {name: str(tomllib.loads(head.partition("\n[")[0])["title"]) for name, head in heads.items()}
 
 
 def read_scene_file(name: str) -> SceneFile:

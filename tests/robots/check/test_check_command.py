@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from robot_templates import inertial, mjcf, urdf
 
-from proofroll.report.terminal.tables import console
+from proofroll.report.terminal.screen import console
 from proofroll.robots.check import check
 from proofroll.robots.check.layers import LAYERS
 from proofroll.robots.check.records import DrawnRobot, HeldLayer, ImporterRow, RobotCheck, UsedTruth

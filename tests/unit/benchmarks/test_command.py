@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from proofroll import cli
-from proofroll.report.terminal.tables import console
+from proofroll.report.terminal.screen import console
 from proofroll_benchmarks.tables import study_lines, study_tables
 
 Proofroll = Callable[..., tuple[int, str, str]]

@@ -1,7 +1,8 @@
-"""Filter for the terminal: text of engines and files must not control it."""
+"""Console of the terminal, which text of engines and files must not control."""
 
 import copy
 import dataclasses
+import os
 from collections.abc import Iterable
 from typing import Any
 
@@ -13,7 +14,7 @@ from rich.text import Text
 
 from proofroll.report.terminal.printable import printable
 
-WIDTH = 80  # columns of a command's answer
+WIDTH, WIDEST = 80, 100  # columns of a command's answer, and of all else
 
 
 class Screen(Console):
@@ -33,6 +34,20 @@ class Screen(Console):
                 super().print(objects[0].caption, style="table.caption")
         else:
             super().print(*objects, **options)
+
+
+def console() -> Screen:
+    """Console for data on standard output: at most 100 columns of a terminal; in a pipe 100, or COLUMNS.
+
+    Text is printed literally: ``[words]`` and ``:words:`` are not markup.
+    """
+    out = Screen(highlight=False, markup=False, emoji=False)
+    if out.is_terminal:
+        out.width = min(out.width, WIDEST)
+    elif not os.environ.get("COLUMNS", "").isdecimal():  # else rich has read it
+        out.width = WIDEST
+    out.width = out.width or 80  # COLUMNS=0 means unknown
+    return out
 
 
 def plain_table(*columns: Column, title: str = "") -> Table:

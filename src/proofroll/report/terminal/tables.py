@@ -1,8 +1,7 @@
-"""Console of the terminal, and lines and tables of a report."""
+"""Lines and tables of a report on the terminal."""
 
 from __future__ import annotations
 
-import os
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
@@ -10,8 +9,7 @@ from proofroll.core.number_format import counted
 from proofroll.core.verdict import Verdict
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.parts import part_kinds
-from proofroll.report.terminal.screen import WIDTH as _COLUMNS
-from proofroll.report.terminal.screen import Screen
+from proofroll.report.terminal.screen import WIDTH
 from proofroll.report.terminal.verdicts import verdict_of
 
 if TYPE_CHECKING:
@@ -21,22 +19,7 @@ if TYPE_CHECKING:
     from proofroll.report.comparison.records import ReportedComparison
     from proofroll.report.page.records import ReportContent
 
-WIDTH = 100
 _FINE = (Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE)
-
-
-def console() -> Screen:
-    """Console for data on standard output: at most 100 columns of a terminal; in a pipe 100, or COLUMNS.
-
-    Text is printed literally: ``[words]`` and ``:words:`` are not markup.
-    """
-    out = Screen(highlight=False, markup=False, emoji=False)
-    if out.is_terminal:
-        out.width = min(out.width, WIDTH)
-    elif not os.environ.get("COLUMNS", "").isdecimal():  # else rich has read it
-        out.width = WIDTH
-    out.width = out.width or 80  # COLUMNS=0 means unknown
-    return out
 
 
 def report_lines(content: ReportContent, out: Path) -> Iterator[str]:
@@ -70,7 +53,7 @@ def comparison_lines(comparisons: Sequence[ReportedComparison]) -> list[str]:
         count = f"{'✓' if item.as_expected else '✗'} {verdicts.count(Verdict.AGREES):>2} of {len(verdicts):>2}"
         entries.append(f"{count}  {item.name:{longest}}  {' '.join(signs)}")
     width = max(map(len, entries), default=0) + 2
-    if 2 * width > _COLUMNS:
+    if 2 * width > WIDTH:
         return [entry.rstrip() for entry in entries]
     half = (len(entries) + 1) // 2
     return [

@@ -8,8 +8,7 @@ from rich.table import Table
 
 from proofroll.report.labels import settings_text, step
 from proofroll.report.terminal.printable import escaped, printable
-from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
-from proofroll.report.terminal.tables import console
+from proofroll.report.terminal.screen import Screen, console, numeric, plain_table, unbroken
 
 COMMANDS = "\x1b]0;title\x07\x1b[2J\x9b31m\x00\x08\r\x7f\u202e\u2028"
 

@@ -17,7 +17,7 @@ from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.ladder.ladder import LadderContent, ladder_content
 from proofroll.report.ladder.tables import rung_table, term_table
-from proofroll.report.terminal.tables import WIDTH, console
+from proofroll.report.terminal.screen import WIDEST, console
 from proofroll.running.case import Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
@@ -128,7 +128,7 @@ def check_tables(content: LadderContent) -> None:
         out.print(term_table(content))
     lines = captured.get().splitlines()
     assert len(lines) > len(content.rungs) + len(content.terms)
-    assert max(map(len, lines)) <= WIDTH
+    assert max(map(len, lines)) <= WIDEST
     assert "…" not in captured.get().replace(" … ", "")
 
 

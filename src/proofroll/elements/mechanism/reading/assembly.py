@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import null_space
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.contact.start import extent
@@ -73,7 +72,10 @@ def _check_inertia(mechanism: Mechanism, M: Array, C: Array) -> None:
     if not np.isfinite(M).all():
         raise InputError("mass matrix", "infinite", "masses, moments or lengths are too large to be computed with")
     size = np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1.0))
-    allowed = null_space(C / size, RANK) if C.size else np.eye(len(M))
+    allowed = np.eye(len(M))
+    if C.size:
+        _, singular_values, directions = np.linalg.svd(C / size)
+        allowed = directions[np.sum(singular_values > RANK * singular_values.max()) :].T
     values, vectors = np.linalg.eigh(allowed.T @ (M / np.outer(size, size)) @ allowed)
     if len(values) and values[0] < SINGULAR:
         way = allowed @ vectors[:, 0] / size

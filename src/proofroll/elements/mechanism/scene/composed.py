@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.scene import checks, rotations
@@ -233,6 +232,8 @@ class SprungJoint:
             raise InputError(f"joints.{self.name}.rest", self.rest, advice)
         frame = rotations.from_rpy(joint.orientation)
         place = np.array(joint.position) + frame @ rest[:3]
+        from scipy.spatial.transform import Rotation  # which few scenes need
+
         at_rest = frame @ Rotation.from_rotvec(rest[3:]).as_matrix()
         spring = Bushing(
             f"{self.name}.spring", self.parent, self.child, position_a=tuple(place), position_b=joint.child_position,
