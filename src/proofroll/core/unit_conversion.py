@@ -40,6 +40,8 @@ _CONVERTED: Mapping[str, tuple[str, float]] = {
     "mJ": ("J", 1e-3),
 }
 
+_SI = {"1", "rad", "m", "kg", "s", "N", "J", "W", "Hz"}
+
 
 def in_si(unit: str) -> tuple[str, float]:
     """SI unit of a unit as another program writes it, and the factor on its numbers; an unknown unit is unchanged."""
@@ -48,9 +50,9 @@ def in_si(unit: str) -> tuple[str, float]:
 
 
 def is_known(unit: str) -> bool:
-    """True if a text is a unit that is converted, or one that others are converted to."""
+    """True if a text is a unit that is converted, or a product or quotient of powers of SI units, as ``N/s``."""
     plain = _SPELT.get(unit.strip(), unit.strip())
-    return plain in _CONVERTED or any(plain == si for si, _ in _CONVERTED.values())
+    return plain in _CONVERTED or all(re.sub(r"\^-?\d+$", "", part) in _SI for part in re.split(r"[ /]", plain))
 
 
 def in_proportion(number: float, factor: float) -> float:

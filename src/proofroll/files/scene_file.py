@@ -85,7 +85,7 @@ def scene_names() -> list[str]:
 
 
 def scene_titles() -> dict[str, str]:
-    """Title of each scene under ``models/``, of which no more is read."""
+    """Title of each scene under ``models/``, without the rest of its file."""
     folder = data_folder("models")
     heads = {name: (folder / name / "scene.toml").read_text(encoding="utf-8") for name in scene_names()}
     return {name: str(tomllib.loads(head.partition("\n[")[0])["title"]) for name, head in heads.items()}

@@ -114,7 +114,8 @@ engine refuse the scene and say so.
 
 At the top of the file: what an impact at several contacts at once does. `"any order"` (the default): one contact after
 another, in any order, with the corners of a flat face as one; the truth goes on where all orders end alike, and ends
-where they do not. `"together"`: Moreau's law for all contacts.
+where they do not. `"together"`: Moreau's law for all contacts at once: what gets an impulse parts at its restitution
+times its approach, and nothing parts more slowly than that.
 
 ### `control`
 

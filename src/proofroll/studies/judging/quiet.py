@@ -14,7 +14,7 @@ _SAME = 1e-6  # relative difference of two intervals of time that is round-off
 
 
 def untouched(scene: Scene, variables: Any, events: Sequence[Any]) -> bool:
-    """True if bodies may touch and none does: no event, and no force of a contact.
+    """True if bodies may touch and none does: no event, no force of a contact, and every gap is open.
 
     Args:
         scene: of the motion.
@@ -23,7 +23,13 @@ def untouched(scene: Scene, variables: Any, events: Sequence[Any]) -> bool:
     """
     forces = [name for name, item in scene.observables.items() if item.of_contacts and name in variables]
     arrays = [np.asarray(variables[name].values) for name in forces]
-    return bool(arrays) and not events and not any(np.any(values != 0) for values in arrays)
+    closed = any(
+        np.any(np.asarray(variables[name].values) <= _STILL * element.length)
+        for element in scene.elements
+        for name in (scene.label(element, gap) for gap in ("gaps", "gap"))
+        if name in variables
+    )
+    return bool(arrays) and not (events or closed or any(np.any(values != 0) for values in arrays))
 
 
 def quiet(scene: Scene, variables: Any, events: Sequence[Any]) -> str:

@@ -30,6 +30,14 @@ def test_a_motion_in_which_nothing_happens_is_told(
     assert quiet(scene, data.variables, events_of(data)) == words
 
 
+def test_what_touches_without_a_force_is_not_told_to_be_apart() -> None:
+    """A body along a floor that bears nothing touches it: the gap is closed."""
+    scene = load_scene("bouncing_ball")
+    data = truth(scene.fully_asked, np.linspace(0.0, 0.1, 6))
+    gap = next(name for name in ("gap", "gaps") if name in data)
+    assert quiet(scene, data.assign({gap: 0 * data[gap]}).variables, ()) == ""
+
+
 def test_a_judgement_of_a_body_at_rest_says_so() -> None:
     """A trajectory that agrees with a truth in which nothing moves has the sentence in its text and its content."""
     times = np.linspace(0.0, 0.1, 6)
