@@ -18,14 +18,20 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 
 
 def test_the_first_line_of_the_readme_tells_the_truth() -> None:
-    """Version, maturity, Pythons, licence and types are those of the package."""
+    """Version, maturity, Pythons, systems, licence and types are those of the package, and of what is tried."""
     (said,) = re.findall(r"^\*Version (.*)\*$", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
-    version, maturity, pythons, licence, typed = said.split(" · ")
+    version, maturity, pythons, systems, licence, typed = said.split(" · ")
     classifiers = PROJECT["classifiers"]
     assert version == PROJECT["version"] == proofroll.__version__
     assert any(item.startswith("Development Status") and item.endswith(f"- {maturity}") for item in classifiers)
     known = [item.rpartition(" ")[2] for item in classifiers if re.fullmatch(r"Programming .* 3\.\d+", item)]
     assert pythons == f"Python {', '.join(known)}"
+    named = [item.rpartition(" ")[2] for item in classifiers if item.startswith("Operating System")]
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "platforms.yml").read_text(encoding="utf-8"))
+    tried = workflow["jobs"]["two-commands"]["strategy"]["matrix"]["os"]
+    systems_tried = {{"ubuntu": "Linux", "macos": "macOS"}[name.partition("-")[0]] for name in tried}
+    assert set(systems.split(", ")) == systems_tried
+    assert {name.lower() for name in systems_tried} == {name.lower() for name in named}
     assert licence == PROJECT["license"]
     assert typed == "typed"
     assert (ROOT / "src" / "proofroll" / "py.typed").is_file()

@@ -53,6 +53,15 @@ def python(installed: Path, folder: Path, *arguments: str) -> subprocess.Complet
     )
 
 
+@pytest.mark.drill
+def test_type_checkers_refuse_what_is_not_there(installed: Path, tmp_path: Path) -> None:
+    """A strict type checker knows the public names, and the types of their arguments."""
+    (tmp_path / "user.py").write_text("import proofroll\nproofroll.nothing()\nproofroll.simulate('pendulum', 3)\n")
+    said = python(installed, tmp_path, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path), "user.py").stdout
+    assert 'Module has no attribute "nothing"' in said
+    assert 'Argument 2 to "simulate" has incompatible type "int"' in said
+
+
 def test_contents(wheel: Path) -> None:
     """The wheel holds the package, its models, comparisons, templates and license, and no tests."""
     with zipfile.ZipFile(wheel) as archive:

@@ -1,6 +1,7 @@
 """Makes the environment of an engine in another version: a virtual environment with the engine and this proofroll."""
 
 import contextlib
+import importlib.util
 import json
 import re
 import shutil
@@ -11,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 
 from proofroll.core.entry_points import announced
-from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import GROUP, distribution_of, engine_names, release
 from proofroll.running import environments
 from proofroll.running.bound_program import printed_by
@@ -44,9 +45,12 @@ def add(
 
     Raises:
         InputError: an argument is invalid, or the label is taken.
+        Missing: virtualenv is not installed.
         ProofrollError: the environment cannot be made; its folder was deleted.
     """
     tell = tell or (lambda _: None)
+    if importlib.util.find_spec("virtualenv") is None:
+        raise Missing("environments need virtualenv, not installed here: pip install 'proofroll[environments]'")
     if not re.fullmatch(r"[\w-]+", name):
         plain = re.split(r"\W", name.strip(), maxsplit=1)[0] or "NAME"
         advice = f"give the plain name of an engine: proofroll engines add {plain} --requirement {plain}==VERSION"

@@ -66,7 +66,7 @@ def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any,
 
 def simulate(
     scene: Scene | str,
-    engine: Any = "truth",
+    engine: str | type[Any] = "truth",
     *,
     until: float = 2.0,
     every: float | None = None,
