@@ -348,7 +348,7 @@ def _words(engine: EngineFacts) -> str:
 class _Watched:
     """A comparison on a terminal: each row when its runs have ended, above a line of progress that is overwritten.
 
-    Both are removed at the end, when the whole answer takes their place. Elsewhere nothing is shown before that.
+    Both are removed at the end, when the whole answer takes their place. Elsewhere a line of progress is printed now and then.
 
     Args:
         show: prints the comparison when it has ended, or the part of it that has.
@@ -365,11 +365,10 @@ class _Watched:
         """Context manager with the rows and the line on standard error; yields a function that updates them."""
         (planned,) = running.plans
         keys = {case.key for case in planned.cases}
-        start, texts = time.monotonic(), ["starting"]
+        texts = ["starting"]
 
         def line() -> str:
-            counts = f"{len(keys & running.results.keys())} of {len(keys)} runs"
-            return f"  {counts}, {time.monotonic() - start:.0f} s, {texts[-1]}"
+            return f"{len(keys & running.results.keys())} of {len(keys)} runs, {texts[-1]}"
 
         with options.growing(lambda: self._lines, line, shown=self._moves) as moves:
 

@@ -194,10 +194,12 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
 def growing(lines: Callable[[], Sequence[RenderableType]], last: Callable[[], str], *, shown: bool) -> Iterator[bool]:
     """Context manager with growing lines on a terminal, which it removes at the end; yields True if it shows them.
 
+    If standard error is no terminal, or nothing may move there, it prints the line of progress every few seconds.
+
     Args:
         lines: gives the lines so far; the last ones that fit the screen are shown.
-        last: gives the line below them, of progress.
-        shown: False to show nothing.
+        last: gives the line below them, of progress, without the time that has passed.
+        shown: False to show nothing on a terminal.
     """
     from rich.console import Group
     from rich.live import Live
@@ -205,11 +207,14 @@ def growing(lines: Callable[[], Sequence[RenderableType]], last: Callable[[], st
 
     console, moves = _standard_error()
     if not (shown and moves):
-        yield False
+        with nullcontext() if moves else _now_and_then(last):
+            yield False
         return
+    start = time.monotonic()
 
     def visible() -> Group:
-        line = Text(f"{last()}{_waited_for()}", overflow="ellipsis", no_wrap=True)
+        text = f"  {last()}{_waited_for()}, {time.monotonic() - start:.0f} s"
+        line = Text(text, overflow="ellipsis", no_wrap=True)
         return Group(*lines()[-max(1, console.height - 2) :], line)
 
     with Live(get_renderable=visible, console=console, transient=True):

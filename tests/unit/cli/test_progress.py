@@ -30,6 +30,13 @@ def test_a_pipe_gets_a_line_now_and_then(monkeypatch: pytest.MonkeyPatch, capsys
         while "building" not in said:
             time.sleep(0.01)
             said += capsys.readouterr().err
+    for shown in (True, False):  # rows of a comparison, and one for a program
+        said = ""
+        with options.growing(lambda: ["a row"], lambda: "1 of 2 runs", shown=shown) as moves:
+            while "1 of 2 runs" not in said:
+                time.sleep(0.01)
+                said += capsys.readouterr().err
+        assert not moves
     assert "\x1b" not in said
     assert all(line.startswith("proofroll: ") for line in said.splitlines())
 
