@@ -348,7 +348,7 @@ def _words(engine: EngineFacts) -> str:
 class _Watched:
     """A comparison on a terminal: each row when its runs have ended, above a line of progress that is overwritten.
 
-    Both are removed at the end, when the whole answer takes their place. Elsewhere a line of progress is printed now and then.
+    Both are removed at the end, when the whole answer takes their place. Elsewhere progress is a line now and then.
 
     Args:
         show: prints the comparison when it has ended, or the part of it that has.
