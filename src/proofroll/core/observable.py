@@ -39,6 +39,7 @@ class Observable:
         at_impacts: False if it has no value beside an impact, whose length is an engine's own, nor where the question
             is ill-posed.
         of_contacts: True if it is zero wherever nothing touches.
+        apart: True if it is the distance of what may touch.
         sums_samples: True if runs sum it over their samples, which have no impulses: it is compared up to the first
             impact.
         difference_of: larger variable whose small difference, with its round-off, it is; empty: none.
@@ -63,6 +64,7 @@ class Observable:
     hangs_on_events: bool = True
     at_impacts: bool = True
     of_contacts: bool = False
+    apart: bool = False
     sums_samples: bool = False
     absent: str = ""
     difference_of: str = ""

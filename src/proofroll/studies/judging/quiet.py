@@ -23,12 +23,9 @@ def untouched(scene: Scene, variables: Any, events: Sequence[Any]) -> bool:
     """
     forces = [name for name, item in scene.observables.items() if item.of_contacts and name in variables]
     arrays = [np.asarray(variables[name].values) for name in forces]
-    closed = any(
-        np.any(np.asarray(variables[name].values) <= _STILL * element.length)
-        for element in scene.elements
-        for name in (scene.label(element, gap) for gap in ("gaps", "gap"))
-        if name in variables
-    )
+    open_gap = _STILL * min(element.length for element in scene.elements)
+    gaps = [name for name, item in scene.observables.items() if item.apart and name in variables]
+    closed = any(np.any(np.asarray(variables[name].values) <= open_gap) for name in gaps)
     return bool(arrays) and not (events or closed or any(np.any(values != 0) for values in arrays))
 
 

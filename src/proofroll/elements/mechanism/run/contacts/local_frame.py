@@ -161,9 +161,9 @@ def table(body: BodyOnWall, weight: float, lengths: Sequence[float]) -> tuple[Ob
         residual("force_audit", "N", "reported minus recomputed contact force", force, asked_for=False, audit=True),
         residual("rate_audit", "m/s", "velocities minus the rates of position and attitude", speed, asked_for=False),
         # A ball that flies is followed in its distance, too, which decides.
-        Observable("gap", *apart, Role.MOTION, floor=a, headline=True, decides=True, difference_of="p_WB")
+        Observable("gap", *apart, Role.MOTION, floor=a, headline=True, decides=True, difference_of="p_WB", apart=True)
         if flies
-        else residual("gap", *apart, a, difference_of="p_WB"),
+        else residual("gap", *apart, a, difference_of="p_WB", apart=True),
         # Without a bound on friction slip is an error; with one the true ball slips, and slip is an observable of the
         # motion.
         Observable(

@@ -123,7 +123,7 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
     if not mechanism.contacts:
         return
     length, speed, force = (least * sizes[unit] for unit in ("m", "m/s", "N"))
-    yield Observable("gaps", "m", "distances between what may touch", Role.MOTION, floor=length)
+    yield Observable("gaps", "m", "distances between what may touch", Role.MOTION, floor=length, apart=True)
     yield Observable("slips", "m/s", "slip speeds of the contacts", Role.MOTION, floor=speed, asked_for=False)
     meaning = "normal forces between what may touch"
     yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True)
