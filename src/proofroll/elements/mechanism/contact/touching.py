@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.errors import NotUnique
-from proofroll.elements.mechanism.scene.rotations import Array, cross
+from proofroll.elements.mechanism.scene.rotations import Array, cross, plain_cross, turned, turned_back
 from proofroll.elements.mechanism.scene.shapes.box_features import BoxSlot, Lying
 from proofroll.elements.mechanism.scene.shapes.capsule_box import CapsuleBoxSlot
 from proofroll.elements.mechanism.scene.shapes.features import Border, CapsuleFeatures, SolidFeatures
@@ -40,7 +40,9 @@ class Moving(NamedTuple):
 
     def velocity(self, place: Array) -> Array:
         """Velocity of the body's material at a place in the world [m/s]."""
-        return self.v + cross(self.w, place - self.p)
+        (x, y, z), (a, b, c), (u, v, w) = place.tolist(), self.p.tolist(), self.v.tolist()
+        x, y, z = plain_cross(self.w.tolist(), (x - a, y - b, z - c))
+        return np.array((u + x, v + y, w + z))
 
 
 class Touching(NamedTuple):
@@ -275,14 +277,24 @@ def _on_wall(shape: ConvexShape, body: Moving, wall: Wall, wall_body: Moving) ->
 
 
 def _on_curve(sphere: SphereShape, body: Moving, wall: CurvedWall, wall_body: Moving) -> _Lying:
-    """Numbers of :func:`_on_wall` on a curved wall."""
-    centre, axes = body.p + body.R @ sphere.centre, wall_body.R @ wall.frame
-    near = wall.near(axes.T @ (centre - wall_body.p - wall_body.R @ wall.point))
-    n = axes @ near.normal
-    slides = body.velocity(centre) - wall_body.velocity(centre)  # of the centre over the wall's body
-    n_rate = cross(wall_body.w, n) + axes @ (near.bend @ (axes.T @ slides))
-    place, rate = centre - sphere.radius * n, body.velocity(centre) - sphere.radius * n_rate
-    return near.distance - sphere.radius, n, n_rate, place, rate
+    """Numbers of :func:`_on_wall` on a curved wall, in plain floats."""
+    axes, (ox, oy, oz), spin = (wall_body.R @ wall.frame).tolist(), wall_body.p.tolist(), wall_body.w.tolist()
+    (px, py, pz), arm = body.p.tolist(), turned(body.R.tolist(), sphere.centre.tolist())
+    cx, cy, cz = px + arm[0], py + arm[1], pz + arm[2]  # the centre, and its velocity
+    (vx, vy, vz), (ux, uy, uz) = body.v.tolist(), plain_cross(body.w.tolist(), arm)
+    vx, vy, vz = vx + ux, vy + uy, vz + uz
+    x, y, z = cx - ox, cy - oy, cz - oz
+    (wx, wy, wz), (ux, uy, uz) = wall_body.v.tolist(), plain_cross(spin, (x, y, z))
+    slides = vx - wx - ux, vy - wy - uy, vz - wz - uz  # of the centre over the wall's body
+    ax, ay, az = turned(wall_body.R.tolist(), wall.point.tolist())
+    distance, normal, (xx, xy, xz, yy, yz, zz) = wall.seen(*turned_back(axes, (x - ax, y - ay, z - az)))
+    n = turned(axes, normal)
+    bent = turned(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), turned_back(axes, slides))
+    (ax, ay, az), (bx, by, bz) = plain_cross(spin, n), turned(axes, bent)
+    rate, r = (ax + bx, ay + by, az + bz), sphere.radius
+    place = cx - r * n[0], cy - r * n[1], cz - r * n[2]
+    place_rate = vx - r * rate[0], vy - r * rate[1], vz - r * rate[2]
+    return distance - r, np.array(n), np.array(rate), np.array(place), np.array(place_rate)
 
 
 def _from_tip(sphere: SphereShape, body: Moving, cone: ConeWall, cone_body: Moving) -> float:

@@ -1,6 +1,7 @@
 """Rotations as 3×3 matrices and scalar-first unit quaternions."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import ArrayLike
 from proofroll.core.arrays import FloatArray
 
 Array = FloatArray  # its short name, for signatures of mechanisms
+# A vector in plain floats: numpy's calls for three numbers cost several times as much.
+Floats3 = tuple[float, float, float]
 _UNIT = np.eye(3)
 
 
@@ -18,6 +21,27 @@ def cross(a: Any, b: Any) -> Array:
     a0, a1, a2 = a.tolist() if isinstance(a, np.ndarray) else a
     b0, b1, b2 = b.tolist() if isinstance(b, np.ndarray) else b
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
+def plain_cross(a: Sequence[float], b: Sequence[float]) -> Floats3:
+    """:func:`cross` in plain floats."""
+    a0, a1, a2 = a
+    b0, b1, b2 = b
+    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+
+
+def turned(R: Sequence[Sequence[float]], a: Sequence[float]) -> Floats3:
+    """Product of a matrix, by its rows, and a vector in plain floats."""
+    x, y, z = a
+    (a0, a1, a2), (b0, b1, b2), (c0, c1, c2) = R
+    return a0 * x + a1 * y + a2 * z, b0 * x + b1 * y + b2 * z, c0 * x + c1 * y + c2 * z
+
+
+def turned_back(R: Sequence[Sequence[float]], a: Sequence[float]) -> Floats3:
+    """Product of the transpose of a matrix, by its rows, and a vector in plain floats."""
+    x, y, z = a
+    (a0, a1, a2), (b0, b1, b2), (c0, c1, c2) = R
+    return a0 * x + b0 * y + c0 * z, a1 * x + b1 * y + c1 * z, a2 * x + b2 * y + c2 * z
 
 
 def skew(a: Any) -> Array:
@@ -82,6 +106,14 @@ def to_quaternion(R: Array) -> Array:
     return q if q[0] >= 0 else -q
 
 
+def quaternion_from_z(axis: Sequence[float]) -> tuple[float, float, float, float]:
+    """A unit quaternion ``(w, x, y, z)`` that turns z to a unit vector; the turn about that does not matter."""
+    x, y, z = axis
+    size = math.sqrt(2.0 + 2.0 * abs(z))
+    # the smallest turn from z, or one from -z after half a turn about x
+    return ((1.0 + z) / size, -y / size, x / size, 0.0) if z >= 0.0 else (-y / size, (1.0 - z) / size, 0.0, x / size)
+
+
 def quaternion_rate(q: Any, w: Any) -> Array:
     """Time derivative of a quaternion for an angular velocity ``w`` in body axes, rad/s."""
     q0, q1, q2, q3 = q
@@ -93,12 +125,18 @@ def quaternion_rate(q: Any, w: Any) -> Array:
 
 def frame_of_axis(z: ArrayLike, x: ArrayLike | None = None) -> Array:
     """Right-handed frame (columns x, y, z) with the axis ``z``; x is as near as possible to ``x``, or to a default."""
-    e3 = np.asarray(z, dtype=float) / np.linalg.norm(z)
+    a, b, c = _unit(*np.asarray(z, dtype=float).tolist())
     if x is None:
-        x = (1.0, 0.0, 0.0) if abs(e3[0]) < 0.9 else (0.0, 1.0, 0.0)
-    e1 = np.asarray(x, dtype=float) - e3 * (e3 @ np.asarray(x, dtype=float))
-    e1 /= np.linalg.norm(e1)
-    return np.array([e1, cross(e3, e1), e3]).T
+        x = (1.0, 0.0, 0.0) if abs(a) < 0.9 else (0.0, 1.0, 0.0)
+    u, v, w = x if isinstance(x, tuple) else np.asarray(x, dtype=float).tolist()
+    along = a * u + b * v + c * w
+    u, v, w = _unit(u - a * along, v - b * along, w - c * along)
+    return np.array([[u, b * w - c * v, a], [v, c * u - a * w, b], [w, a * v - b * u, c]])
+
+
+def _unit(x: float, y: float, z: float) -> Floats3:
+    length = math.sqrt(x * x + y * y + z * z) or math.nan
+    return x / length, y / length, z / length
 
 
 def from_z(axis: ArrayLike) -> Array:

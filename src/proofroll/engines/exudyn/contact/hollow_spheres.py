@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.elements.mechanism.scene.rotations import Array, Floats3, turned_back
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, PlacedWall
 from proofroll.engines.exudyn.native import Output, exu
 
 # Radius of the hollow sphere in radii of the ball where the wall is not curved. The larger it is, the less its normal
@@ -18,6 +18,7 @@ from proofroll.engines.exudyn.native import Output, exu
 ON_A_PLANE = 10.0
 # Largest part of the distance of both centres that a gap may have: without a distance they have no normal.
 _REACH = 1 - 1e-6
+_POSITION, _ORIGIN = Output.Position, [0, 0, 0]
 
 
 class MovingPlane(NamedTuple):
@@ -40,18 +41,19 @@ class MovingPlane(NamedTuple):
 
     def follow(self, system: Any) -> None:
         """Moves the triangle to where the sphere is nearest to the plane."""
-        centre = _centre(system, self.sphere, self.body)
+        centre = np.array(_centre(system, self.sphere, self.body))
         place = centre - self.normal * (self.normal @ (centre - self.point))
         system.SetMarkerParameter(self.marker, "localPosition", place.tolist())
 
 
-def _centre(system: Any, sphere: Any, body: Any) -> Array:
+def _centre(system: Any, sphere: Any, body: Any) -> Floats3:
     """Place of a marker in Exudyn's axes of a body, from its centre of mass [m]; None: in the world."""
-    centre = np.array(system.GetMarkerOutput(sphere, Output.Position, exu.ConfigurationType.Current))
+    x, y, z = system.GetMarkerOutput(sphere, _POSITION, exu.ConfigurationType.Current).tolist()
     if body is None:
-        return centre
-    R = np.reshape(system.GetObjectOutputBody(body, Output.RotationMatrix, [0, 0, 0]), (3, 3))
-    return np.asarray(R.T @ (centre - system.GetObjectOutputBody(body, Output.Position, [0, 0, 0])))
+        return x, y, z
+    R = system.GetObjectOutputBody(body, Output.RotationMatrix, _ORIGIN).reshape(3, 3).tolist()
+    u, v, w = system.GetObjectOutputBody(body, _POSITION, _ORIGIN).tolist()
+    return turned_back(R, (x - u, y - v, z - w))
 
 
 class HollowSphere(NamedTuple):
@@ -60,40 +62,34 @@ class HollowSphere(NamedTuple):
     Attributes:
         marker, sphere: Exudyn's markers of its centre, on the wall's body, and of the centre of the sphere.
         body: Exudyn's number of the wall's body; None: the world.
-        wall: in the frame of its body.
-        turn, com: rotation from that frame to Exudyn's axes of the body, and its centre of mass in that frame [m].
+        wall: in Exudyn's axes of its body, from its centre of mass.
         radius, of_sphere: radii [m].
     """
 
     marker: Any
     sphere: Any
     body: Any
-    wall: CurvedWall
-    turn: Array
-    com: Array
+    wall: PlacedWall
     radius: float
     of_sphere: float
 
     def follow(self, system: Any) -> None:
         """Moves the hollow sphere to where the sphere is nearest to the wall."""
-        centre = _centre(system, self.sphere, self.body)
-        place = self.turn @ (self.centre(self.turn.T @ centre + self.com) - self.com)
-        system.SetMarkerParameter(self.marker, "localPosition", place.tolist())
-
-    def centre(self, sphere: Array) -> Array:
-        """Its centre for a centre of the sphere, both in the frame of the wall's body [m]."""
-        return hollow_centre(self.wall, sphere, self.of_sphere, self.radius)
+        sphere = _centre(system, self.sphere, self.body)
+        place = hollow_centre(self.wall, sphere, self.of_sphere, self.radius)
+        system.SetMarkerParameter(self.marker, "localPosition", place)
 
 
-def hollow_centre(wall: CurvedWall, sphere: Array, of_sphere: float, radius: float) -> Array:
-    """Centre of a hollow sphere that touches a wall where a sphere is nearest, in the frame of the wall's body [m].
+def hollow_centre(wall: PlacedWall, sphere: Floats3, of_sphere: float, radius: float) -> list[float]:
+    """Centre of a hollow sphere that touches a wall where a sphere is nearest, in the axes of the placed wall [m].
 
     Beyond a gap of nearly the distance of the two centres it follows the sphere and not the wall. Where several points
     of the wall are as near, it lies along the axis.
     """
-    near, distance = wall.near(wall.frame.T @ (sphere - wall.point)), radius - of_sphere
-    normal = wall.frame @ near.normal if near.normal.any() else wall.axis
-    return np.asarray(sphere + (distance - min(near.distance - of_sphere, _REACH * distance)) * normal)
+    (x, y, z), apart = sphere, radius - of_sphere
+    distance, (nx, ny, nz) = wall.seen(x, y, z)
+    off = apart - min(distance - of_sphere, _REACH * apart)
+    return [x + off * nx, y + off * ny, z + off * nz]
 
 
 def hollow_radius(wall: CurvedWall, sphere: Array, of_sphere: float) -> float:

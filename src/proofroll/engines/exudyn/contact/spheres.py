@@ -26,10 +26,10 @@ from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import StepEvents, state_of
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.elements.mechanism.scene.rotations import Array, Floats3, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, PlacedWall
 from proofroll.engines.exudyn.contact.hollow_spheres import HollowSphere, MovingPlane, hollow_centre, hollow_radius
 from proofroll.engines.exudyn.contact.turning import add_turning
 from proofroll.engines.exudyn.native import Output, exu, items
@@ -211,7 +211,7 @@ class Spheres(Redundant):
         end_a, end_b = item["markerNumbers"]
         outward = -made.sign if item.get("isHollowSphere1") else 1.0  # sense of the centres' line against the normal
 
-        def between_spheres() -> tuple[float, Sequence[float]]:
+        def between_spheres() -> tuple[float, Floats3]:
             xa, ya, za = output(end_a, Output.Position, kind).tolist()
             xb, yb, zb = output(end_b, Output.Position, kind).tolist()
             x, y, z = xa - xb, ya - yb, za - zb
@@ -220,10 +220,11 @@ class Spheres(Redundant):
             pressed = abs((x * Fx + y * Fy + z * Fz) / distance)
             return pressed, (x / distance, y / distance, z / distance)
 
-        def on_plane() -> tuple[float, Sequence[float]]:
+        def on_plane() -> tuple[float, Floats3]:
             _, normal, _ = self._lying(made)
             force = self.system.GetObjectOutput(made.item, Output.Force)
-            return made.sign * float(normal @ force), normal.tolist()
+            x, y, z = normal.tolist()
+            return made.sign * float(normal @ force), (x, y, z)
 
         pressing = between_spheres if "spheresRadii" in item else on_plane
 
@@ -233,7 +234,8 @@ class Spheres(Redundant):
             shape.centre if friction.bend and isinstance(shape, SphereShape) else np.zeros(3)
             for shape in (contact.shape_a, contact.shape_b)
         ]
-        add_turning(self.system, friction, list(map(self.marker, bodies, places)), pressing, zone)
+        markers = [None if body == WORLD else self.marker(body, at) for body, at in zip(bodies, places, strict=True)]
+        add_turning(self.system, friction, markers, pressing, zone)
         w_a, w_b = (self._at_start.w_WB[self._mechanism.body_index[body]] for body in bodies)
         turns = np.linalg.norm(friction.opposed(touch.normal, w_a - w_b, touch.slide)) >= zone
         return 0.0 if turns else float(np.linalg.norm(moment)) / radius
@@ -261,15 +263,14 @@ class Spheres(Redundant):
         """Adds the markers of a hollow sphere that stands for a wall, where it is at the start."""
         centre = self._seen_from(wall_body, body, sphere)
         turn, com, radius = self._turns[wall_body], self._com[wall_body], hollow_radius(wall, centre, sphere.radius)
-        place = turn @ (hollow_centre(wall, centre, sphere.radius, radius) - com)
+        placed, (x, y, z) = PlacedWall(wall, turn, com), (turn @ (centre - com)).tolist()
+        place = hollow_centre(placed, (x, y, z), sphere.radius, radius)
         marker = items.MarkerBodyRigid(bodyNumber=self.bodies[wall_body], localPosition=place)
         return HollowSphere(
             marker=self.system.AddMarker(marker),
             sphere=self.marker(body, sphere.centre),
             body=None if wall_body == WORLD else self.bodies[wall_body],
-            wall=wall,
-            turn=turn,
-            com=com,
+            wall=placed,
             radius=radius,
             of_sphere=sphere.radius,
         )

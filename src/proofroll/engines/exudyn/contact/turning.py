@@ -1,21 +1,23 @@
-"""Rolling resistance and friction against spin in Exudyn: a connector with a moment of its own beside a contact."""
+"""Rolling resistance and friction against spin in Exudyn: moments as loads beside a contact.
+
+A connector of two bodies would do; but Exudyn differentiates it by each of its coordinates in each step, which takes
+five times as many calls.
+"""
 
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-
 from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
-from proofroll.elements.mechanism.scene.rotations import cross
+from proofroll.elements.mechanism.scene.rotations import Floats3, plain_cross
 from proofroll.engines.exudyn.native import Output, exu, items
 
 
 def add_turning(
     system: Any,
     friction: TurningFriction,
-    markers: list[Any],
-    pressing: Callable[[], tuple[float, Sequence[float]]],
+    markers: Sequence[Any],
+    pressing: Callable[[], tuple[float, Floats3]],
     zone: float,
 ) -> None:
     """Adds the moment of one friction between the bodies of its contact.
@@ -23,35 +25,53 @@ def add_turning(
     Args:
         system: Exudyn's system.
         friction: its law.
-        markers: of the contact's bodies a and b; of a ball whose motion is resisted at its centre.
+        markers: of the contact's bodies a and b; of a ball whose motion is resisted at its centre; None: the world.
         pressing: gives the present normal force [N] and normal of the contact, from b to a.
         zone: angular velocity up to which the moment is proportional to it [rad/s].
     """
-    kind, velocity, rotation = exu.ConfigurationType.Current, Output.AngularVelocity, Output.RotationMatrix
-    body_a, body_b = markers
+    marker_a, marker_b = markers
+    bend, coefficient, spins = friction.bend, friction.friction, friction.spins
 
-    def moving(normal: Sequence[float], w_a: Sequence[float], w_b: Sequence[float]) -> Any:
-        """Angular velocity with which a ball would roll as its centre moves over the wall [rad/s]."""
-        outputs = ((marker, output) for output in (Output.Velocity, Output.Position) for marker in markers)
-        va, vb, pa, pb = (np.array(system.GetMarkerOutput(*item, kind)) for item in outputs)
-        of_wall = np.array(w_b if friction.bend > 0 else w_a)
-        return (friction.bend * cross(np.array(normal), va - vb - cross(of_wall, pa - pb))).tolist()
+    def read(marker: Any, output: Any) -> Floats3:
+        if marker is None:
+            return 0.0, 0.0, 0.0
+        x, y, z = system.GetMarkerOutput(marker, output, exu.ConfigurationType.Current).tolist()
+        return x, y, z
 
-    def wrench(system: Any, *_state: Any) -> list[float]:
-        """Force and moment on the first marker, in its axes; plain floats, for each residual calls it."""
-        xa, ya, za = system.GetMarkerOutput(body_a, velocity, kind).tolist()
-        xb, yb, zb = system.GetMarkerOutput(body_b, velocity, kind).tolist()
-        R = system.GetMarkerOutput(body_a, rotation, kind).tolist()
-        N, (nx, ny, nz) = pressing()
-        x, y, z = xa - xb, ya - yb, za - zb
-        if friction.bend:
-            x, y, z = moving((nx, ny, nz), (xa, ya, za), (xb, yb, zb))
+    def apart(output: Any) -> Floats3:
+        (xa, ya, za), (xb, yb, zb) = read(marker_a, output), read(marker_b, output)
+        return xa - xb, ya - yb, za - zb
+
+    def opposed(normal: Floats3) -> Floats3:
+        """Angular velocity that the moment opposes; of a ball that rolls as its centre moves over the wall [rad/s]."""
+        if not bend:
+            return apart(Output.AngularVelocity)
+        (x, y, z), of_wall = apart(Output.Velocity), read(marker_b if bend > 0 else marker_a, Output.AngularVelocity)
+        if any(of_wall):
+            u, v, w = plain_cross(of_wall, apart(Output.Position))
+            x, y, z = x - u, y - v, z - w
+        x, y, z = plain_cross(normal, (x, y, z))
+        return bend * x, bend * y, bend * z
+
+    def moment(sign: float) -> list[float]:
+        """Moment on a body in the world [N m]; ``sign``: 1 for body a, -1 for body b."""
+        N, normal = pressing()
+        if N <= 0.0:
+            return [0.0, 0.0, 0.0]
+        (nx, ny, nz), (x, y, z) = normal, opposed(normal)
         spin = nx * x + ny * y + nz * z
-        sx, sy, sz = spin * nx, spin * ny, spin * nz
-        x, y, z = (sx, sy, sz) if friction.spins else (x - sx, y - sy, z - sz)
-        scale = -friction.friction * max(N, 0.0) / max(math.hypot(x, y, z), zone)
-        return [0.0, 0.0, 0.0, *(scale * (R[k] * x + R[k + 3] * y + R[k + 6] * z) for k in range(3))]
+        u, v, w = spin * nx, spin * ny, spin * nz
+        x, y, z = (u, v, w) if spins else (x - u, y - v, z - w)
+        scale = -sign * coefficient * N / max(math.hypot(x, y, z), zone)
+        return [scale * x, scale * y, scale * z]
 
-    system.AddObject(
-        items.ObjectConnectorRigidBodySpringDamper(markerNumbers=markers, springForceTorqueUserFunction=wrench)
-    )
+    def load(sign: float) -> Callable[[Any, float, Any], list[float]]:
+        return lambda _system, _time, _constant: moment(sign)
+
+    for marker, sign in ((marker_a, 1.0), (marker_b, -1.0)):
+        if marker is not None:
+            system.AddLoad(
+                items.LoadTorqueVector(
+                    markerNumber=marker, loadVector=[0.0, 0.0, 0.0], loadVectorUserFunction=load(sign)
+                )
+            )

@@ -4,6 +4,7 @@ A vertex is a sphere of almost no radius, a circle a cylinder of almost no heigh
 MuJoCo refuses, the top of a wide box. A curved wall is a plane that :mod:`.walls` poses anew in each step.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -204,6 +205,10 @@ class Contacts:
         self.boxes = {k for k, contact in enumerate(mechanism.contacts) if contact.box_slot and not contact.slot}
         self.of_geom = {a: (k, 1.0) for k, (a, _) in zip(firsts, self._geoms, strict=True)}
         self.of_geom |= {b: (k, -1.0) for k, (_, b) in zip(firsts, self._geoms, strict=True)}
+        self._bodies = [
+            (model.body(contact.body_a).id, model.body(contact.body_b).id) for contact in mechanism.contacts
+        ]
+        self._world, self._rate = Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3)), np.zeros((3, model.nv))
         self._normal_rows: dict[int, list[Array]] = {}
         curved = {k for k, contact in enumerate(mechanism.contacts) if curved_end(contact) is not None}
         self._turned = curved if settings.curvature else set()
@@ -256,7 +261,7 @@ class Contacts:
                 if number in self._on_cone:
                     data.efc_aref[row] -= mu * float(np.linalg.norm(rates[friction] - data.efc_aref[friction]))
                 continue
-            slip = float(np.linalg.norm(data.efc_vel[friction]))
+            slip = math.hypot(*data.efc_vel[friction].tolist())
             # from rest a slip starts along its acceleration
             slip_rates = rates[friction] if slip == 0 else data.efc_vel[friction]
             size = float(np.linalg.norm(slip_rates))
@@ -301,7 +306,7 @@ class Contacts:
                 mu, friction = self._slipping(contact)
                 bound = _NEAR_CONE * mu * data.efc_force[row]
                 if bound > 0:
-                    on_cone = np.linalg.norm(data.efc_force[friction]) >= bound
+                    on_cone = math.hypot(*data.efc_force[friction].tolist()) >= bound
                     (self._on_cone if on_cone else within).add(self._number(contact))
         self._sticking = within - self._on_cone - self._turned
 
@@ -328,8 +333,8 @@ class Contacts:
         contacts, none = self._mechanism.contacts, np.zeros(3)
         slot = contacts[number].box_slot
         assert slot is not None  # as of all of these
-        bodies = [self._model.body(name).id for name in (contacts[number].body_a, contacts[number].body_b)]
-        a, b = (Moving(data.xpos[body], data.xmat[body].reshape(3, 3), none, none) for body in bodies)
+        poses = [(data.xpos[body], data.xmat[body].reshape(3, 3)) for body in self._bodies[number]]
+        a, b = (Moving(p, R, none, none) for p, R in poses)
         candidates = [touch(contacts[k], a, b) for k in range(number, number + slot.count)]
         away = [
             np.inf if candidate.absent else float(np.linalg.norm(candidate.place - contact.pos))
@@ -371,21 +376,22 @@ class Contacts:
     def _turning(self, data: Any, contact: Any) -> Array:
         """J̇v of a contact in its frame [m/s²], for the joint velocities of the last ``mj_comVel``."""
         number, sign = self.owner(data, contact)
-        contact_of_scene, rate = self._mechanism.contacts[number], np.zeros((3, self._model.nv))
-        names = contact_of_scene.body_a, contact_of_scene.body_b
-        bodies = [self._model.body(name).id for name in names]
+        bodies = self._bodies[number]
         movings = [self._moving(data, body) for body in bodies]
-        touching, missing = touch(contact_of_scene, movings[0], movings[1]), np.zeros(3)
+        touching, missing = touch(self._mechanism.contacts[number], movings[0], movings[1]), np.zeros(3)
         for body, moving, side in zip(bodies, movings, (1.0, -1.0), strict=True):
-            mujoco.mj_jacDot(self._model, data, rate, None, touching.place, body)
-            along_body = touching.place_rate - moving.velocity(touching.place)
-            missing += side * (rate @ data.qvel + cross(moving.w, along_body))
+            if body:  # the world has no velocity
+                mujoco.mj_jacDot(self._model, data, self._rate, None, touching.place, body)
+                along_body = touching.place_rate - moving.velocity(touching.place)
+                missing += side * (self._rate @ data.qvel + cross(moving.w, along_body))
         shift: Array = sign * contact.frame.reshape(3, 3) @ missing
         shift[0] += float(touching.normal_rate @ touching.slide)
         return shift
 
     def _moving(self, data: Any, body: int) -> Moving:
         """Motion of a body as of the last computation of velocities."""
+        if not body:
+            return self._world
         twist = np.zeros(6)
         mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
         return Moving(data.xpos[body], data.xmat[body].reshape(3, 3), twist[3:], twist[:3])

@@ -9,13 +9,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
+import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism, Tree
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, to_quaternion
+from proofroll.elements.mechanism.scene.rotations import Array, quaternion_from_z, turned, turned_back
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Shape, SphereShape
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, PlacedWall
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 
@@ -37,22 +38,39 @@ def check_walls(mechanism: Mechanism, settings: MujocoSettings) -> None:
 
 
 class _Plane(NamedTuple):
-    """A plane in MuJoCo: its geom and how deep that lies under it [m], its wall and sphere, and the bodies of both."""
+    """A plane in MuJoCo.
+
+    Attributes:
+        geom, under: its geom, and how deep that lies under it [m].
+        wall: in the frame of its body.
+        bodies: of the wall and of the sphere; 0 is the world.
+        centre: of the sphere in the frame of its body [m].
+    """
 
     geom: int
     under: float
-    wall: CurvedWall
-    sphere: SphereShape
+    wall: PlacedWall
     bodies: tuple[int, int]
+    centre: Sequence[float]
 
     def pose(self, model: Any, data: Any, above: float) -> None:
         """Poses the plane where the sphere of ``data`` is nearest to the wall, and ``above`` it [m]."""
-        (carrier, ball), wall = self.bodies, self.wall
-        R = data.xmat[carrier].reshape(3, 3)
-        centre = data.xpos[ball] + data.xmat[ball].reshape(3, 3) @ self.sphere.centre
-        plane = tangent(wall, R.T @ (centre - data.xpos[carrier]))
-        model.geom_quat[self.geom] = to_quaternion(frame_of_axis(plane.normal))
-        model.geom_pos[self.geom] = plane.point + (above - self.under) * plane.normal
+        carrier, ball = self.bodies
+        x, y, z = data.xpos[ball].tolist()
+        if any(self.centre):
+            u, v, w = turned(data.xmat[ball].reshape(3, 3).tolist(), self.centre)
+            x, y, z = x + u, y + v, z + w
+        if carrier:
+            u, v, w = data.xpos[carrier].tolist()
+            x, y, z = turned_back(data.xmat[carrier].reshape(3, 3).tolist(), (x - u, y - v, z - w))
+        distance, normal = self.wall.seen(x, y, z)
+        (u, v, w), up = normal, above - self.under - distance
+        model.geom_quat[self.geom] = quaternion_from_z(normal)
+        model.geom_pos[self.geom] = x + up * u, y + up * v, z + up * w
+
+
+def _in_its_body(wall: CurvedWall) -> PlacedWall:
+    return PlacedWall(wall, np.eye(3), np.zeros(3))
 
 
 def tangent(wall: CurvedWall, centre: Array) -> HalfSpace:
@@ -60,9 +78,9 @@ def tangent(wall: CurvedWall, centre: Array) -> HalfSpace:
 
     Where several points are as near, it lies across the axis.
     """
-    near = wall.near(wall.frame.T @ (centre - wall.point))
-    normal = wall.frame @ near.normal if near.normal.any() else wall.axis
-    return HalfSpace(centre - near.distance * normal, normal)
+    distance, direction = _in_its_body(wall).seen(*centre.tolist())
+    normal = np.array(direction)
+    return HalfSpace(centre - distance * normal, normal)
 
 
 def shapes_at_start(mechanism: Mechanism) -> Sequence[tuple[Shape, Shape]]:
@@ -102,7 +120,8 @@ class Walls:
             model.geom_sameframe[geom] = 0  # else MuJoCo takes the body's pose for the geom's
             under = float(model.geom_size[geom, 2]) if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX else 0.0
             of_bodies = model.body(bodies[end]).id, model.body(bodies[1 - end]).id
-            self._planes[number] = _Plane(geom=geom, under=under, wall=wall, sphere=sphere, bodies=of_bodies)
+            placed, centre = _in_its_body(wall), np.asarray(sphere.centre).tolist()
+            self._planes[number] = _Plane(geom=geom, under=under, wall=placed, bodies=of_bodies, centre=centre)
         self._above = dict.fromkeys(self._planes, 0.0)  # m
 
     def __bool__(self) -> bool:

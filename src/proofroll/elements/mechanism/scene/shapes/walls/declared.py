@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -14,7 +15,7 @@ from typing_extensions import override
 from proofroll.core.arrays import FloatArray, cross, read_only
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.elements.mechanism.scene.shapes.walls.curved import CurvedWall, Near
+from proofroll.elements.mechanism.scene.shapes.walls.curved import NO_BEND, NO_NORMAL, CurvedWall, Seen
 from proofroll.elements.mechanism.scene.shapes.walls.formula import differentiated
 
 # Places along each coordinate at which a declaration is checked, and from which Newton's method for the nearest point
@@ -214,12 +215,12 @@ class DeclaredWall(CurvedWall):
         return np.eye(3)
 
     @override
-    def near(self, place: Array) -> Near:
-        surface, place = self.surface, place / self.metre
-        normal, bend = -surface.normal(place), -surface.normal_gradient(place) / self.metre
-        if not (np.isfinite(normal).all() and np.isfinite(bend).all()):
-            normal, bend = np.zeros(3), np.zeros((3, 3))
-        return Near(float(surface.gap(place)) * self.metre, normal, bend)
+    def seen(self, x: float, y: float, z: float) -> Seen:
+        k = self.metre
+        distance, *parts = _field(self.surface)[0](x / k, y / k, z / k)
+        if not math.isfinite(sum(parts)):
+            return distance * k, NO_NORMAL, NO_BEND
+        return distance * k, parts[:3], [part / k for part in parts[3:]]
 
 
 # Functions with the surface as key, for attributes of the surface would have to be pickled with it.

@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.scene.rotations import about, from_z
+from proofroll.elements.mechanism.scene.rotations import about, from_quaternion, from_rpy, from_z, quaternion_from_z
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Wall
-from proofroll.elements.mechanism.scene.shapes.walls import Bore, BowlWall, ConeWall, EdgeLine, Shaft, TorusWall
+from proofroll.elements.mechanism.scene.shapes.walls import (
+    Bore,
+    BowlWall,
+    ConeWall,
+    CurvedWall,
+    EdgeLine,
+    PlacedWall,
+    Shaft,
+    TorusWall,
+)
 from proofroll.elements.mechanism.scene.shapes.walls.charts import wall_coordinates
 
 POINT, AXIS = np.array([0.1, -0.2, 0.3]), np.array([0.36, 0.48, 0.8])
@@ -21,6 +30,7 @@ WALLS: dict[str, Wall] = {
     "cone": ConeWall(POINT, AXIS, 0.6),
     "torus": TorusWall(POINT, AXIS, 0.4, 0.02),
 }
+CURVED = {name: wall for name, wall in WALLS.items() if isinstance(wall, CurvedWall)}
 PLACES = np.array([[0.3, 0.2], [-0.7, 0.15], [0.1, 0.4]])
 
 
@@ -92,3 +102,26 @@ def test_the_smallest_rotation_turns_z_to_an_axis(axis: tuple[float, float, floa
     assert np.trace(R) == pytest.approx(1 + 2 * unit[2], abs=1e-12)
     for angle in (0.3, 2.5, 4.0, -1.0):
         np.testing.assert_allclose(from_z(about(1, angle)[:, 2]), about(1, angle), atol=1e-14)
+    quaternion = quaternion_from_z(unit.tolist())
+    assert np.linalg.norm(quaternion) == pytest.approx(1.0, abs=1e-14)
+    np.testing.assert_allclose(from_quaternion(quaternion)[:, 2], unit, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_a_wall_is_the_same_from_other_axes(name: str) -> None:
+    """From axes turned and moved against its body's it is as far, and its normal is turned with them."""
+    wall, place = CURVED[name], np.array([0.15, -0.1, 0.45])
+    near = wall.near(wall.frame.T @ (place - wall.point))
+    R, origin = from_rpy((0.3, -1.1, 2.0)), np.array([0.2, 0.1, -0.4])
+    distance, normal = PlacedWall(wall, R, origin).seen(*(R @ (place - origin)).tolist())
+    assert distance == pytest.approx(near.distance, abs=1e-15)
+    np.testing.assert_allclose(normal, R @ wall.frame @ near.normal, atol=1e-15)
+
+
+def test_where_several_points_are_nearest_the_normal_is_the_axis() -> None:
+    """On its axis, where a bore has no normal, one that is placed has its axis for it, turned as the wall is."""
+    wall, R = CURVED["bore"], from_rpy((0.3, -1.1, 2.0))
+    distance, normal = PlacedWall(wall, R, POINT).seen(0.0, 0.0, 0.0)
+    assert distance == pytest.approx(0.3)
+    np.testing.assert_allclose(normal, R @ AXIS, atol=1e-15)
+    assert not wall.near(np.zeros(3)).normal.any()
