@@ -7,6 +7,7 @@ contacts separate.
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -93,12 +94,14 @@ class StepTerms(NamedTuple):
         free: velocity after the step without impulses, (nv,).
         inverse: of the mass matrix, (nv, nv).
         touching: geometry of the contacts.
+        frames: of their normals.
     """
 
     J: Array
     free: Array
     inverse: Array
     touching: list[Touching]
+    frames: list[Array]
 
 
 def _carried(vector: Array, start: Array, end: Array) -> Array:
@@ -154,6 +157,15 @@ class ImpulseSteps:
         self._moments = TurningImpulses(tree, float(settings.solver_tolerance or 0.0))
         self._pressed_by = [friction.pressed_by for friction in self._moments.frictions]
         self._solvers: dict[tuple[int, ...], _Solver] = {}
+        count, nv = len(self.contacts), tree.model.nv
+        self._all = tuple(range(count))
+        # of each contact and joint row: numbers of its rows
+        self._rows = [range(3 * k, 3 * k + 3) for k in self._all]
+        self._rows += [range(3 * count + k, 3 * count + k + 1) for k in range(len(self.joints.J))]
+        self._upper, self._world = (
+            np.triu(np.ones((nv, nv), dtype=bool)),
+            Moving(np.zeros(3), np.eye(3), *np.zeros((2, 3))),
+        )
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
         try:
@@ -171,8 +183,10 @@ class ImpulseSteps:
         """
         if flat:
             raise Diverged(f"{self.contacts[k].name} {ONE_POINT}")
+        if self._settings.solver != "pgs" or not self.contacts[k].friction:
+            return
         G_1, G_2 = float(G[0, 0]), float(G[1, 1])
-        if self._settings.solver == "pgs" and self.contacts[k].friction and max(G_1, G_2) > _UNEQUAL * min(G_1, G_2):
+        if max(G_1, G_2) > _UNEQUAL * min(G_1, G_2):
             raise Diverged(
                 f"Pinocchio's PGS returns a wrong impulse where a contact gives way {_UNEQUAL:g} times as much in one "
                 f"direction as across it, as {self.contacts[k].name} does at {self.t:g} s; set solver=admm"
@@ -202,7 +216,7 @@ class ImpulseSteps:
         terms = self.terms(q, v, self._dt, late)
         turning = np.zeros((len(terms.touching), 3))
         if self._midpoint or self._returned.any():
-            turning = self._turning(q, v, terms.touching, self._dt - late)
+            turning = self._turning(q, v, terms, self._dt - late)
         shifts = self._shifts(terms.J, q, v, terms.touching, turning)
         return self._turned(q, v, terms, shifts, self._dt, convex=self._settings.convex)
 
@@ -210,16 +224,16 @@ class ImpulseSteps:
         """Impulses of a short time from now on, with the turning of the contacts (J̇v); open gaps stay open."""
         terms = self.terms(self.q, self.v, span)
         touching, shifts = terms.touching, np.zeros((len(self._returned), 3))
-        shifts[: len(touching)] = self._turning(self.q, self.v, touching, span)
+        shifts[: len(touching)] = self._turning(self.q, self.v, terms, span)
         apart = [touch.absent or touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
         shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
         return self._turned(self.q, self.v, terms, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:
         """Normals, positions and widest cones of contact points in Pinocchio, with gaps of the shapes at its poses."""
-        J, _, inverse, touching = self.terms(self.q, self.v, self._dt)
-        world = np.array([frame_of_axis(touch.normal) for touch in touching]) @ J
-        solver, data = self._solver(tuple(range(len(self.contacts)))), self._data
+        J, _, inverse, touching, frames = self.terms(self.q, self.v, self._dt)
+        world = np.array(frames) @ J
+        solver, data = self._solver(self._all), self._data
         normal, place = np.zeros((2, len(touching), 3))
         for k, point in enumerate(solver.points):
             point.setFriction(self._friction(k))
@@ -245,16 +259,16 @@ class ImpulseSteps:
         tau = tree.drives(q, v)
         rate = pin.aba(model, data, q, v, tau, pulls) if pulls else pin.aba(model, data, q, v, tau)
         free = v + span * rate
-        inverse = np.triu(pin.computeMinverse(model, data, q))
-        inverse = inverse + np.triu(inverse, 1).T
+        upper = pin.computeMinverse(model, data, q)
+        inverse = np.where(self._upper, upper, upper.T)
         if len(tree.geared):
             free, inverse = self._driven(q, free, inverse, span, late)
         pin.computeJointJacobians(model, data, q)
         J = np.zeros((len(touching), 3, model.nv))
-        all_of = self._solver(tuple(range(len(touching))))
-        for k, contact_touch in enumerate(touching):
-            J[k] = self._posed(all_of, k, contact_touch)
-        return StepTerms(J=J, free=free, inverse=inverse, touching=touching)
+        frames, all_of = [frame_of_axis(point.normal) for point in touching], self._solver(self._all)
+        for k, (point, frame) in enumerate(zip(touching, frames, strict=True)):
+            J[k] = self._posed(all_of, k, point, frame)
+        return StepTerms(J=J, free=free, inverse=inverse, touching=touching, frames=frames)
 
     def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
         """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
@@ -274,7 +288,7 @@ class ImpulseSteps:
 
     def unsure(self, span: float) -> Array:
         """Velocities by which errors of each row within the tolerance change those after a ``span`` [s], (rows, nv)."""
-        J, free, inverse, _ = self.terms(self.q, self.v, span)
+        J, free, inverse, _, _ = self.terms(self.q, self.v, span)
         rows = np.concatenate([J.reshape(-1, len(free)), self.joints.J])
         speed = float(np.abs(rows @ free).max(initial=0.0)) * float(self._settings.solver_tolerance or 0.0)
         ways = rows @ inverse
@@ -291,34 +305,33 @@ class ImpulseSteps:
             for contact, feature in zip(self.contacts, features, strict=True)
         ]
 
-    def _turning(self, q: Array, v: Array, touching: Sequence[Touching], span: float) -> Array:
+    def _turning(self, q: Array, v: Array, terms: StepTerms, span: float) -> Array:
         """Changes of slip and gap velocities within a ``span`` [s] in which joint velocities are constant (J̇v)."""
         later = pin.integrate(self._model, q, span * v)
-        touching_later = self._touched(self._ahead, later, v, [contact.feature for contact in touching])
+        touching_later = self._touched(self._ahead, later, v, [contact.feature for contact in terms.touching])
         changes = [
-            frame_of_axis(point.normal).T
-            @ (_carried(later_point.slide, later_point.normal, point.normal) - point.slide)
-            for point, later_point in zip(touching, touching_later, strict=True)
+            frame.T @ (_carried(later_point.slide, later_point.normal, point.normal) - point.slide)
+            for frame, point, later_point in zip(terms.frames, terms.touching, touching_later, strict=True)
         ]
-        return np.reshape(changes, (len(touching), 3))
+        return np.reshape(changes, (len(changes), 3))
 
     def _moving(self, data: Any, body: str) -> Moving:
         k = self._index[body]
         if k < 0:
-            return Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+            return self._world
         frame = self._tree.body[k]
         velocity, pose = self._tree.velocity(data, frame), data.oMf[frame]
         return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)
 
-    def _posed(self, solver: _Solver, number: int, contact_point: Touching) -> Array:
+    def _posed(self, solver: _Solver, number: int, contact_point: Touching, frame: Array) -> Array:
         """Poses the ``number``-th point of a solver and returns its rows, shape (3, nv)."""
         point, data = solver.points[number], self._data
-        place = pin.SE3(frame_of_axis(contact_point.normal), contact_point.place)
+        place = pin.SE3(frame, contact_point.place)
         point.joint1_placement = data.oMi[point.joint1_id].actInv(place)
         point.joint2_placement = data.oMi[point.joint2_id].actInv(place)
         point.calc(self._model, data, solver.point_datas[number])
-        rows = point.jacobian(self._model, data, solver.point_datas[number])
-        return np.reshape(np.array(rows), (3, self._model.nv))
+        rows: Array = point.jacobian(self._model, data, solver.point_datas[number])
+        return rows
 
     def _solver(self, which: tuple[int, ...]) -> _Solver:
         if which not in self._solvers:
@@ -386,10 +399,12 @@ class ImpulseSteps:
         """
         if not self._moments.frictions:
             return self._solved(terms, shifts, span, convex=convex)
-        J, free, inverse, touching = terms
-        rows, count = self._moments.rows(self._data, touching, J), len(touching)
-        bends = np.abs(self._turning(q, v, touching, span)[:, 2])  # as a curved wall turns away from a fast ball
-        soft = J[:, 2] @ v >= -_SOFT * (self._gravity * span + bends)
+        J, free, inverse, touching, _ = terms
+        rows, count = self._moments.rows(self._data, terms.touching, terms.frames, J), len(touching)
+        approach, soft_speed = J[:, 2] @ v, -_SOFT * self._gravity * span
+        soft = approach >= soft_speed
+        if not soft.all():  # a curved wall turns away from a fast ball
+            soft = approach >= soft_speed - _SOFT * np.abs(self._turning(q, v, terms, span)[:, 2])
         kicks = list[Impulses]()
 
         def pressed(impulses: Array) -> Pressed:
@@ -409,45 +424,52 @@ class ImpulseSteps:
 
     def _solved(self, terms: StepTerms, shifts: Array, span: float, *, convex: bool) -> Impulses:
         """Impulses of dry friction and of all contacts and stops that would close, also due to other impulses."""
-        J, free, inverse, touching = terms
-        count, v = len(touching), free
-        blocks = [*J, *self.joints.J[:, None]]
-        of_blocks = [*shifts[:count], *shifts[count:, 2:]]
-        rubs = count + len(self.joints.friction)
-        gaps = [k for k in (*range(count), *range(rubs, len(blocks))) if np.isfinite(shifts[k, 2])]
-        impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(blocks) - count), tuple(range(count, rubs))
+        J, free, inverse, touching, frames = terms
+        count, v, own_rows = len(touching), free, self._rows
+        all_rows = np.concatenate([J.reshape(3 * count, len(free)), self.joints.J])
+        all_shifts = np.concatenate([shifts[:count].ravel(), shifts[count:, 2]])
+        added, rubs = all_shifts.tolist(), count + len(self.joints.friction)
+        gaps = [k for k in (*self._all, *range(rubs, len(own_rows))) if math.isfinite(added[own_rows[k][-1]])]
+        impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(own_rows) - count), tuple(range(count, rubs))
         states = [OPEN] * count
         grown, pushed = bool(which), np.zeros(len(free))
         alone, motor_responses = self._motions
         while True:
-            # a speed that is round-off of its rows would be the unit of impulses, in which slips are huge
-            closing = {k for k in gaps if blocks[k][-1] @ v + shifts[k, 2] < -_SMALL * np.abs(blocks[k] @ v).max()}
+            speeds, closing = (all_rows @ v).tolist(), set[int]()
+            for k in gaps:
+                of_row = [speeds[row] for row in own_rows[k]]
+                # a speed that is round-off of its rows would be the unit of impulses, in which slips are huge
+                if of_row[-1] + added[own_rows[k][-1]] < -_SMALL * max(map(abs, of_row)):
+                    closing.add(k)
             if closing <= set(which) and not grown:
                 driving = alone - motor_responses.T @ pushed
-                held = np.linalg.norm(J[:, :2] @ v + shifts[:count, :2], axis=1) <= self._held
-                states = [
-                    STICK if stays and state == SLIP else state for stays, state in zip(held, states, strict=True)
-                ]
+                for k, held in enumerate(self._held):
+                    along = [speeds[row] + added[row] for row in own_rows[k][:2]]
+                    states[k] = STICK if states[k] == SLIP and math.hypot(*along) <= held else states[k]
                 moment, seen = np.zeros((count, 3)), tuple(states)
                 return Impulses(v=v, impulse=impulse, states=seen, moment=moment, along=along_rows, driving=driving)
             which, grown = tuple(sorted({*which, *closing})), False
-            rows = np.concatenate([blocks[k] for k in which])
+            chosen = [row for k in which for row in own_rows[k]]
+            rows = all_rows[chosen]
             to_joints = inverse @ rows.T
-            g = rows @ free + np.concatenate([of_blocks[k] for k in which])
-            got = self._found(which, rows @ to_joints, g, touching, span, convex=convex)
+            g = rows @ free + all_shifts[chosen]
+            got = self._found(which, rows @ to_joints, g, terms, span, convex=convex)
             v, pushed = free + to_joints @ got, rows.T @ got
             impulse[:], along_rows[:] = 0.0, 0.0
-            ends = np.cumsum([len(blocks[k]) for k in which])
-            for end, k in zip(ends, which, strict=True):
+            for end, k in zip(self._ends(which), which, strict=True):
                 if k < count:
-                    impulse[k] = frame_of_axis(touching[k].normal) @ got[end - 3 : end]
+                    impulse[k] = frames[k] @ got[end - 3 : end]
                     F1, F2, N = got[end - 3 : end].tolist()
                     states[k] = step_events.state_of(N, math.hypot(F1, F2), _INSIDE * self.contacts[k].friction * N)
                 else:
                     along_rows[k - count] = got[end - 1]
 
+    def _ends(self, which: tuple[int, ...]) -> list[int]:
+        """Ends of some contacts and joint rows among the rows of these alone."""
+        return list(accumulate(len(self._rows[k]) for k in which))
+
     def _found(
-        self, which: tuple[int, ...], G: Array, g: Array, touching: Sequence[Touching], span: float, *, convex: bool
+        self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool
     ) -> Array:
         """Impulses of the contacts and joint rows ``which`` [N s, N m s].
 
@@ -457,27 +479,30 @@ class ImpulseSteps:
         Raises:
             Diverged: Pinocchio's solver does not find them.
         """
-        count, solver = len(touching), self._solver(which)
-        ends = np.cumsum([3 if k < count else 1 for k in which])
+        count, solver, ends = len(self.contacts), self._solver(which), self._ends(which)
         # Pinocchio's tolerances and regularisations are numbers without scale: 1e-8, below which its ADMM adapts
         # its penalty the wrong way, would be a large part of the impulses of short steps or light bodies. In these
         # units of speed and impulse the problem is the same for all masses, steps and lengths.
-        speed = max(float(np.abs(g[ends - 1]).max()), _SMALL * float(np.abs(g).max())) or 1.0
-        unit = speed / float(np.diag(G).max())
+        speeds = np.abs(g).tolist()
+        fastest = max(speeds)
+        speed = max(*(speeds[end - 1] for end in ends), _SMALL * fastest) or 1.0
+        unit = speed / float(G.diagonal().max())
         points = []
         for row, (end, k) in enumerate(zip(ends, which, strict=True)):
             if k < count:
-                self._check(k, G[end - 3 : end, end - 3 : end], touching[k].flat)
-                self._posed(solver, row, touching[k])
-                points.append((solver.points[row], int(end), self._friction(k)))
-                solver.points[row].setFriction(min(self._friction(k), _NARROW))
+                point, mu = solver.points[row], self._friction(k)
+                self._check(k, G[end - 3 : end, end - 3 : end], terms.touching[k].flat)
+                if which != self._all:  # else as of the terms
+                    self._posed(solver, row, terms.touching[k], terms.frames[k])
+                points.append((point, end, mu))
+                point.setFriction(min(mu, _NARROW))
             elif k < count + len(self.joints.friction):
                 solver.points[row].setTimeStep(span / unit)  # bounds are forces; the default step would be 1 s
                 solver.points[row].calc(self._model, self._data, solver.point_datas[row])
         solver.options.solve_ncp = not convex
         tolerance = float(self._settings.solver_tolerance or 0.0)
         # a product of impulses and velocities, which both have the tolerance; velocities are 1 along normals
-        least = tolerance * max(1.0, float(np.abs(g).max()) / speed)
+        least = tolerance * max(1.0, fastest / speed)
         solver.options.absolute_complementarity_tol = least
         operator = pin.DelassusOperatorDense(G * (unit / speed))
         while True:
@@ -488,12 +513,11 @@ class ImpulseSteps:
                     f"solver_tolerance={self._settings.solver_tolerance:g} at {self.t:g} s; a larger one may do"
                 )
             impulses = np.array(solver.result.retrieveConstraintImpulses())
-            narrow = [
-                (point, mu)
-                for point, end, mu in points
-                if point.getFriction() < mu
-                and np.hypot(*impulses[end - 3 : end - 1]) + least >= point.getFriction() * impulses[end - 1] > least
-            ]
+            sizes, narrow = impulses.tolist(), []
+            for point, end, mu in points:
+                bound = point.getFriction() * sizes[end - 1]
+                if point.getFriction() < mu and math.hypot(*sizes[end - 3 : end - 1]) + least >= bound > least:
+                    narrow.append((point, mu))
             if not narrow:
                 return unit * impulses
             for point, mu in narrow:

@@ -1,5 +1,6 @@
 """Rolling resistance and friction against spin, by iteration around Pinocchio's solver, which has no moments."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.contact.rolling_and_spin import turning_frictions
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.run.contacts.step_events import SLIP, States
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, skew
+from proofroll.elements.mechanism.scene.rotations import Array, skew
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
 # Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one:
@@ -18,6 +19,7 @@ from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 _MOST, _SETTLED = 100, 1e-2
 # Response to moments, in parts of that without contacts, that is round-off of what contacts hold.
 _HELD = 1e-9
+_INDEPENDENT = 1e-15  # least response of independent rows, relative to the largest
 
 
 class Pressed(NamedTuple):
@@ -48,10 +50,10 @@ class TurningImpulses:
         self._tree, self._tolerance = tree, tolerance
         self.frictions = turning_frictions(tree.mechanism.contacts)
 
-    def rows(self, data: pin.Data, touching: Sequence[Touching], J: Array) -> Array:
+    def rows(self, data: pin.Data, touching: Sequence[Touching], frames: Sequence[Array], J: Array) -> Array:
         """Derivatives of resisted angular velocities, and of what moments oppose, by joint velocities, from ``data``.
 
-        (2, frictions, 3, nv); ``J``: those of the slides, along the normals' :func:`frame_of_axis`, (contacts, 3, nv).
+        (2, frictions, 3, nv); ``J``: those of the slides along the ``frames`` of the normals, (contacts, 3, nv).
         """
         index, model = self._tree.mechanism.body_index, self._tree.model
         rows = np.zeros((2, len(self.frictions), 3, model.nv))
@@ -62,8 +64,9 @@ class TurningImpulses:
                     frame = self._tree.body[index[body]]
                     rows[0, k] += sign * pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[3:]
             rows[0, k] = friction.resisted(normal, rows[0, k])
-            slides = frame_of_axis(normal) @ J[friction.pressed_by]
-            rows[1, k] = rows[0, k] + friction.bend * skew(normal) @ slides
+            rows[1, k] = rows[0, k]
+            if friction.bend:
+                rows[1, k] += friction.bend * skew(normal) @ frames[friction.pressed_by] @ J[friction.pressed_by]
         return rows
 
     def found(
@@ -82,28 +85,34 @@ class TurningImpulses:
             Diverged: the iterations do not settle.
         """
         moments, impulses = np.zeros((len(self.frictions), 3)), np.zeros(len(v))
+        coefficients = np.array([friction.friction for friction in self.frictions])
+        eases = dict[tuple[int, bytes], float]()  # what is held is mostly the same in all solutions of a step
         for _ in range(_MOST):
             outcome, last = pressed(impulses), moments.copy()
-            bounds = np.array([friction.friction for friction in self.frictions]) * outcome.normal
-            for k, (row, opposed, bound) in enumerate(zip(*rows, bounds, strict=True)):
-                moments[k] += _stopping(row, inverse, outcome)
+            bounds, held = coefficients * outcome.normal, outcome.held.tobytes()
+            for k, (row, opposed, bound) in enumerate(zip(*rows, bounds.tolist(), strict=True)):
+                if (k, held) not in eases:
+                    eases[k, held] = _ease(row, inverse, outcome.held)
+                if eases[k, held]:
+                    moments[k] -= row @ outcome.v / eases[k, held]
                 moves = self.frictions[k].bend and outcome.states[self.frictions[k].pressed_by] == SLIP
-                if moves or np.linalg.norm(moments[k]) > bound:
+                if moves or math.hypot(*moments[k].tolist()) > bound:
                     turning = opposed @ (v + outcome.v)
-                    moments[k] = -bound * turning / (float(np.linalg.norm(turning)) or 1.0)
+                    moments[k] = -bound * turning / (math.hypot(*turning.tolist()) or 1.0)
             impulses = np.einsum("kin,ki->n", rows[0], moments)
             if np.abs(moments - last).max() <= _SETTLED * self._tolerance * bounds.max():
                 return moments, impulses
         raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")
 
 
-def _stopping(row: Array, inverse: Array, outcome: Pressed) -> Array:
-    """Moment that stops what still turns, while the contacts hold what they do [N m s]."""
-    ways, held_rows = inverse @ row.T, outcome.held
-    free = row @ ways
-    into = held_rows @ ways
-    response = free - into.T @ np.linalg.pinv(held_rows @ inverse @ held_rows.T, hermitian=True) @ into
+def _ease(row: Array, inverse: Array, held_rows: Array) -> float:
+    """Largest response to a moment while the contacts hold what they do [1/(kg m²)]; 0: it is round-off."""
+    ways = inverse @ row.T
+    free, response = row @ ways, row @ ways
+    if len(held_rows):
+        sizes, directions = np.linalg.eigh(held_rows @ inverse @ held_rows.T)
+        independent = sizes > _INDEPENDENT * sizes[-1]
+        into = directions[:, independent].T @ held_rows @ ways
+        response = free - into.T @ (into / sizes[independent, None])
     ease = float(np.linalg.eigvalsh(response)[-1])
-    if ease <= _HELD * np.trace(free):
-        return np.zeros(3)
-    return np.asarray(-(row @ outcome.v) / ease)
+    return ease if ease > _HELD * np.trace(free) else 0.0
