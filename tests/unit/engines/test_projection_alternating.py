@@ -28,7 +28,7 @@ class Bouncing(AlternatingMotion[str]):
         self._enter(0.0, np.array([1.0, 0.0, 0.0]), "flies")
 
     def _rates(self, y: Any) -> Any:
-        return np.array([y[1], -9.81])
+        return np.array([y[1], -9.81, 1.0])
 
     def _excess(self, y: Any) -> list[Excess]:
         return [Excess(0, "impact", -float(y[0]), -float(y[1]))]
@@ -74,7 +74,7 @@ class Stopping(AlternatingMotion[str]):
 
     def _rates(self, y: Any) -> Any:
         self.counted += 1
-        return -self._heading(y) + [-y[1], y[0]] if self.mode == "slip" else np.zeros(2)
+        return np.append(-self._heading(y) + [-y[1], y[0]] if self.mode == "slip" else np.zeros(2), 1.0)
 
     def _excess(self, y: Any) -> list[Excess]:
         return [Excess(0, "still", -float(y[:2] @ self._toward), float(self.mode == "slip"))]

@@ -63,7 +63,7 @@ class TurningFriction:
         """Resisted part of angular velocities, (3,) or (3, velocities); 0 where it is round-off of the whole."""
         projection = np.outer(normal, normal)
         part = (projection if self.spins else np.eye(3) - projection) @ turning
-        return _without_round_off(part, np.linalg.norm(turning, axis=0))
+        return part if part.dtype == object else _without_round_off(part, np.linalg.norm(turning, axis=0))
 
     def opposed(self, normal: Array, turning: Array, slide: Array) -> Array:
         """Angular velocity that the moment opposes [rad/s], (3,), at those of a relative to b and a slide [m/s].
@@ -78,10 +78,11 @@ class TurningFriction:
 
         ``fastest``: largest angular velocity of a body [rad/s], of whose products rates are the sums.
         """
-        by_normal = self._part_rate(touch) @ turning
-        size = np.linalg.norm(rate) + fastest * (fastest + np.linalg.norm(touch.normal_rate))
-        rate = _without_round_off(self.resisted(touch.normal, rate) + by_normal, size)
-        return rate + self.bend * cross(touch.normal_rate, touch.slide) if self.bend else rate
+        resisted = self.resisted(touch.normal, rate) + self._part_rate(touch) @ turning
+        if resisted.dtype != object:
+            size = np.linalg.norm(rate) + fastest * (fastest + np.linalg.norm(touch.normal_rate))
+            resisted = _without_round_off(resisted, size)
+        return resisted + self.bend * cross(touch.normal_rate, touch.slide) if self.bend else resisted
 
     def _part_rate(self, touch: Touching) -> Array:
         """Rate of that matrix as the normal turns [1/s]."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.errors import NotUnique
-from proofroll.elements.mechanism.scene.rotations import Array, cross, plain_cross, turned, turned_back
+from proofroll.elements.mechanism.scene.rotations import Array, cross, dot, plain_cross, turned, turned_back
 from proofroll.elements.mechanism.scene.shapes.box_features import BoxSlot, Lying
 from proofroll.elements.mechanism.scene.shapes.capsule_box import CapsuleBoxSlot
 from proofroll.elements.mechanism.scene.shapes.features import Border, CapsuleFeatures, SolidFeatures
@@ -20,6 +20,7 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
     Wall,
 )
 from proofroll.elements.mechanism.scene.shapes.walls import ConeWall, CurvedWall, EdgeLine, Shaft
+from proofroll.elements.mechanism.scene.shapes.walls.formula import sqrt
 
 # Sine of the angle between a disc and its plane, or two capsules, up to which they are parallel: digits of a file.
 FLAT = 1e-9
@@ -312,17 +313,17 @@ def _on_plane(shape: ConvexShape, body: Moving, plane: HalfSpace, wall_body: Mov
     turning = cross(body.w, n) - n_rate  # rate of the direction in the body's frame
     place = body.p + arm
     rate = body.v + cross(body.w, arm) + body.R @ (by_direction @ (body.R.T @ turning))
-    gap = float(n @ (place - wall_body.p - wall_body.R @ plane.point))
+    gap = dot(n, place - wall_body.p - wall_body.R @ plane.point)
     return gap, n, n_rate, place, rate
 
 
 def _two_spheres(sphere_a: SphereShape, a: Moving, sphere_b: SphereShape, b: Moving) -> _Lying:
     centre_a, centre_b = a.p + a.R @ sphere_a.centre, b.p + b.R @ sphere_b.centre
     d, d_rate = centre_a - centre_b, a.velocity(centre_a) - b.velocity(centre_b)
-    distance = float(np.linalg.norm(d))
+    distance = sqrt(dot(d, d))
     length = distance or 1.0  # a trial step may lay one centre on the other, where the normal is zero
     n = d / length
-    n_rate = (d_rate - n * (n @ d_rate)) / length
+    n_rate = (d_rate - n * dot(n, d_rate)) / length
     place, rate = centre_a - sphere_a.radius * n, a.velocity(centre_a) - sphere_a.radius * n_rate
     return distance - sphere_a.radius - sphere_b.radius, n, n_rate, place, rate
 

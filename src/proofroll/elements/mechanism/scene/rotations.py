@@ -30,6 +30,12 @@ def plain_cross(a: Sequence[float], b: Sequence[float]) -> Floats3:
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
+def dot(a: Array, b: Array) -> Any:
+    """Product of two 3-vectors, as a plain float, or as a symbol of symbols."""
+    (x, y, z), (u, v, w) = a.tolist(), b.tolist()
+    return x * u + y * v + z * w
+
+
 def turned(R: Sequence[Sequence[float]], a: Sequence[float]) -> Floats3:
     """Product of a matrix, by its rows, and a vector in plain floats."""
     x, y, z = a

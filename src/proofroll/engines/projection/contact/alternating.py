@@ -100,7 +100,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
 
     @abstractmethod
     def _rates(self, y: Array) -> Array:
-        """Time derivative of x in the present mode."""
+        """Time derivative of y in the present mode."""
 
     def _look(self, y: Array) -> None:
         """Notes a state within the mode; for subclasses."""
@@ -118,7 +118,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
     def _enter(self, t: float, y: Array, mode: ModeT) -> None:
         """Continues in a mode."""
         self.mode = mode
-        self._stepper.begin(t, y, lambda y: np.append(self._rates(y), 1.0), self._accepted, np.ones(len(y)))
+        self._stepper.begin(t, y, self._rates, self._accepted, np.ones(len(y)))
 
     def advance(self, t: float) -> None:
         """Moves to time t [s].

@@ -36,7 +36,6 @@ from proofroll.elements.mechanism.contact.modes import (
 )
 from proofroll.elements.mechanism.contact.rolling_and_spin import (
     TurningFriction,
-    moments_by_pressing,
     opposed_rates,
     pressed_by,
     require_moving,
@@ -51,16 +50,24 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, coefficients_of
 from proofroll.elements.mechanism.scene.signal import breaks, varies
 from proofroll.engines.projection.contact.alternating import AlternatingMotion, Excess, ends_of_efforts
-from proofroll.engines.projection.contact.contacts_there import ContactsThere, landing_together, leaving, refuse_lying
+from proofroll.engines.projection.contact.contacts_there import (
+    ContactsThere,
+    landing_together,
+    leaving,
+    refuse_lying,
+    system_of,
+)
+from proofroll.engines.projection.contact.recorded_modes import RANK, InMode, RecordedMode, recordable
 from proofroll.engines.projection.contact.slip_directions import SlipDirections, balanced, led_direction
 from proofroll.engines.projection.smooth.connections import Bodies
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.smooth.elimination import Space
 from proofroll.engines.projection.smooth.elimination import solved as divided
 
-_RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
 _OVERLAP = 1e-14  # overlap that is round-off, relative to the natural length
 _STANDS = 1e-6  # acceleration, relative to the natural one, too small to start a motion
+_WORTH = 50  # evaluations in a mode after which its equations are recorded, which takes as long as they do
+_NOWHERE: Any = None, None  # last state and motion where there are none
 _REST = 1e-2  # slip speed, relative to gravity times a fixed step, below which slips end together with another one
 
 
@@ -107,6 +114,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._timed = any(map(varies, mechanism.signals))
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._limited = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
+        self._mechanism, self._recordable = mechanism, recordable(mechanism, equations)
+        self._last, self._kinds = _NOWHERE, tuple[str, ...]()
+        self._recorded, self._uses = dict[tuple[str, ...], RecordedMode](), dict[tuple[str, ...], int]()
         start = np.append(equations.start, 0.0)
         self._limit_efforts(start)
         instant = self.at(start)
@@ -133,33 +143,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
         free = equations.solve(x, 0.0, None if equations.coupled else closing)
         spaces = spaces or [equations.tree.space(free.bodies)]
-        moving = self._moving(x, free.bodies)
-        touching = self._touching(x, moving)
-        S, origin = spaces[0].S.reshape(-1, 4, 4), free.bodies.origin
-        J, rate = np.zeros((len(touching), 3, len(S))), np.zeros((len(touching), 3))
-        for k, (contact, point) in enumerate(zip(self._bodies, touching, strict=False)):
-            lever = S[:, :3, :3] @ (point.place - origin) + S[:, :3, 3]
-            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
-                i = self._index[body]
-                if i >= 0:
-                    J[k] += sign * (equations.tree.moves[i][:, None] * lever).T
-                    rate[k] += sign * self._material(x, free, i, moving[body], point)
-        for k, switch in enumerate(self._joints, len(self._bodies)):
-            J[k, :, switch.joint.velocity] = switch.direction
-            rate[k] = switch.direction * free.rates[switch.joint.velocity]
-        fastest = max((float(np.linalg.norm(body.w)) for body in moving.values()), default=0.0)
-        for k, friction in enumerate(self._turning, len(self._bodies) + len(self._joints)):
-            contact, point = self._bodies[friction.pressed_by], touching[friction.pressed_by]
-            spin, spin_rate = np.zeros((3, len(S))), np.zeros(3)
-            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
-                i = self._index[body]
-                if i >= 0:
-                    axes = S[:, [2, 0, 1], [1, 2, 0]]  # of the velocities, from their matrices
-                    spin += sign * (equations.tree.moves[i][:, None] * axes).T
-                    spin_rate += sign * moving[body].R @ free.angular[i]
-            J[k] = friction.resisted(point.normal, spin)
-            relative = moving[contact.body_a].w - moving[contact.body_b].w
-            rate[k] = friction.resisted_rate(point, relative, spin_rate, fastest)
+        moving = self.moving(x, free.bodies)
+        touching = self.touching(x, moving)
+        S = spaces[0].S.reshape(-1, 4, 4)
+        J, rate = self.slides(x, free, S, moving, touching)
         flat = J.reshape(-1, J.shape[2]).T
         if equations.coupled:
             assert equations.split is not None  # of the last solution
@@ -169,7 +156,42 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         response = response.reshape(-1, *J.shape[:2])
         return ContactsThere(touching=touching, J=J, response=response, rate=rate, free=free)
 
-    def _touching(self, x: Array, moving: dict[str, Moving]) -> tuple[Touching, ...]:
+    def slides(
+        self, x: Array, free: SolvedState, S: Array, moving: Mapping[str, Moving], touching: Sequence[Touching]
+    ) -> tuple[Array, Array]:
+        """Derivatives of sliding velocities by ν, (contacts, 3, nv), and their rates without forces, (contacts, 3).
+
+        ``S``: twists of unit velocities, (nv, 4, 4). Of states in symbols, too.
+        """
+        moves = self._equations.tree.moves
+        J, rate = np.zeros((len(touching), 3, len(S)), dtype=x.dtype), np.zeros((len(touching), 3), dtype=x.dtype)
+        for k, (contact, point) in enumerate(zip(self._bodies, touching, strict=False)):
+            lever = S[:, :3, :3] @ (point.place - free.bodies.origin) + S[:, :3, 3]
+            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
+                i = self._index[body]
+                if i >= 0:
+                    J[k] += sign * (moves[i][:, None] * lever).T
+                    rate[k] += sign * self._material(x, free, i, moving[body], point)
+        for k, switch in enumerate(self._joints, len(self._bodies)):
+            J[k, :, switch.joint.velocity] = switch.direction
+            rate[k] = switch.direction * free.rates[switch.joint.velocity]
+        sizes = [] if x.dtype == object else [float(np.linalg.norm(body.w)) for body in moving.values()]
+        fastest = max(sizes, default=0.0)
+        for k, friction in enumerate(self._turning, len(self._bodies) + len(self._joints)):
+            contact, point = self._bodies[friction.pressed_by], touching[friction.pressed_by]
+            spin, spin_rate = np.zeros_like(J[0]), np.zeros_like(rate[0])
+            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
+                i = self._index[body]
+                if i >= 0:
+                    axes = S[:, [2, 0, 1], [1, 2, 0]]  # of the velocities, from their matrices
+                    spin += sign * (moves[i][:, None] * axes).T
+                    spin_rate += sign * moving[body].R @ free.angular[i]
+            J[k] = friction.resisted(point.normal, spin)
+            relative = moving[contact.body_a].w - moving[contact.body_b].w
+            rate[k] = friction.resisted_rate(point, relative, spin_rate, fastest)
+        return J, rate
+
+    def touching(self, x: Array, moving: Mapping[str, Moving]) -> tuple[Touching, ...]:
         """Gap, normal and sliding velocity of each contact."""
         joints = self._equations.watched(x) if self._joints else {}
         pairs = [(moving[contact.body_a], moving[contact.body_b]) for contact in self._bodies]
@@ -181,7 +203,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             *(friction.touching(bodies[k], pairs[k][0].w - pairs[k][1].w) for friction, k in turns),
         )
 
-    def _moving(self, x: Array, bodies: Bodies) -> dict[str, Moving]:
+    def moving(self, x: Array, bodies: Bodies) -> dict[str, Moving]:
         """Motion of the frames of all bodies, and of the world."""
         equations = self._equations
         r, _, v, _ = equations.parts(x)
@@ -240,34 +262,17 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     def _forces_against(self, instant: ContactsThere, mode: ContactMode, headings: Mapping[int, Array]) -> Array:
         """Forces as of :meth:`forces`, where friction of slips acts against given directions."""
         rows, force = self._rows(instant, mode), np.zeros((len(mode), 3))
-        turning = list[tuple[int, int, Array]]()
-        for k, contact in enumerate(self.contacts):
-            if k in headings and not contact.presses:
-                force[k] = -self._bounds[k] * headings[k]
-                if contact.pressed_by is not None:
-                    turning.append((k, contact.pressed_by, -self.friction[k] * headings[k]))
+        for k, heading in headings.items():
+            if not self._presses[k]:
+                force[k] = -self._bounds[k] * heading
         if not rows:
             return force
-        directions = [row - self.friction[k] * headings[k] if k in headings else row for k, row in rows]
-        rate = instant.slide_rate(force)
-        K = np.array([row @ instant.J[k] for k, row in rows])
-        D = np.array([instant.response[:, k] @ direction for (k, _), direction in zip(rows, directions, strict=True)])
-        owned = [(k, direction) for (k, _), direction in zip(rows, directions, strict=True)]
-        moments = moments_by_pressing(turning, owned, [touching.normal for touching in instant.touching])
-        for k, place, moment in moments:
-            D[place] += instant.response[:, k] @ moment
-        targets = [-row @ rate[k] for k, row in rows]
-        for i, (k, row) in enumerate(rows):
-            if mode[k].kind == "slip":
-                targets[i] -= instant.touching[k].normal_rate @ instant.touching[k].slide
-                if row @ instant.J[k] @ D[i] <= 0:
-                    raise Diverged(str(torn(self.contacts[k].name, self.t)))
-        sizes = np.linalg.lstsq(K @ D.T, np.array(targets), rcond=_RANK)[0]
-        for size, (k, direction) in zip(sizes, owned, strict=True):
-            force[k] += size * direction
-        for k, place, moment in moments:
-            force[k] += sizes[place] * moment
-        return force
+        system = system_of(instant, self.contacts, self.friction, headings, rows, instant.slide_rate(force))
+        for (k, _), response in zip(rows, system.matrix.diagonal(), strict=True):
+            if k in headings and response <= 0:
+                raise Diverged(str(torn(self.contacts[k].name, self.t)))
+        sizes = np.linalg.lstsq(system.matrix, system.targets, rcond=RANK)[0]
+        return np.asarray(force + np.einsum("r,rki->ki", sizes, system.pushes))
 
     def _settled(self, y: Array, mode: ContactMode) -> Array:
         """State without velocities that violate closed contacts."""
@@ -278,7 +283,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         K = np.array([row @ instant.J[k] for k, row in rows])
         D = np.array([instant.response[:, k] @ row for k, row in rows])
         left = np.array([row @ instant.touching[k].slide for k, row in rows])
-        return self._pushed(y, -D.T @ np.linalg.lstsq(K @ D.T, left, rcond=_RANK)[0])
+        return self._pushed(y, -D.T @ np.linalg.lstsq(K @ D.T, left, rcond=RANK)[0])
 
     def _pushed(self, y: Array, change: Array) -> Array:
         """State after a change of the velocities ν."""
@@ -292,7 +297,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def sampled(self, joints: int) -> dict[str, Array]:
         """Contact forces [N], (contacts, 3); forces of dry friction and stops along the coordinates of all joints."""
-        force, forces = self.solve()[1], np.full((2, joints), np.nan)
+        force, forces = self._in_mode(self._stepper.x).force, np.full((2, joints), np.nan)
         for contact in self._joints:
             forces[:, contact.joint.number] = 0.0
         along_joints = force[len(self._bodies) : len(force) - len(self._turning)]
@@ -314,8 +319,27 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         }
 
     def _rates(self, y: Array) -> Array:
+        return self._in_mode(y).rates
+
+    def _in_mode(self, y: Array) -> InMode:
+        """Motion in the present mode, by its program if it is worth one; that of the last state is kept."""
+        if y is self._last[0]:
+            known: InMode = self._last[1]
+            return known
+        program = self._recorded.get(self._kinds)
+        if program is None and self._kinds:
+            self._uses[self._kinds] = self._uses.get(self._kinds, 0) + 1
+            if self._uses[self._kinds] == _WORTH:
+                self._recorded[self._kinds] = RecordedMode(self, self._mechanism, self.mode)
+        motion = (program and program.at(y, self._slipping)) or self._in_numpy(y)
+        self._last = y, motion
+        return motion
+
+    def _in_numpy(self, y: Array) -> InMode:
         instant = self.at(y)
-        return self._pushed_rates(y, instant, self.forces(instant, self.mode))
+        force = self.forces(instant, self.mode)
+        rates = np.append(self._pushed_rates(y, instant, force), 1.0)
+        return InMode(rates=rates, touching=instant.touching, force=force)
 
     def _pushed_rates(self, y: Array, instant: ContactsThere, force: Array) -> Array:
         """Time derivative of x with contact forces."""
@@ -324,7 +348,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     def _look(self, y: Array) -> None:
         """Stores the directions of slips, to detect reversals."""
         x = y[:-1]
-        moving = self._moving(x, self._equations.bodies(x))
+        if self._kinds in self._recorded:
+            touching = self._in_mode(y).touching
+        else:
+            touching = self.touching(x, self.moving(x, self._equations.bodies(x)))
 
         def leading(k: int) -> Array:
             instant = self.at(y)
@@ -333,34 +360,37 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             gentle = self._rubs[k] and balanced(rate(headings[k]), rate(-headings[k]))
             return led_direction(headings[k], instant.touching[k].normal, rate) if gentle else np.zeros(3)
 
-        self._slipping.look(float(y[-1]), self.mode, self._touching(x, moving), leading)
+        self._slipping.look(float(y[-1]), self.mode, touching, leading)
+        if any(acting.kind == "slip" for acting in self.mode):
+            self._last = _NOWHERE  # their directions are others now
 
     def _enter(self, t: float, x: Array, mode: ContactMode) -> None:
         opened = [k for k, acting in enumerate(mode) if acting.kind == "open" and self.mode[k].kind != "open"]
         if opened:
             gaps = np.array([touching.gap for touching in self.at(x).touching])
             self._overlap[opened] = np.maximum(-gaps[opened], 0.0) + _OVERLAP * self._length
-        x, self.mode = self._settled(x, mode), mode
+        x, self.mode, self._last = self._settled(x, mode), mode, _NOWHERE
+        plain = self._recordable and all(acting.along is None for acting in mode)
+        self._kinds = tuple(acting.kind for acting in mode) if plain else ()
         self._slipping.begin(mode)
         self._look(x)
         super()._enter(t, x, mode)
 
     def _excess(self, x: Array) -> list[Excess]:
-        instant = self.at(x)
-        force, ends = self.forces(instant, self.mode), list[Excess]()
+        (_, touching, force), ends = self._in_mode(x), list[Excess]()
         decided_mode: ContactMode = ()
         stops = [isinstance(item, JointContact) and item.presses for item in self.contacts]
         shared = sum(
             acting.kind == "stick" or (acting.kind == "slip" and s) for acting, s in zip(self.mode, stops, strict=True)
         )
-        for k, (acting, item) in enumerate(zip(self.mode, instant.touching, strict=True)):
+        for k, (acting, item) in enumerate(zip(self.mode, touching, strict=True)):
             by = self.contacts[k].pressed_by
             if acting.kind == "open":
                 if by is None:
                     size = -item.gap - self._overlap[k]
                     ends.append(Excess(k, EventKind.IMPACT, size, -float(item.normal @ item.slide)))
                 continue
-            N = float((item if by is None else instant.touching[by]).normal @ force[k if by is None else by])
+            N = float((item if by is None else touching[by]).normal @ force[k if by is None else by])
             if self._presses[k]:
                 ends.append(Excess(k, EventKind.LIFT_OFF, -N))
             if acting.kind == "slip" and self._rubs[k]:
@@ -371,12 +401,14 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                 if beyond > 0 and shared > 1:
                     # forces shared by several contacts are not unique: others may hold what this one cannot
                     decided_mode = decided_mode or self._decided(
-                        instant,
+                        self.at(x),
                         [part.kind != "open" for part in self.mode],
                         [part.kind == "stick" for part in self.mode],
                     )
                     beyond = -beyond if decided_mode[k].kind == "stick" else beyond
                 ends.append(Excess(k, EventKind.SLIP, beyond))
+        if not self._limited:
+            return ends
         modes, efforts = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
         return ends + ends_of_efforts(self._limited.values(), modes, efforts, len(self.mode))
 

@@ -1,7 +1,7 @@
 """Contacts at a state of a tree, and how they respond to forces."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,6 +44,56 @@ class ContactsThere(NamedTuple):
         J = np.concatenate([frame.T @ self.J[k] for frame, k in zip(frames, which, strict=True)])
         response = np.concatenate([self.response[:, k] @ frame for frame, k in zip(frames, which, strict=True)], 1)
         return frames, J, response
+
+
+class ContactSystem(NamedTuple):
+    """Equations of the unknown forces by which closed contacts are held, one in each row.
+
+    Attributes:
+        pushes: forces on body a of each contact by a unit of each unknown, (rows, contacts, 3); of friction against
+            turning moments.
+        changes: of ν̇ by a unit of each unknown, (rows, nv).
+        matrix, targets: the equations, (rows, rows) and (rows,).
+    """
+
+    pushes: Array
+    changes: Array
+    matrix: Array
+    targets: Array
+
+
+def system_of(
+    instant: ContactsThere,
+    contacts: Sequence[Any],
+    friction: Array,
+    headings: Mapping[int, Array],
+    rows: Sequence[tuple[int, Array]],
+    rate: Array,
+) -> ContactSystem:
+    """Equations of the forces of closed contacts, in floats or symbols.
+
+    Args:
+        instant: contacts at a state.
+        contacts: all of them.
+        friction: their coefficients.
+        headings: direction of each slip.
+        rows: directions in which contacts are held, with their contact; of a slip its normal.
+        rate: rate of each sliding velocity without these forces, (contacts, 3).
+    """
+    pushes, touching = np.zeros((len(rows), len(contacts), 3), dtype=rate.dtype), instant.touching
+    targets = np.zeros(len(rows), dtype=rate.dtype)
+    for i, (k, row) in enumerate(rows):
+        pushes[i, k], targets[i] = row, -row @ rate[k]
+        if k in headings:
+            pushes[i, k] = row - friction[k] * headings[k]
+            targets[i] -= touching[k].normal_rate @ touching[k].slide
+        for turning, heading in headings.items():
+            if contacts[turning].pressed_by == k:
+                pushes[i, turning] = heading * (-friction[turning] * (pushes[i, k] @ touching[k].normal))
+    K = np.reshape([row @ instant.J[k] for k, row in rows], (len(rows), instant.J.shape[2]))
+    flat = pushes.reshape(len(rows), 3 * len(contacts))
+    changes = flat @ instant.response.reshape(K.shape[1], 3 * len(contacts)).T
+    return ContactSystem(pushes=pushes, changes=changes, matrix=K @ changes.T, targets=targets)
 
 
 def landing_together(

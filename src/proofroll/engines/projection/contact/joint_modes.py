@@ -117,7 +117,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         super()._enter(t, y, mode)
 
     def _rates(self, y: Array) -> Array:
-        return self._equations.rates(self._at(y), self._push, self._held)
+        return np.append(self._equations.rates(self._at(y), self._push, self._held), 1.0)
 
     def _joint_state(self, y: Array) -> tuple[Array, Array]:
         """Coordinates and velocities of the switched joints, exact where held."""

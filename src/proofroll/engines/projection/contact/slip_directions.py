@@ -97,6 +97,12 @@ class SlipDirections:
         """True if forces lead a slip in this step."""
         return self._led[k]
 
+    def goes_on(self, k: int, slip: Sequence[float]) -> bool:
+        """True if a slip has the direction of its velocity [m/s]: it does not end, and forces do not lead it."""
+        (x, y, z), (u, v, w) = slip, self._toward[k].tolist()
+        ends = self._last_step[k] or self._led[k] or math.hypot(x, y, z) <= self._still[k]
+        return not ends and x * u + y * v + z * w >= 0
+
     def passed(self, k: int, touch: Touching) -> float:
         """Speed against the direction at the start of the step [m/s]; positive: the slip has ended."""
         return -float(slip_velocity(touch) @ self._toward[k])

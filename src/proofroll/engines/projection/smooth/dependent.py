@@ -224,7 +224,7 @@ class DependentCoordinates:
 
     def pushed(self, x: Array, change: Array) -> Array:
         """State after a change of the velocities ν, (nv,)."""
-        linear, angular = self._of_bodies(self.bodies(x), change)
+        linear, angular = self.of_bodies(self.bodies(x), change)
         x = x.copy()
         _, _, v, w = self.parts(x)
         v += linear
@@ -234,10 +234,10 @@ class DependentCoordinates:
     def pushed_rates(self, x: Array, free: SolvedState, change: Array) -> Array:
         """Time derivative ẋ after a change of the accelerations ν̇, (nv,), of a solution at x."""
         _, q, v, w = self.parts(x)
-        linear, angular = self._of_bodies(free.bodies, change)
+        linear, angular = self.of_bodies(free.bodies, change)
         return _joined(v, quaternion_rates(q, w), free.linear + linear, free.angular + angular)
 
-    def _of_bodies(self, bodies: Bodies, velocities: Array) -> tuple[Array, Array]:
+    def of_bodies(self, bodies: Bodies, velocities: Array) -> tuple[Array, Array]:
         """Velocities and angular velocities (own axes) of the bodies for velocities ν, (bodies, 3) each."""
         motion = self.tree.twists(bodies, velocities)[:-1]
         pose, inverse = bodies.pose[:-1], bodies.inverse[:-1]

@@ -51,7 +51,7 @@ class Recursion(Elimination):
             for k in reversed(self._velocities[number]):
                 U = solid @ S[k]
                 D = S[k] @ U + self.armature[k]
-                rate = (push @ S[k] + drives[k]) / D
+                rate = (push @ S[k] + drives[..., k]) / D
                 parts[k] = U / D, rate
                 solid, push = solid - np.outer(U, U / D), push - np.multiply.outer(rate, U)
             if parent != self._world:

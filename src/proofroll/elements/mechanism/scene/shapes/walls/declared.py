@@ -216,6 +216,8 @@ class DeclaredWall(CurvedWall):
 
     @override
     def seen(self, x: float, y: float, z: float) -> Seen:
+        if not isinstance(x + y + z, float):
+            return super().seen(x, y, z)
         k = self.metre
         distance, *parts = _field(self.surface)[0](x / k, y / k, z / k)
         if not math.isfinite(sum(parts)):

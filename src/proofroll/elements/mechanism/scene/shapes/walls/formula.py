@@ -9,10 +9,13 @@ plain assignments, which costs a tenth of jets of numbers.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+
+_NAMES = re.compile(r"\bn\d+\b")  # of results
 
 
 @runtime_checkable
@@ -146,52 +149,102 @@ def _applied(name: str, x: Any) -> Any:
 
 
 class _Symbol:
-    """An unknown number in a recorded program; ``program`` maps each formula to the name of its result."""
+    """An unknown number in a :class:`Program`: the name of a result, or that number with the other sign."""
 
-    __slots__ = ("program", "text")
+    __slots__ = ("name", "negative", "steps")
 
-    def __init__(self, program: dict[str, str], text: str) -> None:
-        self.program, self.text = program, text
+    def __init__(self, steps: dict[str, str], name: str, negative: bool = False) -> None:
+        self.steps, self.name, self.negative = steps, name, negative
 
-    def noted(self, formula: str) -> _Symbol:
+    @property
+    def text(self) -> str:
+        """The number in a formula."""
+        return f"-{self.name}" if self.negative else self.name
+
+    def noted(self, formula: str, negative: bool = False) -> _Symbol:
         """Result of a formula as a symbol; a repeated formula is recorded once."""
-        return _Symbol(self.program, self.program.setdefault(formula, f"n{len(self.program)}"))
+        return _Symbol(self.steps, self.steps.setdefault(formula, f"n{len(self.steps)}"), negative)
 
     def __add__(self, other: Any) -> Any:
-        return self if _is(other, 0) else self.noted(f"{self.text} + {_text(other)}")
+        if _is(other, 0):
+            return self
+        name, negative = _signed(other)
+        if negative == self.negative:
+            return self.noted(" + ".join(sorted((self.name, name))), negative)
+        if name == self.name:
+            return 0.0
+        first, second = sorted((self.name, name))  # so that a - b and b - a are one result
+        return self.noted(f"{first} - {second}", self.negative == (first == self.name))
 
     def __mul__(self, other: Any) -> Any:
         if _is(other, 0):
             return 0.0
-        return self if _is(other, 1) else self.noted(f"{self.text} * {_text(other)}")
+        name, negative = _signed(other)
+        negative = negative != self.negative
+        if _is(other, 1) or _is(other, -1):
+            return _Symbol(self.steps, self.name, negative)
+        return self.noted(" * ".join(sorted((self.name, name))), negative)
 
     __radd__, __rmul__ = __add__, __mul__
 
     def __neg__(self) -> Any:
-        return self.noted(f"-{self.text}")
+        return _Symbol(self.steps, self.name, not self.negative)
 
     def __sub__(self, other: Any) -> Any:
-        return self if _is(other, 0) else self.noted(f"{self.text} - {_text(other)}")
+        return self.__add__(-other)
 
     def __rsub__(self, other: Any) -> Any:
-        return self.noted(f"{_text(other)} - {self.text}")
+        return (-self).__add__(other)
 
     def __pow__(self, power: int) -> Any:
-        return self.noted(f"{self.text} ** {power:d}")
+        return self.noted(f"{self.name} ** {power:d}", self.negative and power % 2 == 1)
 
     def __truediv__(self, other: Any) -> Any:
-        return self.noted(f"{self.text} / {_text(other)}")
+        name, negative = _signed(other)
+        return self.noted(f"{self.name} / {name}", negative != self.negative)
 
     def __rtruediv__(self, other: Any) -> Any:
-        return 0.0 if _is(other, 0) else self.noted(f"{_text(other)} / {self.text}")
+        name, negative = _signed(other)
+        return 0.0 if _is(other, 0) else self.noted(f"{name} / {self.name}", negative != self.negative)
 
 
 def _is(x: Any, number: int) -> bool:
     return isinstance(x, (int, float)) and x == number
 
 
-def _text(x: Any) -> str:
-    return x.text if isinstance(x, _Symbol) else f"({float(x)!r})"
+def _signed(x: Any) -> tuple[str, bool]:
+    """Name of a symbol, or absolute value of a number, and True if it is negative."""
+    return (x.name, x.negative) if isinstance(x, _Symbol) else (f"{abs(float(x))!r}", math.copysign(1.0, x) < 0)
+
+
+class Program:
+    """Operations on symbols, recorded as plain assignments.
+
+    Attributes:
+        symbols: the arguments.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._steps: dict[str, str] = {}
+        self.symbols = [_Symbol(self._steps, f"x{k}") for k in range(count)]
+
+    def functions(self, results: Sequence[Any], *kinds: Any) -> list[Callable[..., tuple[Any, ...]]]:
+        """Function of the arguments that returns the results, with the elementary functions of each module given."""
+        texts = ["-" * negative + name for name, negative in map(_signed, results)]
+        formulas = {name: formula for formula, name in self._steps.items()}
+        needed, waiting = set[str](), _NAMES.findall(" ".join(texts))
+        while waiting:
+            name = waiting.pop()
+            if name not in needed:
+                needed.add(name)
+                waiting += _NAMES.findall(formulas[name])
+        steps = "".join(f"    {name} = {formula}\n" for name, formula in formulas.items() if name in needed)
+        arguments = ", ".join(symbol.name for symbol in self.symbols)
+        source = f"def calculated({arguments}):\n{steps}    return {', '.join(texts)},\n"
+        scopes = [{name: getattr(kind, name) for name in ("sqrt", "sin", "cos")} for kind in kinds]
+        for scope in scopes:
+            exec(source, scope)  # only the arithmetic recorded above
+        return [scope["calculated"] for scope in scopes]
 
 
 def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -199,19 +252,11 @@ def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..
 
     ``formula`` takes ``count`` numbers and returns one or a tuple of them. Where it is undefined, the values are NaN.
     """
-    program: dict[str, str] = {}
-    symbols = [f"x{i}" for i in range(count)]
-    results = formula(*variables(*(_Symbol(program, name) for name in symbols)))
-    parts = []
+    program, parts = Program(count), []
+    results = formula(*variables(*program.symbols))
     for result in results if isinstance(results, tuple) else (results,):
-        flat = result.parts if isinstance(result, Jet) else [result] + [0.0] * (count + count * (count + 1) // 2)
-        parts += [_text(part) for part in flat]
-    steps = "".join(f"    {name} = {text}\n" for text, name in program.items())
-    source = f"def calculated({', '.join(symbols)}):\n{steps}    return {', '.join(parts)},\n"
-    of_floats, of_arrays = ({name: getattr(kind, name) for name in ("sqrt", "sin", "cos")} for kind in (math, np))
-    for names in (of_floats, of_arrays):
-        exec(source, names)  # only the arithmetic recorded above
-    plain, missing = of_floats["calculated"], (math.nan,) * len(parts)
+        parts += result.parts if isinstance(result, Jet) else [result] + [0.0] * (count + count * (count + 1) // 2)
+    (plain, of_arrays), missing = program.functions(parts, math, np), (math.nan,) * len(parts)
 
     def floats(*place: float) -> Any:
         try:
@@ -221,6 +266,6 @@ def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..
 
     def arrays(*place: Any) -> Any:
         with np.errstate(invalid="ignore", divide="ignore"):
-            return of_arrays["calculated"](*place)
+            return of_arrays(*place)
 
     return floats, arrays

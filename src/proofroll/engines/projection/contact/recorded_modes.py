@@ -1,0 +1,156 @@
+"""Equations of motion in one mode of few contacts, recorded as plain assignments.
+
+The formulas of the numpy solver are evaluated once on symbols of :mod:`.formula`. The program that comes out has as
+many operations as the mode needs, and costs a tenth of numpy's calls for arrays of three numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from operator import mul
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.modes import ContactMode, slip_velocity
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.dynamics.switches import switched_joints
+from proofroll.elements.mechanism.scene.rotations import Array, plain_cross
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
+from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
+from proofroll.elements.mechanism.scene.shapes.walls import ConeWall, CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls.formula import Program, sqrt
+from proofroll.engines.projection.contact.contacts_there import ContactsThere, system_of
+from proofroll.engines.projection.contact.slip_directions import SlipDirections
+from proofroll.engines.projection.smooth.dependent import DependentCoordinates, quaternion_rates
+from proofroll.engines.projection.smooth.elimination import Loads
+from proofroll.engines.projection.smooth.recursion import Recursion
+
+if TYPE_CHECKING:
+    from proofroll.engines.projection.contact.contact_modes import ContactMotion
+
+_MOST = 6  # bodies and contacts together: a longer program costs more than numpy
+RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
+_INDEPENDENT = 1e-4  # volume of three independent rows, relative to the product of their lengths
+
+
+class InMode(NamedTuple):
+    """Motion in a mode at a state.
+
+    Attributes:
+        rates: ẏ.
+        touching: geometry of the contacts.
+        force: on body a of each contact [N], of friction against turning moments [N m], (contacts, 3).
+    """
+
+    rates: Array
+    touching: Sequence[Touching]
+    force: Array
+
+
+def recordable(mechanism: Mechanism, equations: DependentCoordinates) -> bool:
+    """True for a tree of few bodies under weight alone, whose contacts are of spheres, planes and walls by formulas."""
+    applied, few = equations.applied, len(mechanism.bodies) + len(mechanism.contacts) <= _MOST
+    joints = mechanism.loops or mechanism.couplings or mechanism.prescribed or switched_joints(mechanism)
+    forces = mechanism.actuators or applied.laws or applied.of_points or applied.remembers
+    return few and not joints and not forces and all(map(_has_formula, mechanism.contacts))
+
+
+def _has_formula(contact: BodyContact) -> bool:
+    shapes = contact.shape_a, contact.shape_b
+    if contact.features is not None or contact.box_slot is not None or contact.spinning_friction:
+        return False
+    walls = [shape for shape in shapes if not isinstance(shape, SphereShape)]
+    return len(walls) < len(shapes) and all(map(_is_plain, walls))
+
+
+def _is_plain(shape: Any) -> bool:
+    curved = isinstance(shape, CurvedWall) and shape.has_formula and not isinstance(shape, ConeWall)
+    return curved or isinstance(shape, HalfSpace)
+
+
+class RecordedMode:
+    """Program of the equations of motion in a mode.
+
+    The forces that hold closed contacts are solved for outside of it, as their rows may depend on each other.
+    """
+
+    def __init__(self, motion: ContactMotion, mechanism: Mechanism, mode: ContactMode) -> None:
+        """Takes a motion whose mechanism is :func:`recordable`, and a mode without lines of slips."""
+        equations = DependentCoordinates(mechanism, Recursion)
+        program = Program(len(equations.start))
+        parts = _formulas(motion, equations, len(mechanism.joints), mode, np.array(program.symbols, dtype=object))
+        flat = [np.asarray(part, dtype=object) for part in parts]
+        ends = np.cumsum([part.size for part in flat]).tolist()
+        self._parts = [(slice(end - part.size, end), part.shape) for end, part in zip(ends, flat, strict=True)]
+        (self._program,) = program.functions([item for part in flat for item in part.ravel().tolist()], math)
+        self._accelerations = slice(7 * len(equations.mass), 13 * len(equations.mass))
+        self._slips = [k for k, acting in enumerate(mode) if acting.kind == "slip"]
+
+    def at(self, y: Array, slipping: SlipDirections) -> InMode | None:
+        """Motion at a state, the time last; None where a slip has no direction of its own, a wall no normal."""
+        try:
+            flat = np.array(self._program(*y.tolist()[:-1]))
+        except ArithmeticError:
+            return None
+        rates, by_unknown, matrix, targets, pushes, numbers = [flat[part].reshape(shape) for part, shape in self._parts]
+        touching = [Touching(p[0], p[1:4], p[4:7], p[7:10], p[10:13], p[13:16]) for p in numbers]
+        if not all(slipping.goes_on(k, slip_velocity(touching[k]).tolist()) for k in self._slips):
+            return None
+        if self._slips and min(matrix.diagonal().tolist(), default=1.0) <= 0.0:  # torn
+            return None
+        unknown = _solved(matrix, targets)
+        rates[self._accelerations] += by_unknown @ unknown
+        return InMode(rates=rates, touching=touching, force=(pushes @ unknown).reshape(-1, 3))
+
+
+def _formulas(
+    motion: ContactMotion, equations: DependentCoordinates, joints: int, mode: ContactMode, x: Array
+) -> list[Any]:
+    """Rates without the unknown forces, accelerations by each, their equations, forces, and geometry of contacts."""
+    free, nv = equations.solve(x), equations.nv
+    S, moving = equations.tree.directions(free.bodies), motion.moving(x, free.bodies)
+    touching = motion.touching(x, moving)
+    J, rate = motion.slides(x, free, S, moving, touching)
+    still, drives = np.zeros((3 * len(mode), joints, 16)), J.reshape(-1, nv)
+    by_force = equations.tree.motions(free.bodies, still, Loads(drives=drives))[1]
+    response = by_force.T.reshape(nv, *J.shape[:2])
+    instant = ContactsThere(touching=touching, J=J, response=response, rate=rate, free=free)
+    headings, rows = dict[int, Array](), list[tuple[int, Array]]()
+    for k, (acting, contact, point) in enumerate(zip(mode, motion.contacts, touching, strict=True)):
+        if acting.kind == "slip":
+            slip = slip_velocity(point)
+            headings[k] = slip / sqrt(slip @ slip)
+            rows += [(k, point.normal)] * contact.presses
+        elif acting.kind == "stick":
+            rows += [(k, row) for row in np.eye(3)]  # of friction against turning one of them holds nothing
+    system = system_of(instant, motion.contacts, motion.friction, headings, rows, rate)
+    count, (_, q, v, w) = len(rows), equations.parts(x)
+    bodies = [np.concatenate([*map(np.ravel, equations.of_bodies(free.bodies, change))]) for change in system.changes]
+    rates = v, quaternion_rates(q, w), free.linear, free.angular, np.ones(1)
+    numbers = [np.append(point.gap, np.concatenate(point[1:6])) for point in touching]
+    return [
+        np.concatenate([part.ravel() for part in rates]),
+        np.reshape(bodies, (count, 6 * len(v))).T,
+        system.matrix,
+        system.targets,
+        system.pushes.reshape(count, 3 * len(mode)).T,
+        np.array(numbers),
+    ]
+
+
+def _solved(A: Array, b: Array) -> Array:
+    """Solution of A x = b, of least length where rows depend on each other; by Cramer's rule for one or three."""
+    if not len(b):
+        return b
+    if len(b) == 1 and A[0, 0]:
+        return np.asarray(b / A[0])
+    if len(b) == 3:
+        a0, a1, a2 = A.T.tolist()
+        normal = plain_cross(a1, a2)
+        volume, sizes = sum(map(mul, a0, normal)), [math.hypot(*a) for a in (a0, a1, a2)]
+        if abs(volume) > _INDEPENDENT * math.prod(sizes):
+            return np.asarray(np.array([normal, plain_cross(a2, a0), plain_cross(a0, a1)]) @ b / volume)
+    return np.asarray(np.linalg.lstsq(A, b, rcond=RANK)[0])
