@@ -81,6 +81,7 @@ class Touching(NamedTuple):
         return self.tilt <= FLAT
 
 
+AT_REST = Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))  # as the world is
 ONE_POINT = "stands on its whole edge, of which this formulation has one point, so that it tips; give it three spheres"
 
 

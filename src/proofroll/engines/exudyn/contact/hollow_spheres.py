@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism.scene.rotations import Array, Floats3, turned_back
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, PlacedWall
+from proofroll.elements.mechanism.scene.shapes.walls.curved import UPPER, CurvedWall, PlacedWall
 from proofroll.engines.exudyn.native import Output, exu
 
 # Radius of the hollow sphere in radii of the ball where the wall is not curved. The larger it is, the less its normal
@@ -98,9 +98,9 @@ def hollow_radius(wall: CurvedWall, sphere: Array, of_sphere: float) -> float:
     Of a wall that is not curved there it is :data:`ON_A_PLANE` radii, or more for a sphere that starts far from it.
     """
     place = wall.frame.T @ (sphere - wall.point)
-    near = wall.near(place)
-    gap = max(near.distance - of_sphere, 0.0)
-    touching = wall.near(place - gap * near.normal)
-    most = float(np.linalg.eigvalsh(-touching.bend)[-1])  # of the surface on which the centre moves
+    distance, normal, _ = wall.seen(*place.tolist())
+    gap = max(distance - of_sphere, 0.0)
+    bend = np.array(wall.seen(*(place - gap * np.array(normal)).tolist())[2])[UPPER]
+    most = float(np.linalg.eigvalsh(-bend)[-1])  # of the surface on which the centre moves
     flat = max(of_sphere * ON_A_PLANE, of_sphere + 2 * gap)
     return flat if most * flat <= 1 else of_sphere + 1 / most

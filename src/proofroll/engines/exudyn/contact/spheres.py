@@ -29,7 +29,8 @@ from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismS
 from proofroll.elements.mechanism.scene.rotations import Array, Floats3, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, PlacedWall
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls.curved import PlacedWall
 from proofroll.engines.exudyn.contact.hollow_spheres import HollowSphere, MovingPlane, hollow_centre, hollow_radius
 from proofroll.engines.exudyn.contact.turning import add_turning
 from proofroll.engines.exudyn.native import Output, exu, items

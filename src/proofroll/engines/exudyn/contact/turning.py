@@ -6,6 +6,7 @@ five times as many calls.
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
@@ -53,7 +54,7 @@ def add_turning(
         x, y, z = plain_cross(normal, (x, y, z))
         return bend * x, bend * y, bend * z
 
-    def moment(sign: float) -> list[float]:
+    def moment(sign: float, *_state: Any) -> list[float]:
         """Moment on a body in the world [N m]; ``sign``: 1 for body a, -1 for body b."""
         N, normal = pressing()
         if N <= 0.0:
@@ -65,13 +66,7 @@ def add_turning(
         scale = -sign * coefficient * N / max(math.hypot(x, y, z), zone)
         return [scale * x, scale * y, scale * z]
 
-    def load(sign: float) -> Callable[[Any, float, Any], list[float]]:
-        return lambda _system, _time, _constant: moment(sign)
-
     for marker, sign in ((marker_a, 1.0), (marker_b, -1.0)):
         if marker is not None:
-            system.AddLoad(
-                items.LoadTorqueVector(
-                    markerNumber=marker, loadVector=[0.0, 0.0, 0.0], loadVectorUserFunction=load(sign)
-                )
-            )
+            load = partial(moment, sign)
+            system.AddLoad(items.LoadTorqueVector(markerNumber=marker, loadVector=[0] * 3, loadVectorUserFunction=load))

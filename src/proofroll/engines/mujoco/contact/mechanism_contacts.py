@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.contact.touching import Moving, touch
+from proofroll.elements.mechanism.contact.touching import AT_REST, Moving, touch
 from proofroll.elements.mechanism.run.sampling import DEPENDENT
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis, to_quaternion
 from proofroll.elements.mechanism.scene.shapes.box_features import CORNERS, BoxSlot
@@ -208,7 +208,7 @@ class Contacts:
         self._bodies = [
             (model.body(contact.body_a).id, model.body(contact.body_b).id) for contact in mechanism.contacts
         ]
-        self._world, self._rate = Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3)), np.zeros((3, model.nv))
+        self._rate = np.zeros((3, model.nv))
         self._normal_rows: dict[int, list[Array]] = {}
         curved = {k for k, contact in enumerate(mechanism.contacts) if curved_end(contact) is not None}
         self._turned = curved if settings.curvature else set()
@@ -391,7 +391,7 @@ class Contacts:
     def _moving(self, data: Any, body: int) -> Moving:
         """Motion of a body as of the last computation of velocities."""
         if not body:
-            return self._world
+            return AT_REST
         twist = np.zeros(6)
         mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
         return Moving(data.xpos[body], data.xmat[body].reshape(3, 3), twist[3:], twist[:3])

@@ -16,7 +16,7 @@ from proofroll.elements.mechanism import Mechanism, Tree
 from proofroll.elements.mechanism.scene.rotations import Array, quaternion_from_z, turned, turned_back
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Shape, SphereShape
-from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall, PlacedWall
+from proofroll.elements.mechanism.scene.shapes.walls.curved import CurvedWall, PlacedWall
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 

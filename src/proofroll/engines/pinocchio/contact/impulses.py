@@ -7,7 +7,7 @@ contacts separate.
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import accumulate
+from itertools import accumulate, pairwise, starmap
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ import pinocchio as pin
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers
 from proofroll.elements.mechanism.contact.start import natural_scale
-from proofroll.elements.mechanism.contact.touching import ONE_POINT, Moving, Touching, touch
+from proofroll.elements.mechanism.contact.touching import AT_REST, ONE_POINT, Moving, Touching, touch
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
@@ -157,15 +157,10 @@ class ImpulseSteps:
         self._moments = TurningImpulses(tree, float(settings.solver_tolerance or 0.0))
         self._pressed_by = [friction.pressed_by for friction in self._moments.frictions]
         self._solvers: dict[tuple[int, ...], _Solver] = {}
-        count, nv = len(self.contacts), tree.model.nv
-        self._all = tuple(range(count))
-        # of each contact and joint row: numbers of its rows
-        self._rows = [range(3 * k, 3 * k + 3) for k in self._all]
-        self._rows += [range(3 * count + k, 3 * count + k + 1) for k in range(len(self.joints.J))]
-        self._upper, self._world = (
-            np.triu(np.ones((nv, nv), dtype=bool)),
-            Moving(np.zeros(3), np.eye(3), *np.zeros((2, 3))),
-        )
+        nv, self._all = tree.model.nv, tuple(range(len(self.contacts)))
+        ends = list(accumulate([3] * len(self.contacts) + [1] * len(self.joints.J), initial=0))
+        self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
+        self._upper = np.triu(np.ones((nv, nv), dtype=bool))
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
         try:
@@ -318,7 +313,7 @@ class ImpulseSteps:
     def _moving(self, data: Any, body: str) -> Moving:
         k = self._index[body]
         if k < 0:
-            return self._world
+            return AT_REST
         frame = self._tree.body[k]
         velocity, pose = self._tree.velocity(data, frame), data.oMf[frame]
         return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)

@@ -43,7 +43,7 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import (
     turning_frictions,
 )
 from proofroll.elements.mechanism.contact.start import closed_and_still, natural_scale, start_digits
-from proofroll.elements.mechanism.contact.touching import Moving, Touching, torn, touch
+from proofroll.elements.mechanism.contact.touching import AT_REST, Moving, Touching, torn, touch
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -207,7 +207,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         """Motion of the frames of all bodies, and of the world."""
         equations = self._equations
         r, _, v, _ = equations.parts(x)
-        moving = {"world": Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))}
+        moving = {"world": AT_REST}
         for name, i in self._index.items():
             if i >= 0:
                 R, w = bodies.rotation[i], bodies.spin[i]

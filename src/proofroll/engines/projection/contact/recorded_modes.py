@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from operator import mul
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.modes import ContactMode, slip_velocity
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
-from proofroll.elements.mechanism.scene.rotations import Array, plain_cross
+from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import ConeWall, CurvedWall
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 
 _MOST = 6  # bodies and contacts together: a longer program costs more than numpy
 RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
-_INDEPENDENT = 1e-4  # volume of three independent rows, relative to the product of their lengths
+_INDEPENDENT = 1e-6  # smallest pivot of independent rows, relative to the largest
 
 
 class InMode(NamedTuple):
@@ -142,15 +141,11 @@ def _formulas(
 
 
 def _solved(A: Array, b: Array) -> Array:
-    """Solution of A x = b, of least length where rows depend on each other; by Cramer's rule for one or three."""
+    """Solution of A x = b, of least length where rows depend on each other."""
+    from scipy.linalg.lapack import dgesv  # imported here, as balls do not need it
+
     if not len(b):
         return b
-    if len(b) == 1 and A[0, 0]:
-        return np.asarray(b / A[0])
-    if len(b) == 3:
-        a0, a1, a2 = A.T.tolist()
-        normal = plain_cross(a1, a2)
-        volume, sizes = sum(map(mul, a0, normal)), [math.hypot(*a) for a in (a0, a1, a2)]
-        if abs(volume) > _INDEPENDENT * math.prod(sizes):
-            return np.asarray(np.array([normal, plain_cross(a2, a0), plain_cross(a0, a1)]) @ b / volume)
-    return np.asarray(np.linalg.lstsq(A, b, rcond=RANK)[0])
+    pivots, _, solution, _ = dgesv(A, b)
+    sizes = np.abs(pivots.diagonal()).tolist()
+    return np.asarray(solution if min(sizes) > _INDEPENDENT * max(sizes) else np.linalg.lstsq(A, b, rcond=RANK)[0])

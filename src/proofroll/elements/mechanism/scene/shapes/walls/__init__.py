@@ -1,6 +1,6 @@
 """Curved walls that spheres touch, each given by the distance of a place from it, in its own axes."""
 
-from proofroll.elements.mechanism.scene.shapes.walls.curved import CurvedWall, PlacedWall
+from proofroll.elements.mechanism.scene.shapes.walls.curved import CurvedWall
 from proofroll.elements.mechanism.scene.shapes.walls.declared import Declared, DeclaredWall
 from proofroll.elements.mechanism.scene.shapes.walls.of_revolution import (
     Bore,
@@ -11,15 +11,4 @@ from proofroll.elements.mechanism.scene.shapes.walls.of_revolution import (
     TorusWall,
 )
 
-__all__ = [
-    "Bore",
-    "BowlWall",
-    "ConeWall",
-    "CurvedWall",
-    "Declared",
-    "DeclaredWall",
-    "EdgeLine",
-    "PlacedWall",
-    "Shaft",
-    "TorusWall",
-]
+__all__ = ["Bore", "BowlWall", "ConeWall", "CurvedWall", "Declared", "DeclaredWall", "EdgeLine", "Shaft", "TorusWall"]

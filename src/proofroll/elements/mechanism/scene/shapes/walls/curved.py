@@ -6,31 +6,18 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
 from proofroll.elements.mechanism.scene.rotations import Array, Floats3, frame_of_axis, turned, turned_back
 from proofroll.elements.mechanism.scene.shapes.walls.formula import differentiated, variables
 
-_UPPER = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # places of a symmetric matrix in its upper half, row by row
+UPPER = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # places of a symmetric matrix in its upper half, row by row
 NO_NORMAL, NO_BEND = (0.0, 0.0, 0.0), (0.0,) * 6
-# Distance [m], normal, and upper half of its gradient row by row [1/m].
+# A wall as seen from a place, in its own axes: distance [m], negative within the material; unit normal away from it,
+# the gradient of the distance; upper half of the normal's gradient, row by row [1/m].
 Seen = tuple[float, Sequence[float], Sequence[float]]
-
-
-class Near(NamedTuple):
-    """A wall as seen from a place, in the wall's axes.
-
-    Attributes:
-        distance: of the place from the wall [m]; negative within the material.
-        normal: unit vector away from the wall, the gradient of the distance.
-        bend: gradient of the normal [1/m], (3, 3).
-    """
-
-    distance: float
-    normal: Array
-    bend: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +34,7 @@ class CurvedWall:
 
     @property
     def has_formula(self) -> bool:
-        """True if :meth:`away` is a formula; if not, :meth:`near` searches the nearest point."""
+        """True if :meth:`away` is a formula; if not, :meth:`seen` searches the nearest point."""
         return True
 
     def away(self, x: Any, y: Any, z: Any) -> Any:
@@ -63,13 +50,8 @@ class CurvedWall:
         """The wall's axes in the body's frame, as columns."""
         return frame_of_axis(self.axis)
 
-    def near(self, place: Array) -> Near:
-        """The wall as seen from a place; without a normal, zero, where several points of it are nearest."""
-        distance, normal, bend = self.seen(*place.tolist())
-        return Near(distance, np.array(normal), np.array(bend)[_UPPER])
-
     def seen(self, x: float, y: float, z: float) -> Seen:
-        """The numbers of :meth:`near`, in plain floats and a third of its time; of symbols, their formulas."""
+        """The wall as seen from a place, in floats or symbols; its normal is zero where several points are nearest."""
         if not isinstance(x + y + z, float):
             jet = self.away(*variables(x, y, z))
             return jet.value, jet.first, jet.second
@@ -82,7 +64,7 @@ class CurvedWall:
     def near_in_scalars(self, place: Any) -> tuple[Any, list[Any], list[list[Any]]]:
         """Distance, normal and rows of the normal's gradient in any scalars."""
         jet = self.away(*variables(*place))
-        return jet.value, jet.first, [[jet.second[k] for k in row] for row in _UPPER]
+        return jet.value, jet.first, [[jet.second[k] for k in row] for row in UPPER]
 
 
 class PlacedWall:

@@ -106,12 +106,12 @@ def test_a_declared_surface_is_the_wall_of_its_form(
     for name in ("gap", "normal", "normal_gradient", *(["locate"] if same else [])):
         np.testing.assert_allclose(getattr(found, name)(p), getattr(known, name)(p), rtol=0, atol=1e-10)
     for metre in (1.0, 5.0):  # the wall in another unit of length
-        near, expected = DeclaredWall(POINT, UP, surface, metre).near(metre * p[0, 0]), wall.near(p[0, 0])
-        turned = wall.frame @ expected.normal  # the wall's axes need not be the world's
-        assert near.distance == pytest.approx(metre * expected.distance, abs=1e-13)
-        if np.array_equal(wall.frame, np.eye(3)):
-            np.testing.assert_allclose(near.normal, turned, rtol=0, atol=1e-12)
-            np.testing.assert_allclose(near.bend * metre, expected.bend, rtol=0, atol=1e-10)
+        distance, normal, bend = DeclaredWall(POINT, UP, surface, metre).seen(*(metre * p[0, 0]).tolist())
+        expected, in_wall, bent = wall.seen(*p[0, 0].tolist())
+        assert distance == pytest.approx(metre * expected, abs=1e-13)
+        if np.array_equal(wall.frame, np.eye(3)):  # the wall's axes need not be the world's
+            np.testing.assert_allclose(normal, in_wall, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(np.array(bend) * metre, bent, rtol=0, atol=1e-10)
 
 
 @dataclasses.dataclass(frozen=True)
