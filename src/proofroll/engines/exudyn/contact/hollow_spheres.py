@@ -18,7 +18,7 @@ from proofroll.engines.exudyn.native import Output, exu
 ON_A_PLANE = 10.0
 # Largest part of the distance of both centres that a gap may have: without a distance they have no normal.
 _REACH = 1 - 1e-6
-_POSITION, _ORIGIN = Output.Position, [0, 0, 0]
+_POSITION, _CURRENT, _ORIGIN = Output.Position, exu.ConfigurationType.Current, [0, 0, 0]
 
 
 class MovingPlane(NamedTuple):
@@ -48,7 +48,7 @@ class MovingPlane(NamedTuple):
 
 def _centre(system: Any, sphere: Any, body: Any) -> Floats3:
     """Place of a marker in Exudyn's axes of a body, from its centre of mass [m]; None: in the world."""
-    x, y, z = system.GetMarkerOutput(sphere, _POSITION, exu.ConfigurationType.Current).tolist()
+    x, y, z = system.GetMarkerOutput(sphere, _POSITION, _CURRENT).tolist()
     if body is None:
         return x, y, z
     R = system.GetObjectOutputBody(body, Output.RotationMatrix, _ORIGIN).reshape(3, 3).tolist()
@@ -87,7 +87,7 @@ def hollow_centre(wall: PlacedWall, sphere: Floats3, of_sphere: float, radius: f
     of the wall are as near, it lies along the axis.
     """
     (x, y, z), apart = sphere, radius - of_sphere
-    distance, (nx, ny, nz) = wall.seen(x, y, z)
+    distance, nx, ny, nz = wall.seen(x, y, z)
     off = apart - min(distance - of_sphere, _REACH * apart)
     return [x + off * nx, y + off * ny, z + off * nz]
 

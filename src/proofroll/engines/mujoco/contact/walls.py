@@ -63,9 +63,9 @@ class _Plane(NamedTuple):
         if carrier:
             u, v, w = data.xpos[carrier].tolist()
             x, y, z = turned_back(data.xmat[carrier].reshape(3, 3).tolist(), (x - u, y - v, z - w))
-        distance, normal = self.wall.seen(x, y, z)
-        (u, v, w), up = normal, above - self.under - distance
-        model.geom_quat[self.geom] = quaternion_from_z(normal)
+        distance, u, v, w = self.wall.seen(x, y, z)
+        up = above - self.under - distance
+        model.geom_quat[self.geom] = quaternion_from_z((u, v, w))
         model.geom_pos[self.geom] = x + up * u, y + up * v, z + up * w
 
 
@@ -78,7 +78,7 @@ def tangent(wall: CurvedWall, centre: Array) -> HalfSpace:
 
     Where several points are as near, it lies across the axis.
     """
-    distance, direction = _in_its_body(wall).seen(*centre.tolist())
+    distance, *direction = _in_its_body(wall).seen(*centre.tolist())
     normal = np.array(direction)
     return HalfSpace(centre - distance * normal, normal)
 

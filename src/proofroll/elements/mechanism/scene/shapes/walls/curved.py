@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from proofroll.elements.mechanism.scene.rotations import Array, Floats3, frame_of_axis, turned, turned_back
-from proofroll.elements.mechanism.scene.shapes.walls.formula import differentiated, variables
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, turned, turned_back
+from proofroll.elements.mechanism.scene.shapes.walls.formula import Program, differentiated, variables
 
 UPPER = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # places of a symmetric matrix in its upper half, row by row
 NO_NORMAL, NO_BEND = (0.0, 0.0, 0.0), (0.0,) * 6
@@ -72,14 +72,28 @@ class PlacedWall:
 
     def __init__(self, wall: CurvedWall, R: Array, origin: Array) -> None:
         """Takes the rotation from the frame of the wall's body to the axes, and their origin in that frame [m]."""
-        self._seen = wall.seen
-        self._axes, self._point = (R @ wall.frame).tolist(), (R @ (wall.point - origin)).tolist()
+        self._wall, self._axes = wall, (R @ wall.frame).tolist()
+        self._point, program = (R @ (wall.point - origin)).tolist(), Program(3)
+        self._formula: Callable[..., tuple[float, ...]] = self._found
+        if wall.has_formula:
+            jet = wall.away(*self._in_wall(*variables(*program.symbols)))
+            (self._formula,) = program.functions([jet.value, *jet.first], math)
 
-    def seen(self, x: float, y: float, z: float) -> tuple[float, Floats3]:
-        """Distance of a place from the wall [m] and normal; along the axis where several points of it are nearest."""
+    def _in_wall(self, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
         u, v, w = self._point
-        distance, normal, _ = self._seen(*turned_back(self._axes, (x - u, y - v, z - w)))
-        return distance, turned(self._axes, normal if any(normal) else (0.0, 0.0, 1.0))
+        return turned_back(self._axes, (x - u, y - v, z - w))
+
+    def seen(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+        """Distance of a place from the wall [m] and normal; along the axis where several points of it are nearest."""
+        try:
+            distance, u, v, w = self._formula(x, y, z)
+        except (ValueError, ArithmeticError):
+            distance, u, v, w = self._found(x, y, z)
+        return distance, u, v, w
+
+    def _found(self, x: float, y: float, z: float) -> tuple[float, ...]:
+        distance, normal, _ = self._wall.seen(*self._in_wall(x, y, z))
+        return distance, *turned(self._axes, normal if any(normal) else (0.0, 0.0, 1.0))
 
 
 # With the wall as key, as an attribute of it would have to be pickled with it.

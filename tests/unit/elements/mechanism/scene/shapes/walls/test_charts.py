@@ -105,7 +105,7 @@ def test_a_wall_is_the_same_from_other_axes(name: str) -> None:
     wall, place = CURVED[name], np.array([0.15, -0.1, 0.45])
     expected, in_wall, _ = wall.seen(*(wall.frame.T @ (place - wall.point)).tolist())
     R, origin = from_rpy((0.3, -1.1, 2.0)), np.array([0.2, 0.1, -0.4])
-    distance, normal = PlacedWall(wall, R, origin).seen(*(R @ (place - origin)).tolist())
+    distance, *normal = PlacedWall(wall, R, origin).seen(*(R @ (place - origin)).tolist())
     assert distance == pytest.approx(expected, abs=1e-15)
     np.testing.assert_allclose(normal, R @ wall.frame @ in_wall, atol=1e-15)
 
@@ -113,7 +113,7 @@ def test_a_wall_is_the_same_from_other_axes(name: str) -> None:
 def test_where_several_points_are_nearest_the_normal_is_the_axis() -> None:
     """On its axis, where a bore has no normal, one that is placed has its axis for it, turned as the wall is."""
     wall, R = CURVED["bore"], from_rpy((0.3, -1.1, 2.0))
-    distance, normal = PlacedWall(wall, R, POINT).seen(0.0, 0.0, 0.0)
+    distance, *normal = PlacedWall(wall, R, POINT).seen(0.0, 0.0, 0.0)
     assert distance == pytest.approx(0.3)
     np.testing.assert_allclose(normal, R @ AXIS, atol=1e-15)
     assert not any(wall.seen(0.0, 0.0, 0.0)[1])
