@@ -208,7 +208,8 @@ class Contacts:
         self._bodies = [
             (model.body(contact.body_a).id, model.body(contact.body_b).id) for contact in mechanism.contacts
         ]
-        self._rate = np.zeros((3, model.nv))
+        lag, self._rate = settings.velocity_lag, np.zeros((3, model.nv))
+        self._lags = lag, lag + settings.normal_lead, settings.own_share
         self._normal_rows: dict[int, list[Array]] = {}
         curved = {k for k, contact in enumerate(mechanism.contacts) if curved_end(contact) is not None}
         self._turned = curved if settings.curvature else set()
@@ -289,7 +290,7 @@ class Contacts:
     def _slipping(self, contact: Any) -> tuple[float, slice]:
         """Coefficient and rows of a contact's friction that may slip: of a pair that never slides, against spin."""
         row = int(contact.efc_address)
-        if np.isinf(self._mechanism.contacts[self._number(contact)].friction):
+        if math.isinf(self._mechanism.contacts[self._number(contact)].friction):
             return float(contact.friction[2]), slice(row + SLIDES, row + max(SLIDES, int(contact.dim)))
         return float(contact.friction[0]), slice(row + 1, row + min(SLIDES, int(contact.dim)))
 
@@ -359,19 +360,19 @@ class Contacts:
         contacts = [item for item in contacts if item.efc_address >= 0 and self._number(item) in self._turned]
         if not contacts:
             return
-        settings, lagging, turnings = self._settings, data.qvel.copy(), []
+        (lag, ahead, share), lagging, turnings = self._lags, data.qvel.copy(), []
         # of the evaluation before, whose direction has turned since: extrapolated
         rates = data.qacc.copy() if self._rates is None else 2 * data.qacc - self._rates
-        for lead in (0.0, settings.normal_lead):
-            data.qvel[:] = lagging + (settings.velocity_lag + lead) * rates
+        for time in (lag, ahead):
+            data.qvel[:] = lagging + time * rates
             mujoco.mj_comVel(self._model, data)
             turnings.append([self._turning(data, contact) for contact in contacts])
         data.qvel[:] = lagging
         mujoco.mj_comVel(self._model, data)
-        for contact, turning, ahead in zip(contacts, *turnings, strict=True):
+        for contact, turning, later in zip(contacts, *turnings, strict=True):
             row, dim = int(contact.efc_address), min(SLIDES, int(contact.dim))
-            turning[0] = ahead[0]
-            data.efc_aref[row : row + dim] -= (1 - settings.own_share) * turning[:dim]
+            turning[0] = later[0]
+            data.efc_aref[row : row + dim] -= (1 - share) * turning[:dim]
 
     def _turning(self, data: Any, contact: Any) -> Array:
         """J̇v of a contact in its frame [m/s²], for the joint velocities of the last ``mj_comVel``."""
