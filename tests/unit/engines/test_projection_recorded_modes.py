@@ -43,7 +43,7 @@ def test_a_program_has_the_motion_of_numpy(scene: str, parameters: dict[str, Any
     """Rates, forces and geometry of contacts are equal to round-off, in each mode, of one body or two."""
     motion = motion_of(scene, parameters, time)
     y = vars(motion)["_stepper"].x
-    program = RecordedMode(motion, vars(motion)["_mechanism"], motion.mode)
+    program = RecordedMode(vars(motion)["_mechanism"], motion.mode)
     recorded, expected = program.at(y, vars(motion)["_slipping"]), vars(type(motion))["_in_numpy"](motion, y)
     assert recorded is not None
     for ours, numpys in ((recorded.rates, expected.rates), (recorded.force, expected.force)):
@@ -58,7 +58,7 @@ def test_a_slip_without_a_direction_of_its_own_is_left_to_numpy() -> None:
     """A program says nothing of a slip that counts as rest, nor of one against its direction at the step's start."""
     motion = motion_of("sphere_in_cylinder", SLIPPERY, 0.1)
     y, slipping = vars(motion)["_stepper"].x, vars(motion)["_slipping"]
-    program = RecordedMode(motion, vars(motion)["_mechanism"], motion.mode)
+    program = RecordedMode(vars(motion)["_mechanism"], motion.mode)
     assert program.at(y, slipping) is not None
     toward = vars(slipping)["_toward"]
     toward[0] = -toward[0]

@@ -129,6 +129,13 @@ def quaternion_rate(q: Any, w: Any) -> Array:
     )
 
 
+def carried(vector: Array, start: Array, end: Array) -> Array:
+    """A vector turned by the smallest rotation that takes a unit vector to another one less than a half turn away."""
+    axis = cross(start, end)
+    across = cross(axis, vector)
+    return np.asarray(vector + across + cross(axis, across) / (1.0 + start @ end))
+
+
 def frame_of_axis(z: ArrayLike, x: ArrayLike | None = None) -> Array:
     """Right-handed frame (columns x, y, z) with the axis ``z``; x is as near as possible to ``x``, or to a default."""
     a, b, c = _unit(*np.asarray(z, dtype=float).tolist())

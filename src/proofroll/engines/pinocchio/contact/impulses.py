@@ -21,9 +21,9 @@ from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS,
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK, States
-from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
+from proofroll.elements.mechanism.scene.rotations import Array, carried, frame_of_axis
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
-from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION, solver_of
+from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION, SolverParts, solver_of
 from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningImpulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
@@ -104,25 +104,6 @@ class StepTerms(NamedTuple):
     frames: list[Array]
 
 
-def _carried(vector: Array, start: Array, end: Array) -> Array:
-    """A vector turned by the smallest rotation that takes a unit vector to another one less than a half turn away."""
-    axis = cross(start, end)
-    across = cross(axis, vector)
-    return np.asarray(vector + across + cross(axis, across) / (1.0 + start @ end))
-
-
-class _Solver(NamedTuple):
-    """Pinocchio's objects for a subset of contacts and joint rows: constraints, solver, its options and result."""
-
-    points: list[Any]
-    point_datas: list[Any]
-    models: Any
-    datas: Any
-    solve: Any
-    options: Any
-    result: Any
-
-
 class ImpulseSteps:
     """Steps of a tree with contacts, dry friction and stops of joints.
 
@@ -156,7 +137,7 @@ class ImpulseSteps:
         self._returned = np.concatenate([self.restitution, np.zeros(len(self.joints.friction)), stops])
         self._moments = TurningImpulses(tree, float(settings.solver_tolerance or 0.0))
         self._pressed_by = [friction.pressed_by for friction in self._moments.frictions]
-        self._solvers: dict[tuple[int, ...], _Solver] = {}
+        self._solvers: dict[tuple[int, ...], SolverParts] = {}
         nv, self._all = tree.model.nv, tuple(range(len(self.contacts)))
         ends = list(accumulate([3] * len(self.contacts) + [1] * len(self.joints.J), initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
@@ -305,7 +286,7 @@ class ImpulseSteps:
         later = pin.integrate(self._model, q, span * v)
         touching_later = self._touched(self._ahead, later, v, [contact.feature for contact in terms.touching])
         changes = [
-            frame.T @ (_carried(later_point.slide, later_point.normal, point.normal) - point.slide)
+            frame.T @ (carried(later_point.slide, later_point.normal, point.normal) - point.slide)
             for frame, point, later_point in zip(terms.frames, terms.touching, touching_later, strict=True)
         ]
         return np.reshape(changes, (len(changes), 3))
@@ -318,7 +299,7 @@ class ImpulseSteps:
         velocity, pose = self._tree.velocity(data, frame), data.oMf[frame]
         return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)
 
-    def _posed(self, solver: _Solver, number: int, contact_point: Touching, frame: Array) -> Array:
+    def _posed(self, solver: SolverParts, number: int, contact_point: Touching, frame: Array) -> Array:
         """Poses the ``number``-th point of a solver and returns its rows, shape (3, nv)."""
         point, data = solver.points[number], self._data
         place = pin.SE3(frame, contact_point.place)
@@ -328,7 +309,7 @@ class ImpulseSteps:
         rows: Array = point.jacobian(self._model, data, solver.point_datas[number])
         return rows
 
-    def _solver(self, which: tuple[int, ...]) -> _Solver:
+    def _solver(self, which: tuple[int, ...]) -> SolverParts:
         if which not in self._solvers:
             models, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
             rows, count = (*self.joints.friction, *self.joints.stops), len(self.contacts)
@@ -346,7 +327,7 @@ class ImpulseSteps:
             settings, size = self._settings, sum(3 if k < count else 1 for k in which)
             solve, options, result = solver_of(settings.solver or "admm", float(settings.solver_tolerance or 0.0), size)
             made = [datas[i].extract() for i in range(len(which))]
-            self._solvers[which] = _Solver(
+            self._solvers[which] = SolverParts(
                 points=points, point_datas=made, models=models, datas=datas, solve=solve, options=options, result=result
             )
         return self._solvers[which]

@@ -1,6 +1,6 @@
 """Pinocchio's frictional contact solvers, and the largest coefficient that each takes."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import pinocchio as pin
 
@@ -8,6 +8,18 @@ import pinocchio as pin
 LARGEST_FRICTION = {"pgs": 1e6, "admm": 1e2}
 # Pinocchio's limit of 1000 is reached at tight tolerances where the normal force is small.
 _ADMM_ITERATIONS = 10_000
+
+
+class SolverParts(NamedTuple):
+    """Pinocchio's objects for a subset of contacts and joint rows: constraints, solver, its options and result."""
+
+    points: list[Any]
+    point_datas: list[Any]
+    models: Any
+    datas: Any
+    solve: Any
+    options: Any
+    result: Any
 
 
 def solver_of(kind: str, tolerance: float, size: int = 3) -> tuple[Any, Any, Any]:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.arrays import cross
 from proofroll.core.dop853 import Accept
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import EventKind
@@ -21,7 +20,6 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.coulomb import contact_forces
 from proofroll.elements.mechanism.contact.joint_laws import (
     JointContact,
-    joint_contacts,
     line_response,
     refuse_rubbing_stops,
 )
@@ -35,21 +33,19 @@ from proofroll.elements.mechanism.contact.modes import (
     slip_velocity,
 )
 from proofroll.elements.mechanism.contact.rolling_and_spin import (
-    TurningFriction,
     opposed_rates,
     pressed_by,
     require_moving,
     shut_by_pressing,
-    turning_frictions,
 )
 from proofroll.elements.mechanism.contact.start import closed_and_still, natural_scale, start_digits
-from proofroll.elements.mechanism.contact.touching import AT_REST, Moving, Touching, torn, touch
-from proofroll.elements.mechanism.dynamics.switches import switched_joints
+from proofroll.elements.mechanism.contact.touching import Touching, torn
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, coefficients_of
+from proofroll.elements.mechanism.scene.shapes.geometry import coefficients_of
 from proofroll.elements.mechanism.scene.signal import breaks, varies
 from proofroll.engines.projection.contact.alternating import AlternatingMotion, Excess, ends_of_efforts
+from proofroll.engines.projection.contact.contact_geometry import ContactGeometry
 from proofroll.engines.projection.contact.contacts_there import (
     ContactsThere,
     landing_together,
@@ -59,7 +55,6 @@ from proofroll.engines.projection.contact.contacts_there import (
 )
 from proofroll.engines.projection.contact.recorded_modes import RANK, InMode, RecordedMode, recordable
 from proofroll.engines.projection.contact.slip_directions import SlipDirections, balanced, led_direction
-from proofroll.engines.projection.smooth.connections import Bodies
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.smooth.elimination import Space
 from proofroll.engines.projection.smooth.elimination import solved as divided
@@ -87,15 +82,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     ) -> None:
         """Takes the size of a fixed ``step`` [s], or 0 and the relative ``tolerance`` of steps that adapt."""
         super().__init__(equations, stepper, accept, breaks(mechanism.signals))
-        self._bodies, self._joints = mechanism.contacts, joint_contacts(switched_joints(mechanism))
-        self._turning = turning_frictions(self._bodies)
-        self.contacts: tuple[BodyContact | JointContact | TurningFriction, ...] = (
-            *self._bodies,
-            *self._joints,
-            *self._turning,
-        )
-        self._index = mechanism.body_index
-        self.friction = np.array([contact.friction for contact in self.contacts])
+        self._geometry = geometry = ContactGeometry(equations, mechanism)
+        self._bodies, self._joints, self._turning = geometry.bodies, geometry.joints, geometry.turning
+        self.contacts, self.friction = geometry.contacts, geometry.friction
         self._static = np.array([contact.static for contact in self.contacts])
         self._bounds = np.array([contact.bound for contact in self.contacts])
         self._presses = [contact.presses for contact in self.contacts]
@@ -143,10 +132,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
         free = equations.solve(x, 0.0, None if equations.coupled else closing)
         spaces = spaces or [equations.tree.space(free.bodies)]
-        moving = self.moving(x, free.bodies)
-        touching = self.touching(x, moving)
-        S = spaces[0].S.reshape(-1, 4, 4)
-        J, rate = self.slides(x, free, S, moving, touching)
+        touching, J, rate = self._geometry.at(x, free, spaces[0].S.reshape(-1, 4, 4))
         flat = J.reshape(-1, J.shape[2]).T
         if equations.coupled:
             assert equations.split is not None  # of the last solution
@@ -155,71 +141,6 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             response = divided(spaces[0].H, flat)
         response = response.reshape(-1, *J.shape[:2])
         return ContactsThere(touching=touching, J=J, response=response, rate=rate, free=free)
-
-    def slides(
-        self, x: Array, free: SolvedState, S: Array, moving: Mapping[str, Moving], touching: Sequence[Touching]
-    ) -> tuple[Array, Array]:
-        """Derivatives of sliding velocities by ν, (contacts, 3, nv), and their rates without forces, (contacts, 3).
-
-        ``S``: twists of unit velocities, (nv, 4, 4). Of states in symbols, too.
-        """
-        moves = self._equations.tree.moves
-        J, rate = np.zeros((len(touching), 3, len(S)), dtype=x.dtype), np.zeros((len(touching), 3), dtype=x.dtype)
-        for k, (contact, point) in enumerate(zip(self._bodies, touching, strict=False)):
-            lever = S[:, :3, :3] @ (point.place - free.bodies.origin) + S[:, :3, 3]
-            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
-                i = self._index[body]
-                if i >= 0:
-                    J[k] += sign * (moves[i][:, None] * lever).T
-                    rate[k] += sign * self._material(x, free, i, moving[body], point)
-        for k, switch in enumerate(self._joints, len(self._bodies)):
-            J[k, :, switch.joint.velocity] = switch.direction
-            rate[k] = switch.direction * free.rates[switch.joint.velocity]
-        sizes = [] if x.dtype == object else [float(np.linalg.norm(body.w)) for body in moving.values()]
-        fastest = max(sizes, default=0.0)
-        for k, friction in enumerate(self._turning, len(self._bodies) + len(self._joints)):
-            contact, point = self._bodies[friction.pressed_by], touching[friction.pressed_by]
-            spin, spin_rate = np.zeros_like(J[0]), np.zeros_like(rate[0])
-            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
-                i = self._index[body]
-                if i >= 0:
-                    axes = S[:, [2, 0, 1], [1, 2, 0]]  # of the velocities, from their matrices
-                    spin += sign * (moves[i][:, None] * axes).T
-                    spin_rate += sign * moving[body].R @ free.angular[i]
-            J[k] = friction.resisted(point.normal, spin)
-            relative = moving[contact.body_a].w - moving[contact.body_b].w
-            rate[k] = friction.resisted_rate(point, relative, spin_rate, fastest)
-        return J, rate
-
-    def touching(self, x: Array, moving: Mapping[str, Moving]) -> tuple[Touching, ...]:
-        """Gap, normal and sliding velocity of each contact."""
-        joints = self._equations.watched(x) if self._joints else {}
-        pairs = [(moving[contact.body_a], moving[contact.body_b]) for contact in self._bodies]
-        bodies = [touch(contact, a, b) for contact, (a, b) in zip(self._bodies, pairs, strict=True)]
-        turns = [(friction, friction.pressed_by) for friction in self._turning]
-        return (
-            *bodies,
-            *(contact.touching(*joints[contact.joint.number]) for contact in self._joints),
-            *(friction.touching(bodies[k], pairs[k][0].w - pairs[k][1].w) for friction, k in turns),
-        )
-
-    def moving(self, x: Array, bodies: Bodies) -> dict[str, Moving]:
-        """Motion of the frames of all bodies, and of the world."""
-        equations = self._equations
-        r, _, v, _ = equations.parts(x)
-        moving = {"world": AT_REST}
-        for name, i in self._index.items():
-            if i >= 0:
-                R, w = bodies.rotation[i], bodies.spin[i]
-                arm = R @ equations.com[i]
-                moving[name] = Moving(r[i] - arm, R, v[i] - cross(w, arm), w)
-        return moving
-
-    def _material(self, x: Array, free: SolvedState, i: int, body: Moving, point: Touching) -> Array:
-        """Rate of the velocity of a body's material at the contact point, which moves over the body."""
-        arm = point.place - self._equations.parts(x)[0][i]
-        turning = cross(body.R @ free.angular[i], arm) + cross(body.w, cross(body.w, arm))
-        return np.asarray(free.linear[i] + turning + cross(body.w, point.place_rate - body.velocity(point.place)))
 
     def _rows(self, instant: ContactsThere, mode: ContactMode) -> list[tuple[int, Array]]:
         """Directions in which closed contacts are constrained, with their contact."""
@@ -330,7 +251,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         if program is None and self._kinds:
             self._uses[self._kinds] = self._uses.get(self._kinds, 0) + 1
             if self._uses[self._kinds] == _WORTH:
-                self._recorded[self._kinds] = RecordedMode(self, self._mechanism, self.mode)
+                self._recorded[self._kinds] = RecordedMode(self._mechanism, self.mode)
         motion = (program and program.at(y, self._slipping)) or self._in_numpy(y)
         self._last = y, motion
         return motion
@@ -351,7 +272,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         if self._kinds in self._recorded:
             touching = self._in_mode(y).touching
         else:
-            touching = self.touching(x, self.moving(x, self._equations.bodies(x)))
+            touching = self._geometry.touching(x, self._geometry.moving(x, self._equations.bodies(x)))
 
         def leading(k: int) -> Array:
             instant = self.at(y)

@@ -4,11 +4,9 @@ The formulas of the numpy solver are evaluated once on symbols of :mod:`.formula
 many operations as the mode needs, and costs a tenth of numpy's calls for arrays of three numbers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,15 +18,13 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import ConeWall, CurvedWall
-from proofroll.elements.mechanism.scene.shapes.walls.formula import Program, sqrt
+from proofroll.elements.mechanism.scene.shapes.walls.formula import RecordedProgram, sqrt
+from proofroll.engines.projection.contact.contact_geometry import ContactGeometry
 from proofroll.engines.projection.contact.contacts_there import ContactsThere, system_of
 from proofroll.engines.projection.contact.slip_directions import SlipDirections
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates, quaternion_rates
 from proofroll.engines.projection.smooth.elimination import Loads
 from proofroll.engines.projection.smooth.recursion import Recursion
-
-if TYPE_CHECKING:
-    from proofroll.engines.projection.contact.contact_modes import ContactMotion
 
 _MOST = 6  # bodies and contacts together: a longer program costs more than numpy
 RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
@@ -71,16 +67,16 @@ def _is_plain(shape: Any) -> bool:
 
 
 class RecordedMode:
-    """Program of the equations of motion in a mode.
+    """Equations of motion in a mode as a recorded program.
 
     The forces that hold closed contacts are solved for outside of it, as their rows may depend on each other.
     """
 
-    def __init__(self, motion: ContactMotion, mechanism: Mechanism, mode: ContactMode) -> None:
-        """Takes a motion whose mechanism is :func:`recordable`, and a mode without lines of slips."""
+    def __init__(self, mechanism: Mechanism, mode: ContactMode) -> None:
+        """Takes a mechanism that is :func:`recordable`, and a mode without lines of slips."""
         equations = DependentCoordinates(mechanism, Recursion)
-        program = Program(len(equations.start))
-        parts = _formulas(motion, equations, len(mechanism.joints), mode, np.array(program.symbols, dtype=object))
+        program = RecordedProgram(len(equations.start))
+        parts = _formulas(equations, mechanism, mode, np.array(program.symbols, dtype=object))
         flat = [np.asarray(part, dtype=object) for part in parts]
         ends = np.cumsum([part.size for part in flat]).tolist()
         self._parts = [(slice(end - part.size, end), part.shape) for end, part in zip(ends, flat, strict=True)]
@@ -94,8 +90,13 @@ class RecordedMode:
             flat = np.array(self._program(*y.tolist()[:-1]))
         except ArithmeticError:
             return None
-        rates, by_unknown, matrix, targets, pushes, numbers = [flat[part].reshape(shape) for part, shape in self._parts]
-        touching = [Touching(p[0], p[1:4], p[4:7], p[7:10], p[10:13], p[13:16]) for p in numbers]
+        rates, by_unknown, matrix, targets, pushes, gaps, vectors = [
+            flat[part].reshape(shape) for part, shape in self._parts
+        ]
+        touching = [
+            Touching(gap=gap, normal=n, normal_rate=n_rate, place=place, place_rate=place_rate, slide=slide)
+            for gap, (n, n_rate, place, place_rate, slide) in zip(gaps.tolist(), vectors, strict=True)
+        ]
         if not all(slipping.goes_on(k, slip_velocity(touching[k]).tolist()) for k in self._slips):
             return None
         if self._slips and min(matrix.diagonal().tolist(), default=1.0) <= 0.0:  # torn
@@ -105,38 +106,35 @@ class RecordedMode:
         return InMode(rates=rates, touching=touching, force=(pushes @ unknown).reshape(-1, 3))
 
 
-def _formulas(
-    motion: ContactMotion, equations: DependentCoordinates, joints: int, mode: ContactMode, x: Array
-) -> list[Any]:
+def _formulas(equations: DependentCoordinates, mechanism: Mechanism, mode: ContactMode, x: Array) -> list[Array]:
     """Rates without the unknown forces, accelerations by each, their equations, forces, and geometry of contacts."""
     free, nv = equations.solve(x), equations.nv
-    S, moving = equations.tree.directions(free.bodies), motion.moving(x, free.bodies)
-    touching = motion.touching(x, moving)
-    J, rate = motion.slides(x, free, S, moving, touching)
-    still, drives = np.zeros((3 * len(mode), joints, 16)), J.reshape(-1, nv)
+    geometry = ContactGeometry(equations, mechanism)
+    touching, J, rate = geometry.at(x, free, equations.tree.directions(free.bodies))
+    still, drives = np.zeros((3 * len(mode), len(mechanism.joints), 16)), J.reshape(-1, nv)
     by_force = equations.tree.motions(free.bodies, still, Loads(drives=drives))[1]
     response = by_force.T.reshape(nv, *J.shape[:2])
     instant = ContactsThere(touching=touching, J=J, response=response, rate=rate, free=free)
     headings, rows = dict[int, Array](), list[tuple[int, Array]]()
-    for k, (acting, contact, point) in enumerate(zip(mode, motion.contacts, touching, strict=True)):
+    for k, (acting, contact, point) in enumerate(zip(mode, geometry.contacts, touching, strict=True)):
         if acting.kind == "slip":
             slip = slip_velocity(point)
             headings[k] = slip / sqrt(slip @ slip)
             rows += [(k, point.normal)] * contact.presses
         elif acting.kind == "stick":
             rows += [(k, row) for row in np.eye(3)]  # of friction against turning one of them holds nothing
-    system = system_of(instant, motion.contacts, motion.friction, headings, rows, rate)
+    system = system_of(instant, geometry.contacts, geometry.friction, headings, rows, rate)
     count, (_, q, v, w) = len(rows), equations.parts(x)
     bodies = [np.concatenate([*map(np.ravel, equations.of_bodies(free.bodies, change))]) for change in system.changes]
     rates = v, quaternion_rates(q, w), free.linear, free.angular, np.ones(1)
-    numbers = [np.append(point.gap, np.concatenate(point[1:6])) for point in touching]
     return [
         np.concatenate([part.ravel() for part in rates]),
         np.reshape(bodies, (count, 6 * len(v))).T,
         system.matrix,
         system.targets,
         system.pushes.reshape(count, 3 * len(mode)).T,
-        np.array(numbers),
+        np.array([point.gap for point in touching]),
+        np.array([point[1:6] for point in touching]),
     ]
 
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, turned, turned_back
-from proofroll.elements.mechanism.scene.shapes.walls.formula import Program, differentiated, variables
+from proofroll.elements.mechanism.scene.shapes.walls.formula import RecordedProgram, differentiated, variables
 
 UPPER = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # places of a symmetric matrix in its upper half, row by row
 NO_NORMAL, NO_BEND = (0.0, 0.0, 0.0), (0.0,) * 6
@@ -73,7 +73,7 @@ class PlacedWall:
     def __init__(self, wall: CurvedWall, R: Array, origin: Array) -> None:
         """Takes the rotation from the frame of the wall's body to the axes, and their origin in that frame [m]."""
         self._wall, self._axes = wall, (R @ wall.frame).tolist()
-        self._point, program = (R @ (wall.point - origin)).tolist(), Program(3)
+        self._point, program = (R @ (wall.point - origin)).tolist(), RecordedProgram(3)
         self._formula: Callable[..., tuple[float, ...]] = self._found
         if wall.has_formula:
             jet = wall.away(*self._in_wall(*variables(*program.symbols)))

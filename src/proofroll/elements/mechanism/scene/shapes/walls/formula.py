@@ -149,7 +149,7 @@ def _applied(name: str, x: Any) -> Any:
 
 
 class _Symbol:
-    """An unknown number in a :class:`Program`: the name of a result, or that number with the other sign."""
+    """An unknown number in a :class:`RecordedProgram`: the name of a result, or that number with the other sign."""
 
     __slots__ = ("name", "negative", "steps")
 
@@ -217,7 +217,7 @@ def _signed(x: Any) -> tuple[str, bool]:
     return (x.name, x.negative) if isinstance(x, _Symbol) else (f"{abs(float(x))!r}", math.copysign(1.0, x) < 0)
 
 
-class Program:
+class RecordedProgram:
     """Operations on symbols, recorded as plain assignments.
 
     Attributes:
@@ -252,7 +252,7 @@ def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..
 
     ``formula`` takes ``count`` numbers and returns one or a tuple of them. Where it is undefined, the values are NaN.
     """
-    program, parts = Program(count), []
+    program, parts = RecordedProgram(count), []
     results = formula(*variables(*program.symbols))
     for result in results if isinstance(results, tuple) else (results,):
         parts += result.parts if isinstance(result, Jet) else [result] + [0.0] * (count + count * (count + 1) // 2)

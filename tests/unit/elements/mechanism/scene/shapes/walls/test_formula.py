@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.elements.mechanism.scene.shapes.walls.formula import Program, cos, sin, sqrt
+from proofroll.elements.mechanism.scene.shapes.walls.formula import RecordedProgram, cos, sin, sqrt
 
 NUMBERS = 0.7, -1.3, 2.1
 
@@ -28,14 +28,14 @@ def formulas(x: Any, y: Any, z: Any) -> list[Any]:
 
 def test_a_program_has_the_numbers_of_its_formulas() -> None:
     """Signs, constants and functions are those of the formulas, to the last digit."""
-    program = Program(3)
+    program = RecordedProgram(3)
     (calculated,) = program.functions(formulas(*program.symbols), math)
     np.testing.assert_array_equal(calculated(*NUMBERS), [float(part) for part in formulas(*NUMBERS)])
 
 
 def test_a_program_has_only_what_is_needed() -> None:
     """A result is calculated once, its opposite not again, what cancels and what nobody needs not at all."""
-    program = Program(2)
+    program = RecordedProgram(2)
     x, y = program.symbols
     unneeded = [sin(x), (x + y) * y]
     (calculated,) = program.functions([x - y, y - x, (x + y) - (y + x), -y], math)
