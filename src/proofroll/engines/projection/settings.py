@@ -27,8 +27,9 @@ class ProjectionSettings:
         dt: step of rk4 [s].
         rtol: relative tolerance of dop853 and of taylor [1].
         elimination: remove the violation of the constraints after each step (taylor: after every few); None is yes.
-        equations: ``projected``, with the projections carried out in numpy at every evaluation, or ``compiled``
-            (heyoka; trees of joints without springs of their own).
+        equations: ``projected``, with the projections carried out in numpy at every evaluation (of few contacts in a
+            mode that lasts: recorded as plain assignments), or ``compiled`` (heyoka; trees of joints without springs of
+            their own).
     """
 
     formulation: str = "dependent"
