@@ -37,6 +37,7 @@ def motion_of(scene: str, parameters: dict[str, Any], time: float) -> ContactMot
         ("cradle", {}, 0.1),
         ("bouncing_ball", {}, 0.1),
         ("eccentric_sphere", {}, 0.1),
+        ("free_turntable", {}, 0.1),
     ],
 )
 def test_a_program_has_the_motion_of_numpy(scene: str, parameters: dict[str, Any], time: float) -> None:
