@@ -16,6 +16,10 @@ from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 
+# Response to moments, in parts of that without contacts, that is round-off of what contacts hold.
+_HELD = 1e-9
+_INDEPENDENT = 1e-15  # least response of independent rows, relative to the largest
+
 
 @dataclass(frozen=True)
 class TurningFriction:
@@ -94,6 +98,24 @@ class TurningFriction:
 def _without_round_off(part: Array, size: Any) -> Array:
     """A part of vectors of a size, (3,) or (3, vectors), without vectors that are round-off."""
     return np.where(np.linalg.norm(part, axis=0) > ROUND_OFF * size, part, 0.0)
+
+
+def largest_response(free: Array, into: Array, held: Array) -> float:
+    """Largest response to a moment while contacts hold what they do [1/(kg m²)]; 0: it is round-off.
+
+    Args:
+        free: response of what the moment resists, without contacts, (3, 3).
+        into: of what contacts hold, (rows, 3).
+        held: response of that to forces along it, (rows, rows), of rows that may depend on each other.
+    """
+    response = free
+    if len(held):
+        sizes, directions = np.linalg.eigh(held)
+        independent = sizes > _INDEPENDENT * sizes[-1]
+        ways = directions[:, independent].T @ into
+        response = free - ways.T @ (ways / sizes[independent, None])
+    ease = float(np.linalg.eigvalsh(response)[-1])
+    return ease if ease > _HELD * np.trace(free) else 0.0
 
 
 def rolling_levers(frictions: Sequence[TurningFriction], count: int) -> Array:

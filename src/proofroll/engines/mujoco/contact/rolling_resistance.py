@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers, turning_frictions
+from proofroll.elements.mechanism.contact.rolling_and_spin import largest_response, rolling_levers, turning_frictions
 from proofroll.elements.mechanism.run.contacts.step_events import SLIP
 from proofroll.elements.mechanism.scene.rotations import Array, cross
 from proofroll.engines.mujoco.contact.contact_states import ContactStates
@@ -18,8 +18,6 @@ from proofroll.engines.mujoco.settings import MujocoSettings
 
 # Change of an angular velocity in one step, relative to it, from which a torque may stop it and the response is needed.
 _SLOW = 0.25
-# Response to a torque, in parts of that without contacts, that is round-off of what contacts hold.
-_HELD = 1e-9
 
 
 class RollingResistance:
@@ -128,11 +126,8 @@ class RollingResistance:
         ways = np.zeros_like(stacked)
         mujoco.mj_solveM(model, data, ways, stacked)
         responses = stacked @ ways.T
-        free_response, ways_in = responses[:3, :3], responses[3:, :3]
-        response = free_response - ways_in.T @ np.linalg.pinv(responses[3:, 3:], hermitian=True) @ ways_in
-        ease = float(np.linalg.eigvalsh(response)[-1])
-        self._ease[place] = ease
-        if ease <= _HELD * np.trace(free_response):
+        ease = self._ease[place] = largest_response(responses[:3, :3], responses[3:, :3], responses[3:, 3:])
+        if not ease:
             return np.zeros(3)
         turning_after = row @ (data.qvel + self._dt * data.qacc)
         return np.asarray(last - turning_after / (ease * self._dt))
@@ -169,7 +164,9 @@ class RollingResistance:
         return moving
 
     def _velocity(self, data: Any, body: int, place: Array) -> Array:
-        """Velocity of a body's material at a place [m/s]."""
+        """Velocity of a body's material at a place [m/s]; 0 is the world."""
+        if not body:
+            return np.zeros(3)
         arm = place - data.subtree_com[self._model.body_rootid[body]]
         return np.asarray(data.cvel[body, 3:] + cross(data.cvel[body, :3], arm))
 

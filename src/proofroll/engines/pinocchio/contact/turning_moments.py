@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.core.errors import Diverged
-from proofroll.elements.mechanism.contact.rolling_and_spin import turning_frictions
+from proofroll.elements.mechanism.contact.rolling_and_spin import largest_response, turning_frictions
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.run.contacts.step_events import SLIP, States
 from proofroll.elements.mechanism.scene.rotations import Array, skew
@@ -17,9 +17,6 @@ from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 # Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one:
 # what the iteration leaves is not seen beside what the solver leaves.
 _MOST, _SETTLED = 100, 1e-2
-# Response to moments, in parts of that without contacts, that is round-off of what contacts hold.
-_HELD = 1e-9
-_INDEPENDENT = 1e-15  # least response of independent rows, relative to the largest
 
 
 class Pressed(NamedTuple):
@@ -92,7 +89,9 @@ class TurningImpulses:
             bounds, held = coefficients * outcome.normal, outcome.held.tobytes()
             for k, (row, opposed, bound) in enumerate(zip(*rows, bounds.tolist(), strict=True)):
                 if (k, held) not in eases:
-                    eases[k, held] = _ease(row, inverse, outcome.held)
+                    ways = inverse @ row.T
+                    of_held = outcome.held @ inverse @ outcome.held.T
+                    eases[k, held] = largest_response(row @ ways, outcome.held @ ways, of_held)
                 if eases[k, held]:
                     moments[k] -= row @ outcome.v / eases[k, held]
                 moves = self.frictions[k].bend and outcome.states[self.frictions[k].pressed_by] == SLIP
@@ -103,16 +102,3 @@ class TurningImpulses:
             if np.abs(moments - last).max() <= _SETTLED * self._tolerance * bounds.max():
                 return moments, impulses
         raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")
-
-
-def _ease(row: Array, inverse: Array, held_rows: Array) -> float:
-    """Largest response to a moment while the contacts hold what they do [1/(kg m²)]; 0: it is round-off."""
-    ways = inverse @ row.T
-    free, response = row @ ways, row @ ways
-    if len(held_rows):
-        sizes, directions = np.linalg.eigh(held_rows @ inverse @ held_rows.T)
-        independent = sizes > _INDEPENDENT * sizes[-1]
-        into = directions[:, independent].T @ held_rows @ ways
-        response = free - into.T @ (into / sizes[independent, None])
-    ease = float(np.linalg.eigvalsh(response)[-1])
-    return ease if ease > _HELD * np.trace(free) else 0.0
