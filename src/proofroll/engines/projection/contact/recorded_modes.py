@@ -88,7 +88,7 @@ class RecordedMode:
         """Motion at a state, the time last; None where a slip has no direction of its own, a wall no normal."""
         try:
             flat = np.array(self._program(*y.tolist()[:-1]))
-        except ArithmeticError:
+        except (ArithmeticError, ValueError):
             return None
         rates, by_unknown, matrix, targets, pushes, gaps, vectors = [
             flat[part].reshape(shape) for part, shape in self._parts
