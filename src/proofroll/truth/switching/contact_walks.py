@@ -18,6 +18,7 @@ from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.modes import (
     FAINT,
+    REST,
     ROUND_OFF,
     ContactMode,
     Features,
@@ -66,6 +67,7 @@ _SAME_RATES = 1e-6
 
 # Angle [rad] and number of steps by which the direction is found in which a slip stops.
 _NEARBY, _TURNS = 1e-3, 2
+_ONE_WAY = 1e-12  # difference of directions in which slips start together
 # Guard of the first instants of a slip, which goes on.
 _GOES_ON = -1
 _LOOKS = 32  # at the turn of bushings in a step, which is resolved by half as many points
@@ -210,8 +212,10 @@ class ContactWalks(ABC):
             raise Refused(REDUNDANT)
         if self._stands(state, mode):
             return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
-        if any(acting.leads for acting in mode):
-            return self._begun(time, state, mode, until)
+        led = self._led_from_rest(state, mode)
+        if any(acting.leads for acting in led):
+            with suppress(*([] if led is mode else [Refused])):
+                return self._begun(time, state, led, until)
         stopping = next((k for k, acting in enumerate(mode) if acting.stops), None)
         if stopping is not None:
             return self._stopping(time, state, mode, stopping)
@@ -435,6 +439,22 @@ class ContactWalks(ABC):
         if abs(angle) * speed > ROUND_OFF or uneven**2 * speed > ROUND_OFF or not duration:
             return None
         return duration * rate, duration * self._equations.rate(half, turned_mode)
+
+    def _led_from_rest(self, state: Array, mode: ContactMode) -> ContactMode:
+        """The mode, in which slips in the plane lead that start from rest in one direction."""
+        if any(acting.leads for acting in mode):
+            return mode
+        touching = self._touching(state, features_of(mode))
+        begins = [
+            acting.kind == "slip" and acting.along is None and bool(contact.friction) and acting.heading is not None
+            for acting, contact in zip(mode, self.contacts, strict=True)
+        ]
+        headings = np.array([acting.heading for acting, starts in zip(mode, begins, strict=True) if starts])
+        speeds = [float(np.linalg.norm(slip_velocity(touch))) for touch, starts in zip(touching, begins, strict=True) if starts]
+        if not speeds or max(speeds) > REST or float(np.abs(headings - headings[0]).max()) > _ONE_WAY:
+            return mode
+        pairs = zip(mode, begins, strict=True)
+        return tuple(acting._replace(leads=True) if starts else acting for acting, starts in pairs)
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""
