@@ -37,7 +37,7 @@ class Observable:
         audit: True if it compares the reactions that an engine reports with the motion that it computed.
         hangs_on_events: True if it is unpredictable once the time of an event is ill-posed.
         at_impacts: False if it has no value beside an impact, whose length is an engine's own, nor where the question
-            is ill-posed.
+            is ill-posed; if it is not ``of_contacts``, nor beside a change of a slip.
         of_contacts: True if it is zero wherever nothing touches.
         apart: True if it is the distance of what may touch.
         sums_samples: True if runs sum it over their samples, which have no impulses: it is compared up to the first

@@ -28,7 +28,7 @@ from proofroll.core.dataset import (
     scales,
 )
 from proofroll.core.element_abilities import KnowsAnotherScene
-from proofroll.core.events import EVENT_ORDER, JUMPS, Event, events_of
+from proofroll.core.events import EVENT_ORDER, JUMPS, Event, EventKind, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import TrueCurve
@@ -37,6 +37,8 @@ from proofroll.studies.judging.quiet import quiet, untouched
 if TYPE_CHECKING:
     import xarray as xr
 
+# At which dry friction of a joint jumps; of a contact that touches it is judged there.
+_REVERSES = frozenset({EventKind.SLIP, EventKind.STICK, EventKind.REST, EventKind.TURN})
 _PARTED = 0.1  # part of their largest difference at which two runs have parted
 
 
@@ -260,7 +262,8 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
         values = dataset.variables[name].values[1:]
         mask = np.isfinite(values)
         if not item.at_impacts:
-            mask[_unsteady(scene, dataset)[1:]] = False
+            jumps = JUMPS if item.of_contacts else JUMPS | _REVERSES
+            mask[_unsteady(scene, dataset, jumps)[1:]] = False
         if item.sums_samples:
             mask[_behind_impacts(scene, dataset)[1:]] = False
         if mask.all():
@@ -279,14 +282,14 @@ def _behind_impacts(scene: Scene, dataset: xr.Dataset) -> NDArray[np.bool_]:
     return np.asarray(dataset.variables["time"].values >= impact)
 
 
-def _unsteady(scene: Scene, dataset: xr.Dataset) -> NDArray[np.bool_]:
-    """Samples next to an impact or to an early end, and those of an ill-posed question, shape (time,)."""
+def _unsteady(scene: Scene, dataset: xr.Dataset, jumps: Collection[str]) -> NDArray[np.bool_]:
+    """Samples next to events of these kinds or to an early end, and those of an ill-posed question, shape (time,)."""
     times = dataset.variables["time"].values
     unsteady = times >= float(dataset.attrs.get("horizon", np.inf))
     unsteady[-1:] |= ended_early(dataset) is not None
     for element in scene.elements:
         for event in events_of(part(scene, element, dataset)):
-            if event.kind in JUMPS:
+            if event.kind in jumps:
                 next_sample = int(np.searchsorted(times, event.time))
                 unsteady[max(next_sample - 1, 0) : next_sample + 1] = True
     return np.asarray(unsteady)

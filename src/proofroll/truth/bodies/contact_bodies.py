@@ -81,7 +81,7 @@ class ContactBodies(ContactStretches):
         rough = modes_of(shut_by_pressing(self.contacts, closed_mask), resting_mask, features)
         rough = self._moved_on(state, rough)
         state = self.equations.eliminated(state, rough)
-        mode, margin = self._decided(state, rough)
+        mode, margin = self.decided(state, rough)
         return Transition(state, mode, (), margin)
 
     def _decided(self, state: Array, rough: ContactMode, leaving: Sequence[int] = ()) -> tuple[ContactMode, float]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import EventKind
-from proofroll.elements.mechanism.contact.free_slides import FreeSlides, passing
+from proofroll.elements.mechanism.contact.free_slides import FreeSlides, passing, unpressed
 from proofroll.elements.mechanism.contact.joint_laws import rebounding
 from proofroll.elements.mechanism.contact.modes import (
     FAINT,
@@ -26,6 +26,7 @@ from proofroll.elements.mechanism.contact.modes import (
     closed_in,
     direction_of,
     features_of,
+    following,
     headed,
     modes_of,
     slip_velocity,
@@ -141,6 +142,25 @@ class ContactStretches(ContactWalks):
 
         ``rough``: what is open, moves or stands; ``leaving``: contacts that static friction no longer holds.
         """
+
+    def decided(self, state: Array, rough: ContactMode, leaving: Sequence[int] = ()) -> tuple[ContactMode, float]:
+        """The same of all contacts: those that nothing presses or parts stay closed, and move on as if they were open.
+
+        See :meth:`_decided` for the arguments.
+        """
+        idle = unpressed(self.contacts, closed_in(rough), self._free_slides(state, rough))
+        if not idle:
+            return self._decided(state, rough, leaving)
+        opened_mode = [acting._replace(kind="open") if k in idle else acting for k, acting in enumerate(rough)]
+        mode, margin = self._decided(state, tuple(opened_mode), leaving)
+        solved, whole = self._solved(state, mode), list(mode)
+        for k in idle:
+            touch, rests = solved.touching[k], rough[k].kind == "stick"
+            way = solved.slide_rate[k] if rests else touch.slide
+            way, rests = way - touch.normal * (touch.normal @ way), rests and bool(self.contacts[k].friction)
+            whole[k] = following(rough[k]._replace(kind="stick", heading=None), way, rests, REST)
+            whole[k] = whole[k]._replace(feature=rough[k].feature)
+        return tuple(whole), margin
 
     @abstractmethod
     def _free_slides(self, state: Array, rough: ContactMode) -> FreeSlides:
@@ -438,7 +458,7 @@ class ContactStretches(ContactWalks):
         resting = [shut and slip <= stopped for shut, slip in zip(closed_mask, slips, strict=True)]
         rough = self._moved_on(state, modes_of(closed_mask, resting, features))
         state = self._equations.eliminated(state, rough)
-        mode, sure = self._decided(state, rough, leaving)
+        mode, sure = self.decided(state, rough, leaving)
         # A slip in the plane may have turned since it began: its sense is that of the last step.
         sliding = self._touching(stretch.visited[-1][1] if stretch.visited else stretch.first, old_features)
         old_mode = tuple(

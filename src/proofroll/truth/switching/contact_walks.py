@@ -67,6 +67,7 @@ _SAME_RATES = 1e-6
 
 # Angle [rad] and number of steps by which the direction is found in which a slip stops.
 _NEARBY, _TURNS = 1e-3, 2
+_NO_PRESSURE = 1e-13  # force of a contact, in natural units, that is round-off where nothing presses it
 _ONE_WAY = 1e-12  # difference of directions in which slips start together
 # Guard of the first instants of a slip, which goes on.
 _GOES_ON = -1
@@ -152,11 +153,15 @@ class ContactWalks(ABC):
         noise = np.where(np.abs(excess) < _CLAMPED, 2 * np.abs(excess), 0.0)
         if len(sides := np.array(signs[len(self._limited) :], dtype=float)):
             noise = np.append(noise, noise_at_start(state, sides, equations.kinks, self._extent(state)))
+        of_guards = noise_of(guards, self._size)
+        for number, value in enumerate(self._guards(state, mode, guards) if guards else ()):
+            if guards[number].kind in {"lift", "break"} and abs(value) <= _NO_PRESSURE:
+                of_guards[number] = _NO_PRESSURE
         return StretchLaw(
             rates=lambda y: self._held(signs, lambda: equations.rate(y, mode)),
             guards=lambda y: self._guards_and_limits(y, mode, guards, signs),
             corrected=lambda y: equations.eliminated(y, mode),
-            noise=np.append(noise_of(guards, self._size), noise),
+            noise=np.append(of_guards, noise),
             near=np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
         )
 

@@ -55,7 +55,7 @@ class ContactTree(ContactStretches):
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
         rough = self._moved_on(self.start, self.dynamics.rough_start())
-        mode, margin = self._decided(self.start, rough)
+        mode, margin = self.decided(self.start, rough)
         state = self.dynamics.eliminated(self.start, mode)
         return Transition(state, mode, (), margin)
 

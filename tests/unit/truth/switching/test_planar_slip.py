@@ -288,3 +288,24 @@ def test_a_slip_begins_in_one_go_where_its_pull_turns_with_the_square_of_time() 
     # behind the pull by the time |u| in which friction turns the slip, times the pull's rate of turning
     behind = growing * until**2 / 2 * turning * until
     assert np.arctan2(way[1], way[0]) == pytest.approx(turning * until**2 / 2, abs=2 * behind)
+
+
+@pytest.mark.parametrize("excess", [1e-2, 1e-6])
+def test_a_slip_from_rest_may_begin_as_slowly_as_it_likes(excess: float) -> None:
+    """A push just above the grip of a ball that hardly turns moves it at once, while another ball falls beside it."""
+    inertia, times, grip = 1e4, np.linspace(0.0, 0.4, 5), 0.25 * 2.0 * 9.81
+    bodies = Body("slides", 2.0, inertia=(inertia,) * 3), Body("falls", 1.0, inertia=(0.1,) * 3)
+    joints = (
+        Joint("floating", "free", "world", "slides", q0=(0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)),
+        Joint("falling", "free", "world", "falls", q0=(5.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)),
+    )
+    shapes = Geometry("floor", "world", "plane"), Geometry("skin", "slides", "sphere", radius=0.1)
+    push = grip * (1 + 2.0 * 0.1**2 / inertia) * (1 + excess)  # that at which it no longer rolls, and more
+    mechanism = Mechanism(
+        bodies, joints, geometries=shapes, pairs=(Pair("p", ("skin", "floor"), 0.25),),
+        forces=(Force("push", "slides", "force", (push, 0.0, 0.0)),),
+    )  # fmt: skip
+    found = truth_of(mechanism, times)
+    assert found.ended == ""
+    np.testing.assert_allclose(found.record.p_WB[:, 1, 2], -9.81 / 2 * times**2, atol=1e-13)
+    np.testing.assert_allclose(found.record.p_WB[:, 0, 0], (push - grip) / 4 * times**2, rtol=1e-9, atol=1e-16)

@@ -332,7 +332,7 @@ def robust_forces(
 ) -> tuple[Array, list[ModeKind], bool]:
     """Solution as of :func:`contact_forces`, and True if slightly changed pressure and friction give the same outcomes.
 
-    A contact whose force is at most a ``least`` part of the largest force counts as open.
+    A contact whose normal force moves it by at most a ``least`` part of the largest such motion counts as open.
     """
     bounds = np.zeros(len(friction)) if bounds is None else bounds
     static = friction if static is None else static
@@ -344,8 +344,9 @@ def robust_forces(
     nudge = _NUDGE * float(np.abs(c).max()) * G[:, ::3] @ lift
 
     def outcome(force: Array, done: Sequence[ModeKind]) -> list[ModeKind]:
-        little = least * float(np.abs(force).max())
-        return ["open" if push[0] <= little and least else kind for push, kind in zip(force, done, strict=True)]
+        speeds = diagonal * force[:, 0]
+        little = least * float(speeds.max())
+        return ["open" if speed <= little and least else kind for speed, kind in zip(speeds, done, strict=True)]
 
     nominal = outcome(force, done)
     same = all(

@@ -326,7 +326,8 @@ class MechanismElement:
         table += event_observables(self.mechanism)
         for item in named_forces(self.mechanism):
             told = {"floor": least[str(item.unit)], "column": item.field == "coupling"}
-            told["watched"] = item.field in {"coupling", "drive"}
+            told["watched"] = item.field != "stop"  # what softened stops give in an impact is their own
+            told["at_impacts"] = item.field != "friction"
             table.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, **told))
         table += link_observables(self.mechanism, least)
         if self.conservative:

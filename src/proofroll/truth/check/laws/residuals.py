@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.truth.check.laws.record import Array
 
 INSTANT = 1e-6  # natural times beside an event of which what jumps may be on either side
-_HOLE = 1e-4  # natural times before a slip has a direction, in which a route has no states; 1.3e-5 is seen
+_HOLE = 1e-6  # natural times that steps may leave out
 # Law -> allowance of its residual, relative to its natural size, and the law as a clause. On honest records of all
 # models the largest residual is 0.2 of its allowance, most are below 1e-3 of it.
 LAWS: dict[str, tuple[float, str]] = {
