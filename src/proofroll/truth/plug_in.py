@@ -56,7 +56,6 @@ class MechanismTruth:
         """See :func:`proofroll.truth.truth_of_mechanism.truth_of`; of motions that are not unique, laws alone."""
         # imports of a third of a second, which what has another truth does not need
         from proofroll.truth.check.answer import held_answer
-        from proofroll.truth.check.laws.answer import answer_sentence
         from proofroll.truth.early_end import cut_motion
         from proofroll.truth.smooth.singular_poses import branching
         from proofroll.truth.truth_of_mechanism import truth_of
@@ -72,7 +71,7 @@ class MechanismTruth:
         if motion.tiles is None:
             return dataset
         check = held_answer(element, dataset, motion.tiles, times)
-        if text := answer_sentence(check.residuals):
+        if text := check.residuals.broken("what the truth publishes"):
             assert check.residuals.first is not None  # as there is a text
             motion = cut_motion(motion, check.residuals.first.time, text)
             return MechanismTruth._dataset(element, motion, branching(motion.branches))

@@ -1,4 +1,4 @@
-"""Hook of the law check: paths of both routes up to the first violation of a law."""
+"""Hook of the law check: the path of the published route up to the first violation of a law, and works of drives."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.check.law_records import LawRecorder
 from proofroll.truth.check.law_states import by_the_bodies, by_the_tree
-from proofroll.truth.check.laws.law_check import LawCheck, sentence, verdict
+from proofroll.truth.check.laws.law_check import LawCheck
 from proofroll.truth.check.laws.record import Pieces, joined_pieces
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.tiles import Tiles, joined_tiles
@@ -91,7 +91,7 @@ class HeldMotion(NamedTuple):
 
 
 def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[Recorded]) -> HeldMotion:
-    """Outcome of the law check of all routes.
+    """Outcome of the law check of the first route, which is published; what another one misses is in the bars.
 
     Args:
         mechanism: in SI units.
@@ -104,16 +104,17 @@ def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[Recorded])
     # beyond an early end of one path the other may be on another branch, and beyond a close decision all is open
     paths = [route.path for route in routes]
     early = min((path.stretches[-1].end for path in paths if not path.known), default=np.inf)
-    end = min(early, first_close(paths, CLOSE))
     walks = [_Walk(mechanism, units, route) for route in routes]
-    names = [route.name for route in routes]
-    result = verdict({name: walk.through(end * (1 - CLOSE)) for name, walk in zip(names, walks, strict=True)})
-    text, works, pieces = sentence(result, len(routes)), [walk.work for walk in walks], walks[0].taken
-    if result.violation is None:
-        return HeldMotion(end=np.inf, text="", laws=text, works=works, pieces=pieces)
-    if not result.violation.time > 0:
+    residuals = walks[0].through(min(early, first_close(paths, CLOSE)) * (1 - CLOSE))
+    for walk in walks[1:]:
+        walk.through(0.0)
+    works, pieces = [walk.work for walk in walks], walks[0].taken
+    text = residuals.broken("the motion that was followed")
+    if residuals.first is None:
+        return HeldMotion(end=np.inf, text="", laws=residuals.held(), works=works, pieces=pieces)
+    if residuals.first.time <= CLOSE * units.time:  # a first piece begins at 0 but for round-off
         raise Refused(text)
-    return HeldMotion(end=result.violation.time / units.time, text=text, laws="", works=works, pieces=pieces)
+    return HeldMotion(end=residuals.first.time / units.time, text=text, laws="", works=works, pieces=pieces)
 
 
 def tiles_of(route: Recorded, until: float, taken: Mapping[int, Sequence[Pieces]] | None = None) -> Tiles | None:
@@ -136,8 +137,7 @@ def tiles_of(route: Recorded, until: float, taken: Mapping[int, Sequence[Pieces]
 def work_along(mechanism: Mechanism, units: Units, tree: ContactTree, path: _Path) -> WorkAlong:
     """Work of drives along another path of the first route; ``mechanism`` in SI units."""
     walk = _Walk(mechanism, units, of_tree(mechanism, units, tree, path))
-    if working(mechanism):
-        walk.through(0.0)
+    walk.through(0.0)
     return walk.work
 
 
@@ -165,13 +165,13 @@ class _Walk:
         them, or contacts have moments, which no dataset has.
         """
         last_pieces: Pieces | None = None
-        judged = self._check.residuals
+        judged, judging = self._check.residuals, True
         for number, stretch in enumerate(self._path.stretches):
-            if stretch.start >= end and self._check.residuals is judged:
+            if stretch.start >= end and judging:
                 if not self._working:
                     break
                 self._take_waiting()
-                self._check.residuals = LawResiduals(rate=judged.rate)  # behind the end work alone goes on
+                self._check.residuals, judging = LawResiduals(rate=judged.rate), False  # work alone goes on
             if self._held is not None:
                 self._held.recall(stretch.start)
             pieces = self._recorder.pieces(stretch, numeric=self._numeric)
@@ -183,7 +183,7 @@ class _Walk:
                 impulses = self._check.passes(passage)
                 if self._working:
                     self.work.passes(passage, impulses)
-            for part in pieces:
+            for part in pieces if judging else ():
                 if self._waiting and (self._waiting[-1].modes, self._waiting[-1].coarse) != (part.modes, part.coarse):
                     self._take_waiting()
                 self._waiting.append(part)

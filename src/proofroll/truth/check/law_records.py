@@ -15,7 +15,6 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.modes import ContactMode, features_of
 from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
-from proofroll.elements.mechanism.contact.sequences import AT_ONCE
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -163,9 +162,8 @@ class LawRecorder:
         """Record of a stretch at states, (states, values)."""
         return np.array([self._state_of(state, self._route.acting(stretch, state)) for state in states])
 
-    def passage(
-        self, path: HybridPath[Stretch[ContactMode]], number: int, before: Pieces, after: Pieces
-    ) -> Passage:
+    @staticmethod
+    def passage(path: HybridPath[Stretch[ContactMode]], number: int, before: Pieces, after: Pieces) -> Passage:
         """Transition to a stretch of a path, from the end of the one before."""
         sooner, later = path.stretches[number - 1], path.stretches[number]
         change = path.transitions[number] if number < len(path.transitions) else None
@@ -177,7 +175,6 @@ class LawRecorder:
             impacts=frozenset(name for kind, name in happenings if kind == EventKind.IMPACT),
             settles=frozenset(name for kind, name in happenings if kind == EventKind.SETTLE),
             decided=sooner.guard is not None and not border,
-            spread=AT_ONCE if isinstance(self._route, ContactBodies) and not self._mechanism.together else 0.0,
         )
 
     def _stated(self, time: Array, pace: Array, record: Array, mode: ContactMode, *, coarse: bool = False) -> Pieces:

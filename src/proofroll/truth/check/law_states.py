@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.joint_laws import JointContact, mode_of_joints
+from proofroll.elements.mechanism.contact.joint_laws import mode_of_joints
 from proofroll.elements.mechanism.contact.modes import ContactMode, features_of
-from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.rotations import Array, from_quaternion
@@ -31,20 +30,8 @@ def by_the_tree(route: ContactTree, state: Array, mode: ContactMode) -> Array:
     motion, named, loops = solution.state.solution.motion, np.zeros(0), np.zeros(0)
     forces = borne_forces(contacts, solution.state.touching, solution)
     if _has_named(m):
-        others = [k for k, contact in enumerate(contacts) if not isinstance(contact, JointContact)]
-        load = np.einsum("kin,ki->n", solution.state.J[others], forces[others])
-        applied = np.zeros((len(m.bodies) + 1, 6))
-        for contact, touch, force in zip(contacts, solution.state.touching, forces, strict=True):
-            if isinstance(contact, JointContact):
-                continue
-            pressed = m.contacts[contact.pressed_by] if isinstance(contact, TurningFriction) else contact
-            wrench = np.concatenate([force, np.cross(touch.place, force)])
-            if isinstance(contact, TurningFriction):
-                wrench = np.concatenate([0 * force, force])
-            applied[m.body_index[pressed.body_a]] += wrench
-            applied[m.body_index[pressed.body_b]] -= wrench
         joints = mode_of_joints(dynamics.equations.switched, contacts, mode)
-        sample = dynamics.equations.sample(q, v, joints, time, load, applied)
+        sample = dynamics.equations.sample(q, v, joints, time, *dynamics.loads(solution.state, forces))
         named, loops = stated_named(m, sample["named"]), sample["wrench"][len(m.joints) :].ravel()
     poses = motion.p_WB[:-1], motion.R_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1]
     return _vector(poses, contacts, solution.state.touching, forces, named, loops)

@@ -29,7 +29,6 @@ from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
 from proofroll.truth.check.held_to_laws import of_bodies, of_tree, tiles_of
-from proofroll.truth.check.laws.law_check import sentence, verdict
 from proofroll.truth.check.laws.motion import kinematics
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
@@ -327,13 +326,12 @@ class _SmoothTruth:
         spans = [(start, start + _FORM_SPAN) for start in (0.0, self._until / 2)]
         tiles = tiles_of(of_tree(self._mechanism, self._units, self._tree, self._path_of_form(spans)), self._until)
         if tiles is not None:
-            residuals.points = tiles.time.size
             kinematics(LawScene(self._mechanism, self._units.length, residuals.rate), tiles, residuals)
-        outcome = verdict({f"closed form: {form.title}": residuals})
-        if outcome.violation is not None:
-            if not outcome.violation.time > 0:
-                raise Refused(sentence(outcome, 1))
-            early.at(outcome.violation.time / self._units.time, sentence(outcome, 1))
+        if residuals.first is not None:
+            text = residuals.broken(f"the closed form ({form.title})")
+            if not residuals.first.time > 0:
+                raise Refused(text)
+            early.at(residuals.first.time / self._units.time, text)
 
     def _path_of_form(self, spans: Sequence[tuple[float, float]]) -> FollowedPath:
         """The closed form as a path in joint coordinates, which has these spans as its steps."""

@@ -447,19 +447,18 @@ class ContactWalks(ABC):
 
     def _led_from_rest(self, state: Array, mode: ContactMode) -> ContactMode:
         """The mode, in which slips in the plane lead that start from rest in one direction."""
-        if any(acting.leads for acting in mode):
-            return mode
-        touching = self._touching(state, features_of(mode))
         begins = [
-            acting.kind == "slip" and acting.along is None and bool(contact.friction) and acting.heading is not None
-            for acting, contact in zip(mode, self.contacts, strict=True)
+            k
+            for k, (acting, contact) in enumerate(zip(mode, self.contacts, strict=True))
+            if acting.kind == "slip" and acting.along is None and acting.heading and contact.friction
         ]
-        headings = np.array([acting.heading for acting, starts in zip(mode, begins, strict=True) if starts])
-        speeds = [float(np.linalg.norm(slip_velocity(touch))) for touch, starts in zip(touching, begins, strict=True) if starts]
-        if not speeds or max(speeds) > REST or float(np.abs(headings - headings[0]).max()) > _ONE_WAY:
+        if not begins or any(acting.leads for acting in mode):
             return mode
-        pairs = zip(mode, begins, strict=True)
-        return tuple(acting._replace(leads=True) if starts else acting for acting, starts in pairs)
+        touching, headings = self._touching(state, features_of(mode)), np.array([mode[k].heading for k in begins])
+        moves = any(np.linalg.norm(slip_velocity(touching[k])) > REST for k in begins)
+        if moves or float(np.abs(headings - headings[0]).max()) > _ONE_WAY:
+            return mode
+        return tuple(acting._replace(leads=True) if k in begins else acting for k, acting in enumerate(mode))
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""

@@ -418,7 +418,7 @@ class ContactDynamics:
         joints = mode_of_joints(self.equations.switched, self.contacts, mode)
 
         def record(force: Array) -> dict[str, Any]:
-            return self.equations.sample(q, v, joints, time, *self._loads(solution.state, force))
+            return self.equations.sample(q, v, joints, time, *self.loads(solution.state, force))
 
         fields, pressed = record(solution.force), solution.force[:count]
         for shift in np.moveaxis(solution.undetermined, 2, 0):  # what another distribution changes is not determinate
@@ -436,7 +436,7 @@ class ContactDynamics:
             borne[k] = friction.resisted(state.touching[friction.pressed_by].normal, shift[k][:, None])[:, 0]
         return borne
 
-    def _loads(self, state: ContactsNow, force: Array) -> tuple[Array, Array]:
+    def loads(self, state: ContactsNow, force: Array) -> tuple[Array, Array]:
         """Loads by contacts of bodies: along the velocities, and about the world's origin, (bodies + 1, 6)."""
         count = len(self._bodies)
         of_bodies = [k for k, contact in enumerate(self.contacts) if not isinstance(contact, JointContact)]

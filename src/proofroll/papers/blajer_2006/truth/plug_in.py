@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +29,6 @@ from proofroll.papers.blajer_2006.truth.ball_laws import checked_motion
 from proofroll.papers.blajer_2006.truth.onset import edge_between, onset
 from proofroll.papers.blajer_2006.truth.rolling import reduced, unreduced
 from proofroll.truth import SAFETY
-from proofroll.truth.check.laws.law_check import sentence, verdict
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.plug_in import MechanismTruth
 
@@ -65,7 +64,7 @@ class BallOnSurfaceTruth:
 
         Raises:
             Diverged: a route could not be integrated, or a value is not finite.
-            Refused: a route violates a law from the start.
+            Refused: the first route violates a law from the start.
         """
         assert isinstance(element, MechanismElement)  # by ``covers``
         body, instants = ball_of(element), np.asarray(times, dtype=np.float64)
@@ -76,14 +75,14 @@ class BallOnSurfaceTruth:
         first_route, second_route = (series.reduced, series.unreduced) if by_series else (reduced, unreduced)
         with np.errstate(invalid="ignore", divide="ignore"):  # values that are not finite are refused by name below
             exact = closed_form(body, instants) is not None
-            (first, first_laws), (second, second_laws) = (
+            (first, laws), (second, _) = (
                 checked_motion(element, body, route, instants, coarse=not (by_series or route is _exact))
                 for route in (_exact if exact else first_route, second_route)
             )
             result, check = (_dataset(element, instants, route) for route in (first, second))
         _put_error_bars(result, check, _ROUND_OFF if exact or by_series else _SHARED)
         result.attrs |= {"route": first.route, "second_route": second.route}
-        result = _up_to_violation(result, {first.route: first_laws, second.route: second_laws})
+        result = _up_to_violation(result, laws)
         result = _with_orientation(result, element, times, asks) if "orientation" in asks else result
         return with_events(result, ())
 
@@ -164,17 +163,16 @@ def _exact(body: RollingBall, times: FloatArray) -> BallMotion:
     return motion
 
 
-def _up_to_violation(dataset: xr.Dataset, checked: Mapping[str, LawResiduals]) -> xr.Dataset:
+def _up_to_violation(dataset: xr.Dataset, laws: LawResiduals) -> xr.Dataset:
     """The dataset with the outcome of its law check, up to the first violation.
 
     Raises:
         Refused: a law is violated from the start.
     """
-    result = verdict(checked)
-    text = sentence(result, len(checked))
-    if result.violation is None:
-        return dataset.assign_attrs({LAWS: text} if text else {})
-    end = result.violation.time
+    text = laws.broken("the motion that was followed")
+    if laws.first is None:
+        return dataset.assign_attrs({LAWS: held} if (held := laws.held()) else {})
+    end = laws.first.time
     if not end > float(dataset["time"][0]):
         raise Refused(text)
     return dataset.isel(time=slice(int((dataset["time"] < end).sum()))).assign_attrs({ENDS: end, ENDED: text})

@@ -130,15 +130,3 @@ class AnswerCheck:
         if control is None:
             return np.zeros(len(time), dtype=bool)
         return np.asarray(np.abs(time * control.rate - np.round(time * control.rate)) < _INSTANT)
-
-
-def answer_sentence(residuals: LawResiduals) -> str:
-    """Sentence of the first violation; empty: there is none."""
-    item = residuals.first
-    if item is None:
-        return ""
-    part = f" for {item.part}" if item.part else ""
-    return (
-        f'what the truth publishes breaks the law "{LAWS[item.law][1]}"{part} by {item.size:.2g} of its natural size '
-        f"(allowed {item.allowed:.1g}): an error of proofroll; please report it"
-    )

@@ -199,7 +199,6 @@ def _newton(
     """No contact that was struck closes further; of one alone v+ = -e v-, or 0 where its rebounds are summed.
 
     Of several each leaves with e of its speed at least, and one with no more: impulses that press have caused the jump.
-    A route that takes them in turn may miss that by its ``spread``, which is a part of the bars.
     """
     pieces_before, time = passage.before, passage.before.time
     fast, strikes = scene.speed + float(np.abs(pieces_before.v).max()), list[Stop]()
@@ -216,12 +215,11 @@ def _newton(
             for name, restitution, (came, left) in strikes
             if name in passage.impacts and came < 0 and not passage.settles
         }
-        room = passage.spread * max((abs(left - came) for _, _, (came, left) in strikes), default=0.0)
         for name, speed in beyond.items():
-            residuals.note("restitution", name, np.array([[max(-speed, 0.0)]]), fast, time, room)
+            residuals.note("restitution", name, np.array([[max(-speed, 0.0)]]), fast, time)
         if beyond:
             nearest = min(beyond, key=lambda name: abs(beyond[name]))
-            residuals.note("restitution", nearest, np.array([[beyond[nearest]]]), fast, time, room)
+            residuals.note("restitution", nearest, np.array([[beyond[nearest]]]), fast, time)
         return
     name, restitution, (came, left) = strikes[0]
     if not passage.settles:

@@ -1,4 +1,4 @@
-"""Laws of motion as integrals over pieces: places, rotations, momentum along each free direction, and energy."""
+"""Laws of motion as integrals over pieces: places, rotations, and momentum along each free direction."""
 
 from __future__ import annotations
 
@@ -99,22 +99,3 @@ def momenta(
             span * (digits + axis.digits),
             tail(rate, pace),
         )
-
-
-def energy(
-    scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: BodyLoads, axes: Sequence[FreeDirection]
-) -> None:
-    """Kinetic energy and that of gravity = work of all forces that are not constraints."""
-    gravity = np.array(scene.mechanism.gravity)
-    centres, velocities = scene.centres(pieces)
-    local = turned(pieces.R.swapaxes(-1, -2), pieces.w)
-    kinetic = 0.5 * (scene.mass * dot(velocities, velocities) + dot(local, turned(scene.inertia, local)))
-    total = (kinetic - scene.mass * (centres @ gravity)).sum(-1)
-    parts = scene.mass * (scene.speed**2 + 2 * dot(velocities, velocities))
-    parts = parts + scene.mass * np.linalg.norm(gravity) * (scene.length + norm(centres))
-    for axis in axes:
-        total = total + 0.5 * scene.mechanism.joints[axis.joint].armature * axis.rate**2
-    span = pieces.time[:, -1:] - pieces.time[:, :1]
-    size = np.abs(total) + parts.sum(-1) + span * loads.power_size
-    left = since_start(total) - integral(loads.power, pieces.pace)
-    residuals.note("energy", "", left, size, pieces.time, tail=tail(loads.power, pieces.pace))

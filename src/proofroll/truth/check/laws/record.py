@@ -117,7 +117,6 @@ class Passage:
         impacts: names of contacts and joints that were struck.
         settles: names of those whose rebounds are summed.
         decided: True if a guard ended the stretch; False for a break of a signal or a border of a surface.
-        spread: part of the jumps by which a route that takes impacts in turn may miss Newton's law for several.
     """
 
     before: Pieces
@@ -125,7 +124,6 @@ class Passage:
     impacts: frozenset[str] = frozenset()
     settles: frozenset[str] = frozenset()
     decided: bool = True
-    spread: float = 0.0
 
     @property
     def happens(self) -> bool:

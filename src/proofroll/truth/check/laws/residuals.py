@@ -19,7 +19,6 @@ LAWS: dict[str, tuple[float, str]] = {
     "joined": (1e-10, "poses and velocities go on where they ended"),
     "momentum": (1e-10, "momentum = integral of the forces"),
     "spin": (1e-10, "angular momentum = integral of the moments"),
-    "energy": (1e-10, "energy = work of the forces"),
     "joint place": (1e-10, "a joint holds its bodies together"),
     "joint rate": (1e-10, "bodies of a joint move together"),
     "loop force": (1e-10, "a loop bears no force along its free directions"),
@@ -151,3 +150,25 @@ class LawResiduals:
                 size_there = float(residual[piece].flat[number] / size[piece].flat[number])
                 bound = float(allowed[piece].flat[number] / size[piece].flat[number])
             self.first = Violation(time=begin, law=law, part=part, size=size_there, allowed=bound)
+
+    def held(self) -> str:
+        """Clause on the laws that hold; empty: nothing could be held to a law."""
+        if not self.points:
+            return ""
+        law, (part, time, _) = max(self.largest.items(), key=lambda item: item[1][0], default=("", (0.0, 0.0, "")))
+        events = f" and on both sides of {self.events} events" if self.events else ""
+        return (
+            f"holds {len(self.largest)} laws at {self.points:,} points{events}; "
+            f"largest residual {part:.2g} of its allowance ({law}, {time:.3g} s)"
+        )
+
+    def broken(self, subject: str) -> str:
+        """Sentence of the first violation; empty: there is none."""
+        item = self.first
+        if item is None:
+            return ""
+        part = f" for {item.part}" if item.part else ""
+        return (
+            f'{subject} breaks the law "{LAWS[item.law][1]}"{part} by {item.size:.2g} of its natural size '
+            f"(allowed {item.allowed:.1g}): an error of proofroll; please report it"
+        )
