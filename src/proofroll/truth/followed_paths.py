@@ -269,7 +269,7 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     sizes |= {
         "wrench": quadratic * sizes["wrench"],
         "pressed": quadratic * units.force,
-        "sums": quadratic * units.force,
+        "sums": quadratic * units.force * max(1.0, units.length),  # forces and moments
         "links": quadratic * sizes["wrench"]
         + max((link.stiffest for link in mechanism.links), default=0.0) * units.length,
     }

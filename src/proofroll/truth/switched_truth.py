@@ -19,7 +19,9 @@ from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
+from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.record import record_of
+from proofroll.elements.mechanism.run.contacts.observables import follow_contacts, moments_along
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import contact_sums
 from proofroll.elements.mechanism.scene.signal import breaks
@@ -120,12 +122,15 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     modes = [bodies.acting(paths[1].stretches[number], state) for number, state in zip(others, states[1], strict=True)]
     applied = [bodies.forces(state, mode) for state, mode in zip(states[1], modes, strict=True)]
     switched = [equations.switched(state, mode) for state, mode in zip(states[1], modes, strict=True)]
-    wrenches = [wrench for _, wrench in applied]
+    pushes, wrenches = zip(*applied, strict=True)
     by_bodies = on_same_turns(scaled, by_tree, second.recorded(times, states[1][:, :-1], switched, wrenches))
-    forces_of_bodies = np.array([force for force, _ in applied])
-    others_sums = np.einsum("pk,tki->tpi", contact_sums(scaled.contacts), forces_of_bodies) * units.force
+    forces_of_bodies = np.array(pushes) * units.force
     # samples at instants are at the times that were asked for, to the last bit
     by_tree, by_bodies = (units.record(mechanism, replace(record, time=asked)) for record in (by_tree, by_bodies))
+    forces_of_tree, sums_of_bodies = (
+        _in_si(mechanism, units, tree_states),
+        _sums_along(by_bodies.placed(mechanism), forces_of_bodies),
+    )
     left = None
     if cut is not None:
         earlier = at_times(cut[0], counterparts((paths[0], cut[0]), stretches, kinds), times, kinds)
@@ -145,8 +150,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
             works,
             unresolved=np.max([rest.max(axis=1, initial=0.0) for rest in unresolved], axis=0),
             kinds=kinds,
-            pressed=(tree_states.pressed * units.force, forces_of_bodies * units.force) if scaled.contacts else None,
-            sums=(tree_states.sums * units.force, others_sums) if scaled.contacts else None,
+            pressed=(forces_of_tree.pressed, forces_of_bodies) if scaled.contacts else None,
+            sums=(forces_of_tree.sums, sums_of_bodies) if scaled.contacts else None,
             until=until * units.time,
             cut=left,
         ),
@@ -261,10 +266,17 @@ def _by_the_tree(
     return Routed(record_of(times, records), np.array(forces), np.array(sums), works)
 
 
+def _sums_along(placed: Placed, pressed: Array) -> Array:
+    """Sums of contact forces [N] and of their moments [N m] along a motion, (times, sums, 3)."""
+    sums = contact_sums(placed.mechanism.contacts) @ pressed
+    return np.concatenate([sums, moments_along(placed, follow_contacts(placed).place, pressed)], axis=1)
+
+
 def _in_si(mechanism: Mechanism, units: Units, states: Routed) -> Routed:
     """Motion and forces in SI units."""
-    pressed, sums = states.pressed * units.force, states.sums * units.force
-    return Routed(units.record(mechanism, states.record), pressed, sums, states.works)
+    moment = np.arange(states.sums.shape[1]) >= len(contact_sums(mechanism.contacts))
+    sums = states.sums * (units.force * np.where(moment, units.length, 1.0))[:, None]
+    return Routed(units.record(mechanism, states.record), states.pressed * units.force, sums, states.works)
 
 
 def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:

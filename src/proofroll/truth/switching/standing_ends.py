@@ -17,7 +17,13 @@ from proofroll.elements.mechanism.contact.modes import ContactMode, closed_in, s
 from proofroll.elements.mechanism.contact.start import TOUCHING, natural_scale, touches
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, cross, to_rpy
-from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair, shared_pairs
+from proofroll.elements.mechanism.scene.shapes.geometry import (
+    Geometry,
+    Pair,
+    contact_sums,
+    shared_pairs,
+    turned_bodies,
+)
 from proofroll.truth.error_bars import TwoRouteMotion
 
 _CORNERS = 8  # of a box; those of one end are every other one
@@ -64,6 +70,10 @@ class StandingEnds:
                 rest = motion.sums[:, order.index(pair)] - motion.pressed[:, others].sum(axis=1)
                 forces = np.where(np.isnan(forces), rest, forces)
             pressed.append(forces)
+        contacts, count = self.mechanism.contacts, len(contact_sums(self.mechanism.contacts))
+        corners = [contacts[k] for part in self.parts if len(part) > 1 for k in part]
+        stands = {body for contact in corners for body in (contact.body_a, contact.body_b)}
+        kept = [count + k for k, body in enumerate(turned_bodies(contacts)) if body not in stands]
         bars = dict(motion.bars)
         bars["pressed"] = bars["sums"] + _CORNERS / 2 * bars["pressed"]
         return replace(
@@ -71,6 +81,7 @@ class StandingEnds:
             bars=bars,
             tiles=None if motion.tiles is None else motion.tiles.of_contacts(self.parts),
             pressed=np.stack(pressed, axis=1),
+            sums=motion.sums[:, [*range(count), *kept]],
             events=self._once(motion.events),
             bounces=self._once(motion.bounces),
             reason=self._told(motion.reason),

@@ -59,7 +59,7 @@ from proofroll.elements.mechanism.scene.drives import MODES
 from proofroll.elements.mechanism.scene.kinks import held_sides
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
-from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, contact_sums
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, contact_moments, contact_sums, turned_bodies
 from proofroll.elements.mechanism.scene.signal import FUNCTIONS
 
 # Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
@@ -87,8 +87,7 @@ class ContactDynamics:
         self.friction = np.array([contact.friction for contact in self.contacts])
         self._static = np.array([contact.static for contact in self.contacts])
         self._bounds = np.array([contact.bound for contact in self.contacts])
-        others = len(self.contacts) - len(mechanism.contacts)
-        self.sums = np.pad(contact_sums(mechanism.contacts), ((0, 0), (0, others)))
+        self._sums = contact_sums(mechanism.contacts)
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._held: tuple[int, ...] = ()
@@ -412,7 +411,8 @@ class ContactDynamics:
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array, Array]:
         """Fields of a record at one time [s], contact forces between bodies, and their sums.
 
-        Forces [N], (contacts, 3), and the :func:`contact_sums` [N], (sums, 3), are NaN where they are not determinate.
+        Forces [N], (contacts, 3), and the :func:`contact_sums` [N] with the :func:`contact_moments` [N m], (sums, 3),
+        are NaN where they are not determinate.
         """
         solution, count = self.solve(q, v, mode, time), len(self._bodies)
         joints = mode_of_joints(self.equations.switched, self.contacts, mode)
@@ -425,8 +425,19 @@ class ContactDynamics:
             others = record(solution.force + self._borne(solution.state, shift))
             for name in ("wrench", "named"):
                 fields[name] = np.where(np.abs(others[name] - fields[name]) > RANK, np.nan, fields[name])
-        moved = np.abs(np.einsum("pk,kiw->piw", self.sums, solution.undetermined)).max(axis=2, initial=0.0)
-        sums = np.where(moved <= RANK, self.sums[:, :count] @ pressed, np.nan)
+        motion, places = solution.state.solution.motion, np.array([touch.place for touch in solution.state.touching])
+        bodies, m = turned_bodies(self.mechanism.contacts), self.mechanism
+        turned = [(k, np.array(m.bodies[k].com)) for k in map(m.body_index.__getitem__, bodies)]
+        centres = [motion.p_WB[k] + motion.R_WB[k] @ com for k, com in turned]
+
+        def summed(forces: Array) -> Array:
+            forces = forces[..., :count, :]
+            return np.concatenate(
+                [self._sums @ forces, contact_moments(m.contacts, centres, places[:count], forces)], axis=-2
+            )
+
+        moved = np.abs(summed(np.moveaxis(solution.undetermined, 2, 0))).max(axis=0, initial=0.0)
+        sums = np.where(moved <= RANK, summed(pressed), np.nan)
         return fields, np.where(solution.determinate[:count], pressed, np.nan), sums
 
     def _borne(self, state: ContactsNow, shift: Array) -> Array:

@@ -22,12 +22,13 @@ from proofroll.elements.mechanism.run.contacts.observables import (
     follow_contacts,
     given_forces,
     kept_laws,
+    moments_along,
     normal_forces,
     residuals,
 )
 from proofroll.elements.mechanism.run.sampling import MechanismSample
 from proofroll.elements.mechanism.scene.joint_kinds import TURNING
-from proofroll.elements.mechanism.scene.shapes.geometry import carried_bodies, contact_sums, shared_pairs
+from proofroll.elements.mechanism.scene.shapes.geometry import carried_bodies, contact_sums, shared_pairs, turned_bodies
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -139,7 +140,8 @@ def columns(
     """Variables of a run, from the motion of the bodies and the forces and moments on them.
 
     ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3);
-    ``sums``: of forces of contacts by :func:`.contact_sums`, (time, sums, 3), by default from ``pressed``;
+    ``sums``: of forces of contacts by :func:`.contact_sums`, then their moments by :func:`.moments_along`,
+    (time, sums, 3), by default from ``pressed``;
     ``unsaid``: reason of what is NaN at the last time; ``work``: of drives [J], (time, drives), by default summed over
     the samples;
     ``named``: see :func:`~proofroll.elements.mechanism.dynamics.named_forces.named_forces`, (time, forces).
@@ -151,7 +153,8 @@ def columns(
     [N, N m] along coordinates; ``force.<spring>`` [N], ``force.<bushing>.x|y|z``, ``torque.<bushing>.x|y|z`` on its
     body_b, ``work.effort.<actuator>``, ``work.drive.<joint>`` [J]; ``force.<pair>.x|y|z`` [N] on the body of its first
     geometry, the sum where a pair touches at several places, ``net_force.<body>.x|y|z`` [N], the sum of the contacts
-    of a body that touches in several pairs, ``gap.<pair>`` [m], ``slip.<pair>`` [m/s], and residuals
+    of a body that touches in several pairs, ``net_torque.<body>.x|y|z`` [N m], the moment about its centre of mass of
+    the contacts of a body that touches at several places, ``gap.<pair>`` [m], ``slip.<pair>`` [m/s], and residuals
     of Coulomb's law, see
     :data:`~proofroll.elements.mechanism.run.contacts.observables.RESIDUALS`; ``energy`` [J], ``drift`` [m], and
     ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
@@ -244,11 +247,12 @@ def _put_contacts(
     """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact, pair and of all together."""
     followed = follow_contacts(placed)
     contacts = placed.mechanism.contacts
-    shared, carried = shared_pairs(contacts), carried_bodies(contacts)
+    shared, carried, turned = shared_pairs(contacts), carried_bodies(contacts), turned_bodies(contacts)
     if sums is None:
         parts = [(row, np.flatnonzero(row)) for row in contact_sums(contacts)]
-        summed = [np.einsum("k,tki->ti", row[of], pressed[:, of]) for row, of in parts]
-        sums = np.stack(summed, axis=1) if summed else np.zeros((len(pressed), 0, 3))
+        summed = [np.einsum("k,tki->ti", row[of], pressed[:, of])[:, None] for row, of in parts]
+        sums = np.concatenate([*summed, moments_along(placed, followed.place, pressed)], axis=1)
+    of_carried, of_turned = np.split(sums[:, len(shared) :], [len(carried)], axis=1)
     for index, (name, numbers) in enumerate(shared.items()):
         for axis, letter in enumerate("xyz"):
             component = sums[:, index, axis]
@@ -258,13 +262,17 @@ def _put_contacts(
     if shared:
         meaning = "sums of the forces of pairs that touch at several places"
         put("pair_forces", sums[:, : len(shared)], "N", meaning, "pair", "xyz")
-    if carried:
-        meaning = "sums of the contact forces on bodies that touch in several pairs"
-        put("net_forces", sums[:, len(shared) :], "N", meaning, "carried", "xyz")
-    for body, net in zip(carried, np.moveaxis(sums[:, len(shared) :], 1, 0), strict=True):
-        for component, letter in zip(net.T, "xyz", strict=True):
-            absent = unsaid if np.isnan(component[-1]) else ""
-            put(f"net_force.{body}.{letter}", component, "N", f"sum of the contact forces on {body}", absent=absent)
+    for kind, unit, what, bodies, values in (
+        ("force", "N", "sums of the contact forces on bodies that touch in several pairs", carried, of_carried),
+        ("torque", "N m", "moments of the contact forces on bodies that touch at several places", turned, of_turned),
+    ):
+        if bodies:
+            put(f"net_{kind}s", values, unit, what, "carried" if kind == "force" else "turned", "xyz")
+        for body, net in zip(bodies, np.moveaxis(values, 1, 0), strict=True):
+            for component, letter in zip(net.T, "xyz", strict=True):
+                absent = unsaid if np.isnan(component[-1]) else ""
+                meaning = f"{'sum' if kind == 'force' else 'moment'} of the contact forces on {body}"
+                put(f"net_{kind}.{body}.{letter}", component, unit, meaning, absent=absent)
     for index, contact in enumerate(placed.mechanism.contacts):
         for axis, letter in enumerate("xyz"):
             component = pressed[:, index, axis]

@@ -166,6 +166,12 @@ def _names(scene: LawScene, published: PublishedValues, residuals: LawResiduals)
             signs = np.array([(contact.a == number) - (contact.b == number) for contact in scene.contacts], float)
             total = np.einsum("k,tki->ti", signs, forces)
             pairs.append((f"net_force.{body.name}", _vector(published, f"net_force.{body.name}"), total))
+        if f"net_torque.{body.name}.x" in values:
+            number, centres = scene.index[body.name], scene.centres(pieces)[0][:, 0]
+            signs = np.array([(contact.a == number) - (contact.b == number) for contact in scene.contacts], float)
+            arms = pieces.place[:, 0] - centres[:, number, None]
+            total = np.einsum("k,tki->ti", signs, np.cross(arms, forces))
+            pairs.append((f"net_torque.{body.name}", _vector(published, f"net_torque.{body.name}"), total))
     for name, first, second in pairs:
         _same(name, (first, second), published, residuals)
 

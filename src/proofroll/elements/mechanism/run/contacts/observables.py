@@ -14,7 +14,12 @@ from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.contact.coulomb import largest_friction
 from proofroll.elements.mechanism.contact.touching import Moving, touch
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.elements.mechanism.scene.shapes.geometry import carried_bodies, shared_pairs
+from proofroll.elements.mechanism.scene.shapes.geometry import (
+    carried_bodies,
+    contact_moments,
+    shared_pairs,
+    turned_bodies,
+)
 from proofroll.elements.mechanism.scene.signal import varies
 
 if TYPE_CHECKING:
@@ -87,6 +92,19 @@ def follow_contacts(placed: Placed) -> Followed:
     return Followed(gap=gap, slip=slip, normal=normal, slide=slide, place=place)
 
 
+def moments_along(placed: Placed, place: FloatArray, pressed: FloatArray) -> FloatArray:
+    """Moments of contact forces on each of :func:`.turned_bodies` about its centre of mass [N m], (time, bodies, 3).
+
+    Args:
+        placed: motion of the bodies.
+        place: of the contacts [m], (time, contacts, 3).
+        pressed: their forces [N], (time, contacts, 3).
+    """
+    m = placed.mechanism
+    centres = [placed.point(body, m.bodies[m.body_index[body]].com) for body in turned_bodies(m.contacts)]
+    return contact_moments(m.contacts, centres, place, pressed)
+
+
 def kept_laws(mechanism: Mechanism) -> frozenset[str]:
     """Names of the ``LAWS`` that hold for a mechanism with contacts, through any impact."""
     if not mechanism.contacts or mechanism.actuators or any(joint.torque for joint in mechanism.joints):
@@ -136,6 +154,11 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
     if carried_bodies(mechanism.contacts):
         meaning = "sums of the contact forces on each body that touches in several pairs, where they are determinate"
         yield Observable("net_forces", "N", meaning, Role.REACTION, floor=force, **told)
+    if turned_bodies(mechanism.contacts):
+        meaning = (
+            "moments of the contact forces on each body that touches at several places, where they are determinate"
+        )
+        yield Observable("net_torques", "N m", meaning, Role.REACTION, floor=sizes["N m"], **told)  # most balance
     meaning = "share of the samples so far without a normal force"
     yield Observable("unpressed", "1", meaning, Role.REACTION, floor=1.0, asked_for=False)
     laws = [law for law in LAWS if law[0] in kept_laws(mechanism)]

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal, cast, get_args
 import numpy as np
 from typing_extensions import override
 
-from proofroll.core.arrays import read_only
+from proofroll.core.arrays import cross, read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism.scene import checks, rotations
 from proofroll.elements.mechanism.scene.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Against, Vector, Z
@@ -456,6 +456,28 @@ def contact_sums(contacts: Sequence[BodyContact]) -> Array:
     for body in carried_bodies(contacts):
         sums.append(np.array([(contact.body_a == body) - float(contact.body_b == body) for contact in contacts]))
     return np.array(sums).reshape(len(sums), len(contacts))
+
+
+def turned_bodies(contacts: Sequence[BodyContact]) -> tuple[str, ...]:
+    """Names of the bodies that touch at several places, each of which is one point, in the order of their contacts."""
+    of_bodies: dict[str, list[BodyContact]] = {}
+    for contact in contacts:
+        for body in (contact.body_a, contact.body_b):
+            of_bodies.setdefault(body, []).append(contact)
+    several = {body: own for body, own in of_bodies.items() if len(own) > 1 and body != WORLD}
+    return tuple(body for body, own in several.items() if not any(contact.may_lie for contact in own))
+
+
+def contact_moments(contacts: Sequence[BodyContact], centres: Sequence[Array], places: Array, forces: Array) -> Array:
+    """Moments of forces of contacts, (…, contacts, 3), on each of the :func:`turned_bodies`, (…, bodies, 3).
+
+    ``centres``: centre of mass of each of them, (…, 3), about which they turn it; ``places``: as ``forces``.
+    """
+    moments = []
+    for body, centre in zip(turned_bodies(contacts), centres, strict=True):
+        signs = np.array([(contact.body_a == body) - float(contact.body_b == body) for contact in contacts])
+        moments.append(signs @ cross(places - centre[..., None, :], forces))
+    return np.stack(moments, axis=-2) if moments else np.zeros((*forces.shape[:-2], 0, 3))
 
 
 def _a(kind: str) -> str:
