@@ -32,7 +32,6 @@ from proofroll.truth.tree.contact_tree import ContactTree
 
 _TURN = 1.0  # rad, by which bodies turn in a piece at most: more is not resolved by its points
 _HALVINGS = 7  # of a step into pieces at most
-_LOOSER = 10.0  # by how much less rotations are resolved than states: they follow from these
 _PARTS = 8  # into which the first instants of a slip are cut: a force that jumps inside is located to one of them
 
 
@@ -96,7 +95,7 @@ class LawRecorder:
         if isinstance(stretch, CompiledStretch) and stretch.by is not None:
             parts = self.pieces(stretch, numeric=False) if pieces is None else pieces
             return joined_tiles([Tiles.of(part, number) for part in parts]) if parts else None
-        cut = list(self._whole(stretch))
+        cut = list(self._cut(stretch, whole=True))
         if not cut:
             return None
         time, pace = (np.array([getattr(piece, name) for piece in cut]) for name in ("time", "pace"))
@@ -249,39 +248,8 @@ class LawRecorder:
             stops=tuple((low, high) for low, high in stops),
         )
 
-    def _whole(self, stretch: Stretch[ContactMode]) -> Iterator[_Piece]:
-        """Pieces of a stretch that leave no time out, without forces."""
-        if isinstance(stretch, StoppingSlip):
-            edges = [stretch.start, *(step.time for step in stretch.steps), stretch.end]
-            for start, end in pairwise(edges):
-                if end > start:
-                    yield from self._parts(start, end, lambda times: stretch.at(times).T, None)
-        elif stretch.exact and not isinstance(stretch, CompiledStretch):
-            for start, end, inside in stretch.dense:
-                if min(end, stretch.end) > start:
-                    yield from self._equal_parts(start, min(end, stretch.end), inside)
-        else:
-            yield from self._cut(stretch)
-
-    def _equal_parts(self, start: float, end: float, inside: Callable[[Array], Any]) -> Iterator[_Piece]:
-        """Equal pieces of a step, so many that their points resolve states and turns."""
-        count = 1
-        for _ in range(_HALVINGS):
-            half = (end - start) / (2 * count)
-            middles = start + half * (2 * np.arange(count) + 1)
-            times = middles[:, None] + half * POINTS
-            states = np.asarray(inside(times.ravel()))
-            moving = self._poses(states.T).reshape(count, len(POINTS), -1, 18)
-            turn = 2 * half * float(np.abs(moving[..., 15:]).max(initial=0.0))
-            turning = np.moveaxis(moving[..., 3:12], 1, -1).reshape(-1, len(POINTS))
-            if turn <= _TURN and not _unresolved(states.reshape(-1, len(POINTS))) and not _unresolved(turning, _LOOSER):
-                break
-            count = max(2 * count, int(np.ceil(count * turn / _TURN)))
-        states = states.T.reshape(*times.shape, -1)
-        yield from (_Piece(time, np.full(len(POINTS), half), part) for time, part in zip(times, states, strict=True))
-
-    def _cut(self, stretch: Stretch[ContactMode]) -> Iterator[_Piece]:
-        """Pieces of a stretch."""
+    def _cut(self, stretch: Stretch[ContactMode], *, whole: bool = False) -> Iterator[_Piece]:
+        """Pieces of a stretch; ``whole``: with the steps before the line of a slip that stops."""
         if isinstance(stretch, BegunSlip):
             edges = np.linspace(stretch.start, stretch.end, _PARTS + 1)
             for start, end in pairwise(edges):
@@ -290,9 +258,10 @@ class LawRecorder:
                 )
         elif isinstance(stretch, StoppingSlip):
             # In the steps before its line, a slip has a direction by round-off alone
-            start = float(stretch.line[-1])
-            if stretch.end > start:
-                yield from self._parts(start, stretch.end, lambda times: stretch.at(times).T, None)
+            begins = [stretch.start, *(step.time for step in stretch.steps)] if whole else [float(stretch.line[-1])]
+            for start, end in pairwise([*begins, stretch.end]):
+                if end > start:
+                    yield from self._parts(start, end, lambda times: stretch.at(times).T, None)
         elif isinstance(stretch, CompiledStretch) and stretch.by is not None:
             recorded = stretch.by.record_of(stretch.mode, stretch.start)
             for start, end, inside_step in stretch.by.steps_of(stretch):
@@ -301,7 +270,7 @@ class LawRecorder:
             for start, last, inside in stretch.dense:
                 if min(last, stretch.end) > start:
                     parts = self._parts(start, min(last, stretch.end), inside, None)
-                    yield from (piece._replace(coarse=True) for piece in parts)
+                    yield from (piece._replace(coarse=not stretch.exact) for piece in parts)
         elif stretch.end > stretch.start:  # nothing moves
             half = (stretch.end - stretch.start) / 2
             states = np.repeat(stretch.first[None], len(POINTS), 0)
@@ -358,7 +327,7 @@ class LawRecorder:
         yield _Piece(time, rate, states.T, record.T if len(record) else None)
 
 
-def _unresolved(values: Array, looser: float = 1.0) -> bool:
+def _unresolved(values: Array) -> bool:
     """True if the points of a piece do not resolve one of the values on it, (values, points)."""
     coefficients = np.abs(TO_SERIES @ values.T)
-    return bool((coefficients[-2:].max(0) > looser * RESOLVED * np.maximum(1.0, coefficients.max(0))).any())
+    return bool((coefficients[-2:].max(0) > RESOLVED * np.maximum(1.0, coefficients.max(0))).any())

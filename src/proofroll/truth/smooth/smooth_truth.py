@@ -29,9 +29,6 @@ from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
 from proofroll.truth.check.held_to_laws import of_bodies, of_tree, tiles_of
-from proofroll.truth.check.laws.motion import kinematics
-from proofroll.truth.check.laws.residuals import LawResiduals
-from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.early_end import EarlyEnd
 from proofroll.truth.error_bars import (
     NUDGE,
@@ -54,7 +51,6 @@ CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indis
 BRANCH = 1e-3  # natural lengths, 1: distance between routes that chaos causes only long after the horizon
 ENERGY = 1e-8  # change of energy relative to its parts, a thousand times that of routes through chaos, 1e-11
 _FORM_STEP = 1.0  # length of parts of a closed form at most, in natural units
-_FORM_SPAN = 0.1  # length of its parts whose velocities are held to its places beside its routes
 _WITNESS_STEP = 2.0**-7  # length of the equal steps of a closed form's witness at most, in natural units
 _POSE_STEP = 2.0**-6  # length of steps that look for singular poses at most, in natural units
 _SINGULAR = 1e-3  # least singular value of rows relative to the largest, below which a pose counts as singular
@@ -150,8 +146,6 @@ class _SmoothTruth:
             count = len(by_the_tree)
             chaotic = chaotic[:count] & (by_the_tree * NUDGE > CHAOS)
         self._check_branch(by_tree.first(count), by_bodies.first(count), chaotic, early, paths)
-        if form is not None:
-            self._check_form(form, early)
         count = len(early.known(self._times))
         by_tree, by_bodies = by_tree.first(count), by_bodies.first(count)
         best, nearby = by_bodies, on_same_turns(self._mechanism, by_bodies, nearby.first(count))
@@ -315,23 +309,6 @@ class _SmoothTruth:
         nearby = tree.walk(0.0, np.append(start, 0.0), stretch.mode, float(times[-1]))
         moved, record = (equations.recorded(times, tree.within(item, times)[:, :-1]) for item in (nearby, stretch))
         return _apart(moved, record) / BESIDE
-
-    def _check_form(self, form: ClosedForm, early: EarlyEnd) -> None:
-        """Ends the truth where velocities of a closed form are not the rates of its places.
-
-        Raises:
-            Refused: the velocities are wrong from the start.
-        """
-        residuals = LawResiduals(rate=1 / self._units.time)
-        spans = [(start, start + _FORM_SPAN) for start in (0.0, self._until / 2)]
-        tiles = tiles_of(of_tree(self._mechanism, self._units, self._tree, self._path_of_form(spans)), self._until)
-        if tiles is not None:
-            kinematics(LawScene(self._mechanism, self._units.length, residuals.rate), tiles, residuals)
-        if residuals.first is not None:
-            text = residuals.broken(f"the closed form ({form.title})")
-            if not residuals.first.time > 0:
-                raise Refused(text)
-            early.at(residuals.first.time / self._units.time, text)
 
     def _path_of_form(self, spans: Sequence[tuple[float, float]]) -> FollowedPath:
         """The closed form as a path in joint coordinates, which has these spans as its steps."""

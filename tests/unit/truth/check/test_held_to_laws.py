@@ -79,8 +79,8 @@ def test_what_a_controller_sets_follows_its_law(held: str, delay: int, monkeypat
     assert "effort = law of the actuator" in motion.ended
 
 
-def test_a_closed_form_is_held_to_the_laws(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Velocities of a closed form that are a millionth off are no rates of its places, and the form is named."""
+def test_the_bars_hold_what_a_closed_form_misses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Velocities of a closed form that are a millionth off are a millionth from both routes, and so are their bars."""
     bob = Body("bob", 1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01))
     pendulum = Mechanism((bob,), (Joint("pivot", "revolute", "world", "bob", axis=(0.0, 1.0, 0.0), q0=(1.0,)),))
     times = np.linspace(0.0, 0.5, 3)
@@ -95,5 +95,5 @@ def test_a_closed_form_is_held_to_the_laws(monkeypatch: pytest.MonkeyPatch) -> N
         return q, v * (1.0 + 1e-6)
 
     monkeypatch.setattr(smooth_truth, "closed_form", lambda _: replace(form, motion=faulty))
-    with pytest.raises(Refused, match=r"the closed form \(pendulum, Jacobi elliptic functions\) breaks"):
-        truth_of(pendulum, times)
+    found = truth_of(pendulum, times)
+    assert found.bars["v_WB"].max() + found.bars["w_WB"].max() > 1e-6 * np.abs(found.record.w_WB).max()

@@ -34,8 +34,8 @@ def on_the_motion(
     for name, size in sizes.items():
         values = getattr(tiles, name)
         off = np.abs(getattr(pieces, name)[:, 0] - places.at(values)).reshape(len(places.tile), -1).max(1)
-        size = (size + float(np.abs(values).max())) * (_DENSE if tiles.coarse else 1.0)
-        residuals.note("sample", "", off[:, None], size, pieces.time, bars[name])
+        room = (size + float(np.abs(values).max())) * (_DENSE if tiles.coarse else 1.0)
+        residuals.note("sample", "", off[:, None], room, pieces.time, bars[name])
 
 
 def force_laws(

@@ -127,7 +127,9 @@ def test_the_sentence_names_what_breaks_a_law() -> None:
     honest, fault = free_body().residuals(), free_body().changed(v=_scaled).residuals()
     assert honest.broken("the motion") == ""
     assert honest.held().startswith("holds ")
-    assert fault.broken("the motion").startswith('the motion breaks the law "place = integral of the velocity" for stone')
+    assert fault.broken("the motion").startswith(
+        'the motion breaks the law "place = integral of the velocity" for stone'
+    )
     assert "please report it" in fault.broken("the motion")
 
 
