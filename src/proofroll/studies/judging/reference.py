@@ -37,7 +37,7 @@ from proofroll.studies.judging.quiet import quiet, untouched
 if TYPE_CHECKING:
     import xarray as xr
 
-# At which dry friction of a joint jumps; of a contact that touches it is judged there.
+# At which other forces that have no value beside impacts jump, too; those of contacts are judged there.
 _REVERSES = frozenset({EventKind.SLIP, EventKind.STICK, EventKind.REST, EventKind.TURN})
 _PARTED = 0.1  # part of their largest difference at which two runs have parted
 
