@@ -459,7 +459,7 @@ def contact_sums(contacts: Sequence[BodyContact]) -> Array:
 
 
 def turned_bodies(contacts: Sequence[BodyContact]) -> tuple[str, ...]:
-    """Names of the bodies that touch at several points, in the order of their contacts; without those that may lie flat."""
+    """Names of the bodies that touch at several points, in the order of contacts; without those that may lie flat."""
     of_bodies: dict[str, list[BodyContact]] = {}
     for contact in contacts:
         for body in (contact.body_a, contact.body_b):
