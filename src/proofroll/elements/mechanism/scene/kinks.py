@@ -102,18 +102,3 @@ def with_sides(functions: Functions, side: Callable[[Any], Any]) -> Functions:
         "max": lambda *values: reduce(larger, values),
         "min": lambda *values: reduce(lambda a, b: larger(a, b, -0.5), values),
     }
-
-
-def beside(kinks: Sequence[str], value: Callable[[Functions, bool], Any], functions: Functions) -> Any:
-    """Value of a law whose kinks keep the sides that they have in the middle of a piece of a motion.
-
-    Args:
-        kinks: of the law.
-        value: functions, and True for the middle -> value of the law at all points, or in the middle.
-        functions: of formulas.
-    """
-    laws: dict[Hashable, Sequence[str]] = {"": kinks}
-    middle = Sides(laws)
-    value(middle.functions(functions), True)
-    held = Sides(laws, [np.sign(argument) for argument in middle.arguments])
-    return value(held.functions(functions), False)

@@ -17,7 +17,7 @@ from proofroll.core.expressions import FUNCTIONS as OF_PARAMETERS
 from proofroll.core.parameters import Parameters, measured
 from proofroll.core.quantity import Quantity
 from proofroll.elements.mechanism.scene import checks
-from proofroll.elements.mechanism.scene.kinks import KINKED, beside, functions_of, kinks_in
+from proofroll.elements.mechanism.scene.kinks import KINKED, functions_of, kinks_in
 
 TIME = "t"
 PIECE = "piece of a signal"  # key of a function of a table or held value and a symbol of time
@@ -78,11 +78,6 @@ class Formula:
     def at(self, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
         """Value at a time [s], which may be an array or a symbol; ``functions`` evaluates the calls for that type."""
         return formula_value(self._parsed, {**dict(self.numbers), TIME: time}, functions_of(self, functions))
-
-    def in_piece(self, time: Any) -> Any:
-        """Values at times of pieces [s], (pieces, points): kinks at their ends have the side of their middle."""
-        middle = time[:, time.shape[1] // 2, None]
-        return beside(self.kinks, lambda functions, mid: self.at(middle if mid else time, functions), FUNCTIONS)
 
     @cached_property
     def kinks(self) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.expressions import parsed_formula
 from proofroll.core.parameters import Parameters
-from proofroll.elements.mechanism.scene.kinks import beside, functions_of, kinks_in
+from proofroll.elements.mechanism.scene.kinks import functions_of, kinks_in
 from proofroll.elements.mechanism.scene.signal import FUNCTIONS, NO_NUMBER, formula_value, names_in
 
 LENGTH, RATE = "L", "dL"
@@ -56,16 +56,6 @@ class SpringLaw:
         """The same law in units of these sizes in the present ones."""
         metre, second, newton = self.units
         return replace(self, units=(metre * length, second * speed, newton * force))
-
-    def in_piece(self, length: Any, rate: Any) -> Any:
-        """Pulls at points of pieces, (pieces, points): kinks at their ends have the side of their middle."""
-        at = length.shape[1] // 2
-
-        def pull(functions: Mapping[str, Callable[..., Any]], mid: bool) -> Any:
-            here = slice(at, at + 1) if mid else slice(None)
-            return self.pull(length[:, here], rate[:, here], functions)
-
-        return beside(self.kinks, pull, FUNCTIONS)
 
     @cached_property
     def kinks(self) -> list[str]:

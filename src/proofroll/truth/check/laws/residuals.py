@@ -90,7 +90,6 @@ class LawResiduals:
 
     Attributes:
         largest: law -> largest residual in parts of its allowance, its time [s] and part.
-        relative: law -> largest residual relative to its natural size, without the further allowances.
         first: first violation; None: all laws hold.
         points: number of points at which laws were evaluated.
         events: number of transitions.
@@ -100,7 +99,6 @@ class LawResiduals:
     """
 
     largest: dict[str, tuple[float, float, str]] = field(default_factory=dict)
-    relative: dict[str, float] = field(default_factory=dict)
     first: Violation | None = None
     points: int = 0
     events: int = 0
@@ -131,14 +129,12 @@ class LawResiduals:
         with np.errstate(all="ignore"):
             allowed = LAWS[law][0] * self.coarse * growth * size + extra + np.minimum(tail, _UNRESOLVED * size)
             parts = np.where(residual > 0, residual / allowed, 0.0)
-            relative = np.where(residual > 0, np.maximum(residual - extra, 0.0) / size, 0.0)
         parts = np.where(np.isfinite(residual), parts, np.inf)
         if self.known_alone:
             parts = np.where(np.isnan(residual) | np.isnan(allowed), 0.0, parts)
         worst = int(np.argmax(parts))
         if parts.flat[worst] >= self.largest.get(law, (0.0,))[0]:
             self.largest[law] = float(parts.flat[worst]), float(times.flat[worst]), part
-        self.relative[law] = max(self.relative.get(law, 0.0), float(np.nanmax(relative, initial=0.0)))
         if not parts.flat[worst] > 1.0:
             return
         violating = (parts > 1.0).reshape(len(parts), -1).any(1)
