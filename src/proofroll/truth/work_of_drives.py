@@ -13,8 +13,7 @@ from numpy.polynomial import chebyshev
 
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
-from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES, dot, integral, tail
+from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES, integral, tail
 from proofroll.truth.check.laws.record import Array, Passage, Pieces
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.numerics.hybrid import DenseStep
@@ -164,9 +163,7 @@ class WorkAlong:
 
     def _rate(self, joint: int, pieces: Pieces) -> Array:
         """Rate of a joint with one coordinate at the points of pieces [m/s, rad/s]."""
-        placed = self._scene.placed(self._scene.connections[joint], pieces)
-        turns = self._scene.mechanism.joints[joint].kind == JointKind.REVOLUTE
-        return dot(placed.spin if turns else placed.slide, placed.A[..., 2])
+        return self._scene.free(joint, pieces)[0].rate
 
 
 class _Window(NamedTuple):

@@ -73,7 +73,7 @@ class Coordinates:
             turn = pieces.turns[..., number, k] - angle
         else:
             last, start, last_rate = self._last[number, k]
-            rate = dot(placed.spin, (placed.A if axes == "A" else placed.B)[..., axis]).ravel()
+            rate = placed.free(kind)[k].rate.ravel()
             times, rates = np.append(last, pieces.time.ravel()), np.append(last_rate, rate)
             moved = np.diff(times) * (rates[1:] + rates[:-1]) / 2
             apart = np.diff(np.append(start, angle.ravel())) - moved
@@ -155,8 +155,7 @@ def _loop_force(
         across = norm(force - dot(force, direction)[..., None] * direction) + norm(moment) / scene.length
         residuals.note("loop force", connection.name, across, size / scene.length, pieces.time)
         return
-    for axes, axis, turns in FREE[connection.kind]:
-        direction = (placed.A if axes == "A" else placed.B)[..., axis]
+    for direction, _, turns in placed.free(connection.kind):
         part = dot(moment if turns else force, direction)
         residuals.note("loop force", connection.name, part, size / (1.0 if turns else scene.length), pieces.time)
 
@@ -175,9 +174,7 @@ def _axes(
     speed = pieces.v[..., connection.b, :] + np.cross(
         pieces.w[..., connection.b, :], placed.origin_b - pieces.p[..., connection.b, :]
     )
-    for k, (frame, axis, turns) in enumerate(FREE[connection.kind]):
-        direction = (placed.A if frame == "A" else placed.B)[..., axis]
-        rate = dot(placed.spin if turns else placed.slide, direction)
+    for k, (direction, rate, turns) in enumerate(placed.free(connection.kind)):
         force, size, digits = (np.zeros(time.shape) for _ in range(3))
         if data.nq in {1, 2}:
             place = coordinates.at(number, k, pieces, placed, connection.kind)
@@ -190,7 +187,7 @@ def _axes(
         elif connection.kind == JointKind.SPHERICAL:
             force = -data.damping * rate
             size = np.abs(force)
-        carrier = connection.a if frame == "A" else connection.b
+        carrier = connection.a if FREE[connection.kind][k][0] == "A" else connection.b
         origin = placed.origin_b
         axes.append(
             FreeDirection(

@@ -13,7 +13,7 @@ from proofroll.truth.check.laws.joints import Coordinates, FreeDirection, joint_
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, PublishedValues
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
-from proofroll.truth.check.laws.scene import FREE, LawScene
+from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiles import Places, Tiles
 
 _ARM = 1e-2  # part of the natural length by which a force turns at least, for sizes of moments
@@ -154,7 +154,7 @@ def _along(
     """A joint transmits along a free direction the forces of its springs, drives, friction and stops."""
     pieces, numbers = published.pieces, [axis.joint for axis in axes]
     for place, axis in enumerate(axes):
-        joint, connection = scene.mechanism.joints[axis.joint], scene.connections[axis.joint]
+        joint = scene.mechanism.joints[axis.joint]
         natural = scene.force * (scene.length if axis.turns else 1.0)
         wrench = published.reactions[..., axis.joint, :]
         part = wrench[..., 3:] if axis.turns else wrench[..., :3]
@@ -164,13 +164,7 @@ def _along(
         size = size + np.nan_to_num(norm(pieces.force)).sum(-1) * (scene.length if axis.turns else 1.0)
         digits = axis.digits
         if joint.armature:
-            frames, (which, number, _) = (
-                scene.placed(connection, tiles),
-                FREE[connection.kind][place - numbers.index(axis.joint)],
-            )
-            rate = dot(
-                frames.spin if axis.turns else frames.slide, (frames.A if which == "A" else frames.B)[..., number]
-            )
+            rate = scene.free(axis.joint, tiles)[place - numbers.index(axis.joint)].rate
             faster = places.rate(rate)[:, None]
             expected = expected - joint.armature * faster
             size = size + joint.armature * np.abs(faster)
@@ -190,13 +184,8 @@ def kinetic_energy(scene: LawScene, moving: BodyPoses) -> tuple[Array, Array]:
     total, size = (kinetic - scene.mass * (centres @ gravity)).sum(-1), kinetic.sum(-1)
     size = size + (scene.mass * np.linalg.norm(gravity) * norm(centres)).sum(-1)
     for number, joint in enumerate(scene.mechanism.joints):
-        connection = scene.connections[number]
-        if not joint.armature:
-            continue
-        placed = scene.placed(connection, moving)
-        for axes, axis, turns in FREE[connection.kind]:
-            rate = dot(placed.spin if turns else placed.slide, (placed.A if axes == "A" else placed.B)[..., axis])
-            total = total + 0.5 * joint.armature * rate**2
+        for axis in scene.free(number, moving) if joint.armature else ():
+            total = total + 0.5 * joint.armature * axis.rate**2
     return total, size
 
 

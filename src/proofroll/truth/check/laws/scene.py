@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.check.laws.integrals import frame_of, of_angles, turned
+from proofroll.truth.check.laws.integrals import dot, frame_of, of_angles, turned
 from proofroll.truth.check.laws.record import Array, BodyPoses
 from proofroll.truth.check.laws.signals import value_of
 from proofroll.truth.check.laws.surfaces import PairContact, contacts_of
@@ -61,6 +61,14 @@ class JointFrames(NamedTuple):
     length: float = 0.0
 
 
+class FreeAxis(NamedTuple):
+    """A free direction of a joint at the points of pieces: a unit vector, the rate along it, and if it turns."""
+
+    direction: Array
+    rate: Array
+    turns: bool
+
+
 class PlacedFrames(NamedTuple):
     """A connection at the points of pieces: axes of A and B as columns, origins of both, and velocities of B in A."""
 
@@ -70,6 +78,11 @@ class PlacedFrames(NamedTuple):
     origin_b: Array
     slide: Array
     spin: Array
+
+    def free(self, kind: str) -> list[FreeAxis]:
+        """Free directions of a joint of a kind, in the order of its coordinates."""
+        axes = [((self.A if frame == "A" else self.B)[..., axis], turns) for frame, axis, turns in FREE[kind]]
+        return [FreeAxis(way, dot(self.spin if turns else self.slide, way), turns) for way, turns in axes]
 
 
 class LawScene:
@@ -146,6 +159,11 @@ class LawScene:
             slide=velocity_at(pieces, b, origin_b) - velocity_at(pieces, a, origin_b),
             spin=pieces.w[..., b, :] - pieces.w[..., a, :],
         )
+
+    def free(self, number: int, pieces: BodyPoses) -> list[FreeAxis]:
+        """Free directions of a joint or loop, by its number, at the points of pieces."""
+        connection = self.connections[number]
+        return self.placed(connection, pieces).free(connection.kind)
 
     @staticmethod
     def terms(coupling: Coupling) -> tuple[list[tuple[str, float]], float]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.contacts import apart
-from proofroll.truth.check.laws.integrals import dot, of_quaternion
+from proofroll.truth.check.laws.integrals import of_quaternion
 from proofroll.truth.check.laws.joints import Coordinates, closure, sizes_of
 from proofroll.truth.check.laws.motion import joined, jump, kinematics
 from proofroll.truth.check.laws.record import Array, BodyPoses
@@ -57,10 +57,7 @@ def start_of(scene: LawScene, moving: BodyPoses, residuals: LawResiduals, struck
         connection = scene.connections[number]
         placed = PlacedFrames(*(part[:1, :1] for part in scene.placed(connection, moving)))
         time, free = moving.time[:1, :1], FREE[connection.kind]
-        rates = [
-            dot(placed.spin if turns else placed.slide, (placed.A if axes == "A" else placed.B)[..., axis])[0, 0]
-            for axes, axis, turns in free
-        ]
+        rates = [axis.rate[0, 0] for axis in placed.free(connection.kind)]
         sizes = np.array([scene.rate if turns else scene.speed for _, _, turns in free])
         v0 = np.array(joint.v0) if len(joint.v0) else np.zeros(len(free))
         if not struck and joint.motion is None and len(free):

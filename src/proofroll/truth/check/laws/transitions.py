@@ -123,14 +123,7 @@ def _of_joints(scene: LawScene, pieces_before: Pieces, pieces_after: Pieces) -> 
             continue
         push = abs(float(pieces_before.friction[0, 0, number]))
         if later == "stick":
-            rate = _rate(scene, pieces_before, number)
+            rate = float(scene.free(number, pieces_before)[0].rate[0, 0])
             yield joint.name, abs(rate) / (scene.rate * (1.0 if turns else scene.length))
         else:
             yield joint.name, abs(push - joint.friction) / joint.friction
-
-
-def _rate(scene: LawScene, pieces: Pieces, number: int) -> float:
-    """Rate of a joint with one coordinate."""
-    placed = scene.placed(scene.connections[number], pieces)
-    turns = scene.mechanism.joints[number].kind == JointKind.REVOLUTE
-    return float(dot(placed.spin if turns else placed.slide, placed.A[..., 2])[0, 0])

@@ -11,7 +11,7 @@ from proofroll.truth.check.laws.integrals import dot, norm, of_angles, of_quater
 from proofroll.truth.check.laws.loads import bushing_load, rotation_vector, spring_ends, spring_pull
 from proofroll.truth.check.laws.record import Array, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
-from proofroll.truth.check.laws.scene import FREE, LawScene
+from proofroll.truth.check.laws.scene import LawScene
 
 _PART = 1e-3  # part of a natural size that counts in the size of a value
 
@@ -40,14 +40,14 @@ def _coordinates(scene: LawScene, published: PublishedValues, residuals: LawResi
         if joint.nq != 1:
             continue
         connection = scene.connections[number]
-        placed, (axes, axis, turns) = scene.placed(connection, pieces), FREE[connection.kind][0]
-        direction = (placed.A if axes == "A" else placed.B)[..., axis]
+        placed = scene.placed(connection, pieces)
+        direction, rate, turns = placed.free(connection.kind)[0]
         R = placed.A.swapaxes(-1, -2) @ placed.B
         place = dot(placed.origin_b - placed.origin_a, direction)
         if turns:
             angle = np.arctan2(R[..., 1, 0], R[..., 0, 0])
             place = angle + 2 * np.pi * np.round((pieces.turns[..., number, 0] - angle) / (2 * np.pi))
-        rate, unit = dot(placed.spin if turns else placed.slide, direction), 1.0 if turns else scene.length
+        unit = 1.0 if turns else scene.length
         for name, value, size in (("q", place, unit), ("v", rate, unit * scene.rate)):
             off = published.values[f"{name}.{joint.name}"][:, None] - value
             residuals.note("value", f"{name}.{joint.name}", off, size + np.abs(value), pieces.time)
@@ -79,8 +79,7 @@ def _energies(
             continue
         connection = scene.connections[number]
         placed = scene.placed(connection, pieces)
-        for k, (axes, axis, turns) in enumerate(FREE[connection.kind]):
-            direction = (placed.A if axes == "A" else placed.B)[..., axis]
+        for k, (direction, _, turns) in enumerate(placed.free(connection.kind)):
             place = pieces.turns[..., number, k] if turns else dot(placed.origin_b - placed.origin_a, direction)
             part = 0.5 * joint.stiffness * (place - joint.rest) ** 2
             unit = 1.0 if turns else scene.length

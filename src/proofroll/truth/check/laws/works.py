@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.check.laws.integrals import dot, integral
+from proofroll.truth.check.laws.integrals import integral
 from proofroll.truth.check.laws.joint_forces import law_of
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.samples import kinetic_energy
-from proofroll.truth.check.laws.scene import FREE, LawScene
+from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.signals import value_of
 from proofroll.truth.check.laws.tiled import Turns, changed_velocity
 from proofroll.truth.check.laws.tiles import Places, Tiles
@@ -32,7 +32,7 @@ def works_follow(
         if control is not None and data.name in control.actuators:
             continue
         number = scene.mechanism.joint_index[data.joint]
-        rate = _rates(scene, tiles, number)[0]
+        rate = scene.free(number, tiles)[0].rate
         force = law_of(data, value_of(data.target, tiles.time), turns[number, 0], rate)
         work, size = (_summed(values, tiles) for values in (force * rate, np.abs(force * rate)))
         name = f"work.effort.{data.name}"
@@ -70,22 +70,12 @@ def _summed(values: Array, tiles: Tiles) -> Array:
     return np.asarray(parts + ends[:, None])
 
 
-def _rates(scene: LawScene, tiles: Tiles, number: int) -> list[Array]:
-    """Rates bars the free directions of a joint."""
-    connection = scene.connections[number]
-    placed = scene.placed(connection, tiles)
-    return [
-        dot(placed.spin if turns else placed.slide, (placed.A if axes == "A" else placed.B)[..., axis])
-        for axes, axis, turns in FREE[connection.kind]
-    ]
-
-
 def _passive_power(scene: LawScene, tiles: Tiles, turns: Turns, number: int) -> Array:
     """Power of the spring, the damper, the torque and the dry friction of a joint."""
     joint, total = scene.mechanism.joints[number], np.zeros(tiles.time.shape)
     if joint.kind == JointKind.FREE:
         return total
-    for k, rate in enumerate(_rates(scene, tiles, number)):
+    for k, (_, rate, _) in enumerate(scene.free(number, tiles)):
         force = -joint.damping * rate
         if joint.nq in {1, 2}:
             force = force - joint.stiffness * (turns[number, k] - joint.rest)
