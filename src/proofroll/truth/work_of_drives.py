@@ -21,7 +21,7 @@ from proofroll.truth.numerics.hybrid import DenseStep
 if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism
 
-_CORRECTIONS = 8  # of Newton's method for the place of a time in a piece, at most: it converges in three
+_BESIDE = 1 + 1e-9  # place just beyond the end of a piece, where its time is known, too
 _HALVINGS = 20  # of a step into windows, at most
 
 _Powers = tuple[Array, Array]  # times [s] and powers [W] at the points of a window
@@ -46,14 +46,9 @@ class _Part(NamedTuple):
             return np.asarray(chebyshev.chebval(-1.0, self.work))
         if time >= self.end:
             return np.asarray(chebyshev.chebval(1.0, self.work))
-        place, pace = 2 * (time - self.start) / (self.end - self.start) - 1, chebyshev.chebder(self.time)
-        for _ in range(_CORRECTIONS):
-            moved = np.clip(
-                place + (time - chebyshev.chebval(place, self.time)) / chebyshev.chebval(place, pace), -1, 1
-            )
-            done, place = abs(moved - place) <= 4 * np.spacing(1.0), float(moved)
-            if done:
-                break
+        from scipy.optimize import brentq
+
+        place = brentq(lambda x: chebyshev.chebval(x, self.time) - time, -_BESIDE, _BESIDE, xtol=4 * np.spacing(1.0))
         return np.asarray(chebyshev.chebval(place, self.work))
 
 

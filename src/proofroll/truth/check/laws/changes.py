@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.truth.check.laws.contacts import gap_of
-from proofroll.truth.check.laws.record import Array, Modes, PublishedEvent, PublishedValues
+from proofroll.truth.check.laws.record import Modes, PublishedEvent, PublishedValues
 from proofroll.truth.check.laws.residuals import INSTANT, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiled import changed_velocity
@@ -42,9 +41,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
         names = _changed(scene, tiles.modes[number], tiles.modes[number + 1])
         if names and not any(_of(item.name, name) for item in near for name in names):
             residuals.note("change", min(names), np.ones((1, 1)), 1.0, time)
-        for item in near if jump > least else ():
-            hits.append(item)
-            _at_impact(scene, tiles, residuals, item, number)
+        hits += near if jump > least else []
     contacts = {contact.name for contact in scene.contacts if contact.alone}
     for item in published.changes:
         if item.of_effort or item.time >= last * (1 - _BEFORE_END):
@@ -87,21 +84,3 @@ def _changed(scene: LawScene, sooner: Modes, later: Modes) -> set[str]:
         modes = [(item.friction[number], item.stops[number]) for item in (sooner, later)]
         names |= {joint.name} if modes[0] != modes[1] else set()
     return names
-
-
-def _at_impact(scene: LawScene, tiles: Tiles, residuals: LawResiduals, item: PublishedEvent, number: int) -> None:
-    """A contact that is struck has no gap."""
-    if not item.strikes:
-        return
-    for contact in scene.contacts:
-        if contact.name == item.name and contact.alone:
-            gap = abs(_last_gap(scene, tiles, contact.name, number))
-            far = scene.length + float(np.abs(tiles.p[number, -1]).max())
-            residuals.note("gap", item.name, np.array([[gap]]), far, np.array([[item.time]]))
-
-
-def _last_gap(scene: LawScene, tiles: Tiles, name: str, number: int) -> float:
-    """Gap of a contact at the end of a tile [m]."""
-    contact = next(contact for contact in scene.contacts if contact.name == name)
-    gaps: Array = gap_of(contact, tiles.one(number))
-    return float(gaps[0, -1])

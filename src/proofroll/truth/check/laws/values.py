@@ -8,6 +8,7 @@ import numpy as np
 
 from proofroll.truth.check.laws.contacts import gap_of, slide_of
 from proofroll.truth.check.laws.integrals import dot, norm, of_angles, of_quaternion, turned
+from proofroll.truth.check.laws.joints import Coordinates
 from proofroll.truth.check.laws.loads import bushing_load, rotation_vector, spring_ends, spring_pull
 from proofroll.truth.check.laws.record import Array, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
@@ -34,19 +35,16 @@ def _vector(published: PublishedValues, name: str) -> Array:
 
 def _coordinates(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
     """Coordinates and rates of joints with one are those of the poses."""
-    pieces = published.pieces
-    assert pieces.turns is not None  # of all samples
+    pieces, followed = published.pieces, Coordinates(scene)
     for number, joint in enumerate(scene.mechanism.joints):
         if joint.nq != 1:
             continue
         connection = scene.connections[number]
         placed = scene.placed(connection, pieces)
-        direction, rate, turns = placed.free(connection.kind)[0]
-        R = placed.A.swapaxes(-1, -2) @ placed.B
-        place = dot(placed.origin_b - placed.origin_a, direction)
-        if turns:
-            angle = np.arctan2(R[..., 1, 0], R[..., 0, 0])
-            place = angle + 2 * np.pi * np.round((pieces.turns[..., number, 0] - angle) / (2 * np.pi))
+        place, (_, rate, turns) = (
+            followed.at(number, 0, pieces, placed, connection.kind),
+            placed.free(connection.kind)[0],
+        )
         unit = 1.0 if turns else scene.length
         for name, value, size in (("q", place, unit), ("v", rate, unit * scene.rate)):
             off = published.values[f"{name}.{joint.name}"][:, None] - value
@@ -170,13 +168,16 @@ def _names(scene: LawScene, published: PublishedValues, residuals: LawResiduals)
             signs = np.array([(contact.a == number) - (contact.b == number) for contact in scene.contacts], float)
             arms = pieces.place[:, 0] - centres[:, number, None]
             total = np.einsum("k,tki->ti", signs, np.cross(arms, forces))
-            pairs.append((f"net_torque.{body.name}", _vector(published, f"net_torque.{body.name}"), total))
+            both, least = (_vector(published, f"net_torque.{body.name}"), total), norm(arms).max() * np.abs(forces)
+            _same(f"net_torque.{body.name}", both, published, residuals, float(np.nanmax(least, initial=0.0)))
     for name, first, second in pairs:
         _same(name, (first, second), published, residuals)
 
 
-def _same(name: str, both: Sequence[Array], published: PublishedValues, residuals: LawResiduals) -> None:
-    size = max((float(np.nanmax(np.abs(item), initial=0.0)) for item in both), default=0.0)
+def _same(
+    name: str, both: Sequence[Array], published: PublishedValues, residuals: LawResiduals, least: float = 0.0
+) -> None:
+    size = max([least, *(float(np.nanmax(np.abs(item), initial=0.0)) for item in both)])
     off = np.abs(both[0] - both[1]).reshape(len(both[0]), -1)
     rest = np.where(np.isnan(off), 0.0, off).max(1, initial=0.0)
     residuals.note("spelling", name, rest[:, None], size, published.pieces.time)
