@@ -24,7 +24,7 @@ from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES, of
 from proofroll.truth.check.laws.record import Modes, Passage, Pieces
 from proofroll.truth.check.laws.tiles import Tiles, joined_tiles
 from proofroll.truth.natural_units import Units
-from proofroll.truth.numerics.hybrid import HybridPath, Stretch
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch, states_inside
 from proofroll.truth.switching.contact_taylor import CompiledStretch
 from proofroll.truth.switching.planar_slip import BegunSlip
 from proofroll.truth.switching.stopping_slip import StoppingSlip
@@ -32,6 +32,7 @@ from proofroll.truth.tree.contact_tree import ContactTree
 
 _TURN = 1.0  # rad, by which bodies turn in a piece at most: more is not resolved by its points
 _HALVINGS = 7  # of a step into pieces at most
+_TOGETHER = 3  # steps of DOP853 that the points of a piece resolve
 _PARTS = 8  # into which the first instants of a slip are cut: a force that jumps inside is located to one of them
 
 
@@ -267,10 +268,13 @@ class LawRecorder:
             for start, end, inside_step in stretch.by.steps_of(stretch):
                 yield from self._parts(start, end, inside_step, recorded, paced=True)
         elif stretch.dense:
-            for start, last, inside in stretch.dense:
-                if min(last, stretch.end) > start:
-                    parts = self._parts(start, min(last, stretch.end), inside, None)
-                    yield from (piece._replace(coarse=not stretch.exact) for piece in parts)
+            together = 1 if stretch.exact else _TOGETHER
+            for begin in range(0, len(stretch.dense), together):
+                steps = stretch.dense[begin : begin + together]
+                start, last = steps[0][0], min(steps[-1][1], stretch.end)
+                inside = steps[0][2] if len(steps) == 1 else partial(states_inside, steps)
+                for piece in self._parts(start, last, inside, None) if last > start else ():
+                    yield piece._replace(coarse=not stretch.exact)
         elif stretch.end > stretch.start:  # nothing moves
             half = (stretch.end - stretch.start) / 2
             states = np.repeat(stretch.first[None], len(POINTS), 0)
