@@ -33,22 +33,13 @@ _BARS = {
     "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
     "energy_change": "energy", "drift": "drift", "gaps": "gap", "slips": "slip", "normal_forces": "pressed",
     "contact_forces": "pressed", "pair_forces": "sums", "net_forces": "sums", "net_torques": "sums",
-    "penetration": "gap",
-    "contact_pull": "pressed", "cone_excess": "pressed",
+    "penetration": "gap", "contact_pull": "pressed", "cone_excess": "pressed",
     "hop_speed": "slip", "energy_gain": "energy", "bushing_forces": "links", "bushing_torques": "links",
 }  # fmt: skip
 _LEAST = 1e-3  # natural lengths that count as a motion, however little moves
 _PARTED = 1e-3  # part of the motion that a bar exceeds from where routes part
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
-_PREFIXES = {
-    "work.": "work",
-    "net_force.": "sums",
-    "net_torque.": "sums",
-    "q.": "q",
-    "v.": "v",
-    "force.": "wrench",
-    "torque.": "wrench",
-}
+_PREFIXES = {"work.": "work", "net_": "sums", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
 
 

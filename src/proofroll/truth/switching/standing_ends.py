@@ -17,13 +17,7 @@ from proofroll.elements.mechanism.contact.modes import ContactMode, closed_in, s
 from proofroll.elements.mechanism.contact.start import TOUCHING, natural_scale, touches
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.scene.rotations import Array, cross, to_rpy
-from proofroll.elements.mechanism.scene.shapes.geometry import (
-    Geometry,
-    Pair,
-    contact_sums,
-    shared_pairs,
-    turned_bodies,
-)
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair, contact_sums, shared_pairs, turned_bodies
 from proofroll.truth.error_bars import TwoRouteMotion
 
 _CORNERS = 8  # of a box; those of one end are every other one
