@@ -113,6 +113,8 @@ FAULTS: list[tuple[str, str, Change]] = [
     ("force of a stop off by 0.1 %", "stop", times(1.001, "stop.")),
     ("contact force off by 0.1 %", "slide_to_roll", times(1.001, "force.ball_on_wall", "contact_forces")),
     ("normal forces off by 0.1 %", "slide_to_roll", times(1.001, "normal_forces")),
+    ("needed friction off by 0.1 %", "slide_to_roll", times(1.001, "needed_friction")),
+    ("friction on a wall off by 0.1 %", "slide_to_roll", times(1.001, "F2")),
     ("gaps off by 1e-7 m", "bouncing_ball", plus(1e-7, "gap")),
     ("slips off in their fifth digit", "slide_to_roll", times(1 + 1e-5, "slip")),
     ("coordinate off by 1e-6", "double_pendulum", plus(1e-6, "q.")),

@@ -27,6 +27,7 @@ def values_follow(
     _links(scene, published, residuals)
     _contacts(scene, published, residuals)
     _names(scene, published, residuals)
+    _on_wall(scene, published, residuals)
 
 
 def _vector(published: PublishedValues, name: str) -> Array:
@@ -172,6 +173,27 @@ def _names(scene: LawScene, published: PublishedValues, residuals: LawResiduals)
             _same(f"net_torque.{body.name}", both, published, residuals, float(np.nanmax(least, initial=0.0)))
     for name, first, second in pairs:
         _same(name, (first, second), published, residuals)
+
+
+def _on_wall(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
+    """Forces and slips of a ball in the local frame of its wall are those of its contact."""
+    values, pieces = published.values, published.pieces
+    if len(scene.contacts) != 1 or "slip2" not in values:
+        return
+    slips = np.hypot(values["slip2"], values["slip3"]), values[f"slip.{scene.contacts[0].name}"]
+    _same("slip2, slip3", slips, published, residuals, scene.speed)
+    _same("slip", (values["slip"], slips[1]), published, residuals, scene.speed)
+    if "N" not in values:
+        return
+    force, normal = pieces.force[:, 0, 0], pieces.normal[:, 0, 0]
+    pressed, least = dot(force, normal), float(np.nanmax(np.abs(force), initial=0.0))
+    rub = norm(force - pressed[:, None] * normal)
+    for name, value, other in (
+        ("N", values["N"], pressed),
+        ("F2, F3", np.hypot(values["F2"], values["F3"]), rub),
+        ("needed_friction", values["needed_friction"] * values["N"], rub),
+    ):
+        _same(name, (value, other), published, residuals, least)
 
 
 def _same(
