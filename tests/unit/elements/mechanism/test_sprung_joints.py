@@ -28,7 +28,7 @@ AXIS = np.array([0.6, 0.0, 0.8])
         ("spherical", "stiffness = [1, 2]", "joints.j.stiffness = (1.0, 2.0): give 3 numbers"),
         ("spherical", "stiffness = -1", "must be at least 0"),
         ("spherical", "rest = [4, 0, 0]", "a rotation vector is shorter than 3 rad; turn the joint"),
-        ("spherical", 'stiffness = "3 N/m"', "give one in N m/rad"),
+        ("spherical", 'stiffness = "3 N/m"', "this number is in N m/rad, and not in N/m"),
         ("spherical", "stiffness = 3\naxis = [0, 0, 1]", "joints.0.axis"),
         ("free", "stiffness = 3", "joints.j.stiffness = 3.0: give 6 numbers"),
         ("free", "damping = [1, 2, 3]", "joints.j.damping"),
