@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.integrators import classical_step
 from proofroll.core.number_format import error as short
 from proofroll.core.number_format import with_bar
 from proofroll.elements.mechanism.scene.rotations import skew
@@ -59,6 +60,8 @@ class AirFit:
         off: root mean square of what the right numbers leave.
         bar: part of it that the rounding of the record explains.
         causes: numbers with which no more than rounding is left; empty where the right ones leave no more.
+        damped: True if the record fits damping of joints at the velocity after a step, and an armature of h times it
+            more as well.
         imitated: True if the record fits kd at the velocity after a step h, and explicit kd with an armature of h kd
             more as well.
         tried: number of numbers and bodies that were tried.
@@ -68,9 +71,28 @@ class AirFit:
     off: float
     bar: float
     causes: tuple[LayerCause, ...] = ()
+    damped: bool = False
     imitated: bool = False
     tried: int = 0
     between: bool = False
+
+
+class _Scheme(NamedTuple):
+    """State at which a step has its forces: that before it, unless told otherwise.
+
+    Attributes:
+        implicit: True if kd acts at the velocity after the step.
+        damped: True if the damping of the joints themselves does, as in MuJoCo's Euler and implicitfast.
+        whole: True if all forces of inertia do, linearised, as in MuJoCo's implicit.
+        stages: True if the step is one of RK4.
+        held: True if efforts are held over its stages; False: servos act in each.
+    """
+
+    implicit: bool = False
+    damped: bool = False
+    whole: bool = False
+    stages: bool = False
+    held: bool = False
 
 
 @dataclass(frozen=True)
@@ -148,7 +170,10 @@ def acceleration_fit(
         return motion
     states, moving = motion
     table = _Table(record, law, robot, states, efforts, held.links)
-    trials: list[tuple[bool, _Rows]] = []
+    trials: list[tuple[_Scheme, _Rows]] = []
+    schemes = [_Scheme(*item) for item in itertools.product((False, True), (False, True))]
+    schemes = [item for item in schemes if robot.damping.any() or not item.damped]
+    rarer = [_Scheme(whole=True), _Scheme(stages=True), _Scheme(stages=True, held=True)]
     try:
         for central, rated in itertools.product((False, True), moving):
             rows = np.flatnonzero(steady[1:-1]) + 1 if central else np.arange(len(record.time) - 1)
@@ -157,9 +182,11 @@ def acceleration_fit(
             if len(rows) < _FEWEST_ROWS:
                 continue
             rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(_MOST_ROWS, len(rows))).astype(int))]
-            for implicit in (False, True):
-                trials.append((implicit, table.rows(rows, rated, central=central, implicit=implicit)))
-                if trials[-1][1].exact and not implicit:
+            for scheme in (*schemes, *([] if central else rarer)):
+                if scheme in rarer and any(item.exact for _, item in trials):
+                    break
+                trials.append((scheme, table.rows(rows, rated, scheme, central=central)))
+                if trials[-1][1].exact and not any(scheme):
                     return AirFit(
                         trials[-1][1].off / trials[-1][1].size, _SAFETY * trials[-1][1].rounding / trials[-1][1].size
                     )
@@ -170,21 +197,24 @@ def acceleration_fit(
     return _judged(trials, law, robot)
 
 
-def _judged(trials: Sequence[tuple[bool, _Rows]], law: ControlLaw, robot: AirRobot) -> AirFit:
+def _judged(trials: Sequence[tuple[_Scheme, _Rows]], law: ControlLaw, robot: AirRobot) -> AirFit:
     """Fit with the scheme that leaves least, and causes where that is more than rounding."""
-    implicit, best = min(trials, key=lambda trial: trial[1].off / trial[1].size)
+    scheme, best = min(trials, key=lambda trial: trial[1].off / trial[1].size)
     scale = 1 / best.size
     if best.exact:
-        armed = [rows for is_implicit, rows in trials if not is_implicit and _fits(rows, "implicit")]
-        return AirFit(best.off * scale, _SAFETY * best.rounding * scale, imitated=implicit and bool(armed))
+        armed = [rows for item, rows in trials if not item.implicit and _fits(rows, "implicit")]
+        imitated = scheme.implicit and bool(armed)
+        return AirFit(best.off * scale, _SAFETY * best.rounding * scale, damped=scheme.damped, imitated=imitated)
     right = LayerCause("", "", None, best.off * scale)  # what no cause may leave, whatever the scheme
     causes: dict[str, LayerCause] = {}
     for _, rows in trials:
         for cause in _causes(rows, law, robot):
             if cause.after < causes.get(cause.id, right).after:
                 causes[cause.id] = cause
-    named = sorted(causes.values(), key=lambda cause: cause.after)
     bar = _SAFETY * best.rounding
+    closed = any(cause.after <= bar * scale for cause in causes.values())  # by one of them to rounding
+    several = [cause for cause in causes.values() if cause.after <= bar * scale or not closed]
+    named = sorted(several, key=lambda cause: cause.after)
     # The steps of the program may be no rows.
     between = not named and bar < best.off <= min(rows.unknown for _, rows in trials)
     tried = len(_NUMBERS) + len(best.added)
@@ -351,14 +381,39 @@ class _Table:
             self._known[row] = armed, inner, weight, into, self._drag(*self.at[row])
         return self._known[row]
 
-    def rows(self, rows: Array, moving: _Moving, *, central: bool, implicit: bool) -> _Rows:
+    def _by_stages(self, row: int, *, held: bool) -> Array:
+        """Change of the velocities by a step of RK4 from a row less the recorded one, in parts of the step."""
+        law, robot, (q, v), effort = self.law, self.robot, self.at[row], self.efforts[row]
+        at_q, at_v = robot.driven.T
+        servos = not held and np.abs(effort) < law.limit * (1 - 1e-6)
+
+        def rates(y: Array) -> Array:
+            place, velocity = y[: len(q)], y[len(q) :]
+            M, inner, weight, free = robot.forces(place, velocity)
+            armed = M + np.diag(robot.load(law.armature))
+            change = law.kp * (place - q)[at_q] + law.kd * (velocity - v)[at_v]
+            acting = free.T @ (inner + law.gravity * weight + robot.load(effort - np.where(servos, change, 0.0)))
+            rate = free @ np.linalg.solve(free.T @ armed @ free, acting)
+            return np.concatenate([robot.equations.tree.rate(place, velocity), rate])
+
+        after = classical_step(rates, np.concatenate([q, v]), self.step)[len(q) :]
+        return np.asarray((self.at[row + 1][1] - after) / self.step)
+
+    def _slope(self, row: int, rate: Array) -> Array:
+        """Change of the forces of inertia at a row with velocities that change by ``rate``; they are quadratic."""
+        q, v = self.at[row]
+        size = (np.abs(v).max() or 1.0) / (np.abs(rate).max() or 1.0)
+        after, before = (self.robot.forces(q, v + change * rate)[1] for change in (size, -size))
+        return np.asarray((after - before) / (2 * size))
+
+    def rows(self, rows: Array, moving: _Moving, scheme: _Scheme, *, central: bool) -> _Rows:
         """Forces at some rows.
 
         Args:
             rows: their indices.
             moving: velocities whose differences are accelerations.
+            scheme: what acts at the velocity after a step.
             central: True if accelerations are differences over two intervals.
-            implicit: True if kd acts at the velocity after a step.
         """
         law, robot, h, rated = self.law, self.robot, self.step, moving.rates
         previous, width = (rows - 1, 2 * h) if central else (rows, h)
@@ -379,7 +434,13 @@ class _Table:
                     base[:3] = moving.axes[row].T @ base[:3] - np.cross(spin, velocity)
             effort = self.efforts[row]
             acting = M @ rate - inner - law.gravity * weight - robot.load(effort)
-            if implicit:
+            if scheme.stages:
+                acting = M @ self._by_stages(row, held=scheme.held)
+            if scheme.whole:
+                acting -= h * self._slope(row, rate)
+            if scheme.damped:
+                acting += h * robot.damping * rate
+            if scheme.implicit:
                 acting += h * robot.load(np.where(np.abs(effort) < law.limit * (1 - 1e-6), law.kd, 0.0)) * rate
             left.append(into @ acting)
             forces = np.linalg.norm(into @ (M @ rate)) + np.linalg.norm(into @ weight)

@@ -52,6 +52,8 @@ from proofroll.robots.model import Array
 _STEPS = 1e-2
 # Remark on what is taken for them.
 BETWEEN = "no cause is known; taken for the program's own steps between the rows"
+# Remark on a scheme that has the damping of joints at the velocity after a step.
+_DAMPED = "damping of joints acts at the velocity after the step, or they have an armature of h times it more"
 # Number of random roundings of a record that give the bar of a layer, and the factor on their largest change.
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
@@ -190,7 +192,13 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
         bar=max(fit.off, fit.bar) if holds else min(fit.bar, 0.99 * fit.off),
         column="the forces",
         reason="; ".join(
-            part for part in (implicit if fit.imitated else BETWEEN if fit.between else "", remark) if part
+            part
+            for part in (
+                implicit if fit.imitated else BETWEEN if fit.between else "",
+                _DAMPED if fit.damped else "",
+                remark,
+            )
+            if part
         ),
         causes=fit.causes,
         tried=0 if earlier else fit.tried,
@@ -223,6 +231,8 @@ def _of_another_robot(
         if trial.off > trial.bar and not trial.causes:
             continue
         left = min((cause.after for cause in trial.causes), default=trial.off)
+        if left > max(trial.bar, _HELPS * fit.off):  # a robot far from this one may be helped by anything
+            continue
         further = bool(trial.causes)  # several of them are alternatives
         if (rank := (len(robot.causes) + further, further, left)) < best:
             proof = f"forces off by {error(fit.off)} of their size, by {error(left, 1)} with that"

@@ -1,0 +1,88 @@
+"""Loops that a person writes in MuJoCo, as it is installed: clean ones hold, and what is planted is named alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.robots.control.judge import RecordJudgement, judge_record
+
+mujoco = pytest.importorskip("mujoco")
+
+ARM = """<mujoco model="arm"><option gravity="0 0 -9.81"/><default><joint damping="{damping}"/></default><worldbody>
+<body name="one" pos="0 0 1"><joint name="a" axis="0 0 1"/>
+<inertial pos=".1 .02 .1" mass="2" diaginertia=".02 .03 .01"/>
+<body name="two" pos=".2 0 .1"><joint name="b" axis="0 1 0"/>
+<inertial pos=".15 0 .03" mass="1.5" diaginertia=".01 .02 .02"/>
+<body name="three" pos=".3 0 0"><joint name="c" axis="1 1 0"/>
+<inertial pos=".1 .05 0" mass=".8" diaginertia=".006 .004 .007"/>
+</body></body></body></worldbody></mujoco>"""
+INTEGRATORS = ("EULER", "IMPLICITFAST", "IMPLICIT", "RK4")
+
+
+def loop(
+    path: Path, integrator: str, precision: str, eulerdamp: bool = True, step: float = 1e-3, **planted: Any
+) -> RecordJudgement:
+    """Judgement of a record of a tenth of a second under swinging torques, without a controller's file.
+
+    Args:
+        path: folder of the record and of the robot's file.
+        integrator: of MuJoCo.
+        precision: ``float64``, ``float32``, or a number of decimals.
+        eulerdamp: False where MuJoCo's Euler has its damping at the velocity before the step.
+        step: of MuJoCo [s].
+        planted: ``heavier``, a factor on the mass and the inertia of the last link; ``torque``, ``friction``,
+            ``stiffness`` and ``damping`` of the second joint, which the file does not have.
+    """
+    file = path / "arm.xml"
+    file.write_text(ARM.format(damping=0.4))
+    spec = mujoco.MjSpec.from_file(str(file))
+    spec.option.timestep = step
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
+    if not eulerdamp:
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+    spec.body("three").mass *= planted.get("heavier", 1.0)
+    spec.body("three").inertia *= planted.get("heavier", 1.0)
+    spec.joint("b").damping[0] += planted.get("damping", 0.0)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = (0.3, -0.5, 0.8), (1.0, -0.7, 0.4)
+    rows = []
+    for k in range(round(0.1 / step) + 1):
+        torques = np.array([1.5, -2.0, 0.7]) * np.sin(40 * k * step + np.arange(3)) + 0.5
+        rows.append((data.qpos.copy(), data.qvel.copy(), torques))
+        data.qfrc_applied[:] = torques
+        data.qfrc_applied[1] += planted.get("torque", 0.0) - planted.get("stiffness", 0.0) * data.qpos[1]
+        data.qfrc_applied[1] -= planted.get("friction", 0.0) * np.sign(data.qvel[1])
+        mujoco.mj_step(model, data)
+    q, v, efforts = map(np.array, zip(*rows, strict=True))
+    arrays: Mapping[str, Any] = {"qpos": q, "qvel": v, "torques": efforts}
+    arrays = {
+        name: item.astype(precision) if precision.startswith("float") else item.round(int(precision))
+        for name, item in arrays.items()
+    }
+    np.savez(path / "run.npz", dt=step, **arrays)
+    return judge_record(path / "run.npz", file, None, layout="playground")
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("precision", ["float64", "float32", "5", "3"])
+def test_a_clean_loop_is_not_accused(tmp_path: Path, integrator: str, precision: str) -> None:
+    """Whatever the integrator of MuJoCo and the precision of the file, a robot with joint damping holds to rounding."""
+    judged = loop(tmp_path, integrator, precision)
+    (layer,) = judged.layers
+    assert layer.holds, [*judged.lines()]
+    assert layer.residual is not None
+    assert not layer.causes
+
+
+@pytest.mark.parametrize(("integrator", "eulerdamp"), [("EULER", True), ("EULER", False), ("IMPLICITFAST", True)])
+def test_a_heavier_link_is_named_alone(tmp_path: Path, integrator: str, eulerdamp: bool) -> None:
+    """A link that is heavier by a hundredth is the only cause, on a robot with joint damping."""
+    (layer,) = loop(tmp_path, integrator, "float64", eulerdamp, heavier=1.01).layers
+    assert [cause.id for cause in layer.causes] == ["payload"]
+    assert "three" in layer.causes[0].sentence
