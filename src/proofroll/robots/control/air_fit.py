@@ -368,6 +368,7 @@ class _Table:
         self.links = links
         self.law, self.robot, self.at, self.efforts = law, robot, states, efforts
         self.step = float(np.diff(record.time).mean())
+        self.targets = record.stacked("target", law.joints)
         self.rated = _largest(record, ("v.", "v_WB.", "w_WB."))
         self.placed, self.forced = _largest(record, ("q.", "q_WB.")), _largest(record, ("effort.",))
         self._known: dict[int, tuple[Array, ...]] = {}
@@ -385,14 +386,23 @@ class _Table:
         """Change of the velocities by a step of RK4 from a row less the recorded one, in parts of the step."""
         law, robot, (q, v), effort = self.law, self.robot, self.at[row], self.efforts[row]
         at_q, at_v = robot.driven.T
-        servos = not held and np.abs(effort) < law.limit * (1 - 1e-6)
+        servos = np.abs(effort) < law.limit * (1 - 1e-6)
+        target = None if self.targets is None else self.targets[row]
+
+        def effort_at(place: Array, velocity: Array) -> Array:
+            if held:
+                return np.asarray(effort)
+            if target is not None:
+                return np.asarray(effort + law.effort(target, place, velocity) - law.effort(target, q[at_q], v[at_v]))
+            change = law.kp * (place - q[at_q]) + law.kd * (velocity - v[at_v])
+            return np.asarray(np.clip(effort - np.where(servos, change, 0.0), -law.limit, law.limit))
 
         def rates(y: Array) -> Array:
             place, velocity = y[: len(q)], y[len(q) :]
             M, inner, weight, free = robot.forces(place, velocity)
             armed = M + np.diag(robot.load(law.armature))
-            change = law.kp * (place - q)[at_q] + law.kd * (velocity - v)[at_v]
-            acting = free.T @ (inner + law.gravity * weight + robot.load(effort - np.where(servos, change, 0.0)))
+            load = robot.load(effort_at(place[at_q], velocity[at_v]))
+            acting = free.T @ (inner + law.gravity * weight + load)
             rate = free @ np.linalg.solve(free.T @ armed @ free, acting)
             return np.concatenate([robot.equations.tree.rate(place, velocity), rate])
 

@@ -34,7 +34,7 @@ from proofroll.robots.control.columns import (
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
 from proofroll.robots.control.imported import MOST
-from proofroll.robots.control.layers import BETWEEN, InAir, record_layers
+from proofroll.robots.control.layers import InAir, record_layers
 from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
@@ -77,6 +77,11 @@ class RecordJudgement:
         """True if at least one layer was looked at."""
         return any(layer.residual is not None for layer in self.layers)
 
+    @property
+    def decided(self) -> bool:
+        """True if no layer differs without the record telling whether that counts."""
+        return not any(layer.undecided for layer in self.layers)
+
     def lines(self) -> Iterator[str]:
         """Lines of text: a headline, one for each layer, and the causes at the first that does not hold."""
         failed_layer = next((layer for layer in self.layers if not layer.holds), None)
@@ -85,6 +90,9 @@ class RecordJudgement:
             yield f"{self.step_bound}."
         if not self.looked_at:
             yield f"{self.record} ({rows}): no layer could be looked at"
+        elif failed_layer is None and not self.decided:
+            undecided = next(layer.name for layer in self.layers if layer.undecided)
+            yield f"{self.record} ({rows}): the {undecided} is not decided; every other layer that was looked at holds"
         elif failed_layer is None:
             yield f"{self.record} ({rows}): every layer that was looked at holds"
         else:
@@ -108,7 +116,7 @@ def _unexplained(layer: Layer) -> str:
 
 
 def _mark(layer: Layer) -> str:
-    return "–" if layer.residual is None else "✓" if layer.holds else "✗"
+    return "?" if layer.undecided else "–" if layer.residual is None else "✓" if layer.holds else "✗"
 
 
 def _found(layer: Layer) -> str:
@@ -117,8 +125,7 @@ def _found(layer: Layer) -> str:
     place = "" if layer.holds else f", most in {layer.column}"
     place += f" at {layer.time:.4g} s" if place and np.isfinite(layer.time) else ""
     remark = f"; {layer.reason}" if layer.reason else ""
-    rounding = "" if layer.reason.startswith(BETWEEN) else f", rounding {error(layer.bar)}"
-    return f"off by {error(layer.residual)}{rounding}{place}{remark}"
+    return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{place}{remark}"
 
 
 def judge_record(

@@ -47,11 +47,6 @@ from proofroll.robots.control.record import OBSERVED, ControlRecord, Layer, Laye
 from proofroll.robots.control.standing_joints import standing_fit
 from proofroll.robots.model import Array
 
-# Part of the largest forces up to which what is left without a cause is taken for the program's steps between the rows:
-# fourth order in steps of 5 ms leaves a seventh of it, a thigh that is heavier by a fifth four times as much.
-_STEPS = 1e-2
-# Remark on what is taken for them.
-BETWEEN = "no cause is known; taken for the program's own steps between the rows"
 # Remark on a scheme that has the damping of joints at the velocity after a step.
 _DAMPED = "damping of joints acts at the velocity after the step, or they have an armature of h times it more"
 # Number of random roundings of a record that give the bar of a layer, and the factor on their largest change.
@@ -174,35 +169,41 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
-    fit = dataclasses.replace(fit, between=fit.between and not stepwise)
+    fit = dataclasses.replace(fit, between=fit.between and not (stepwise or _rows_are_steps(record, law)))
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
-    if fit.between and (fit.off > _STEPS or assumed):
+    if fit.between:
         off = f"the forces are off by {error(fit.off)} of the largest, and no cause is known"
         advice = f"steps between the rows may explain it: {assumed or 'log every step to decide'}"
         return Layer("acceleration", reason="; ".join(filter(None, (off, advice, remark))), undecided=True)
     implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
-    holds = (fit.off <= fit.bar and not fit.causes) or fit.between
+    holds = fit.off <= fit.bar and not fit.causes
     if assumed and not holds and all(cause.after > fit.bar for cause in fit.causes):
         remark = "; ".join(filter(None, (remark, assumed)))
     earlier = next((layer.name for layer in layers if not layer.holds), "")
     return Layer(
         name="acceleration",
         residual=fit.off,
-        bar=max(fit.off, fit.bar) if holds else min(fit.bar, 0.99 * fit.off),
+        bar=fit.bar if holds else min(fit.bar, 0.99 * fit.off),
         column="the forces",
         reason="; ".join(
-            part
-            for part in (
-                implicit if fit.imitated else BETWEEN if fit.between else "",
-                _DAMPED if fit.damped else "",
-                remark,
-            )
-            if part
+            part for part in (implicit if fit.imitated else "", _DAMPED if fit.damped else "", remark) if part
         ),
         causes=fit.causes,
         tried=0 if earlier else fit.tried,
     )
+
+
+def _rows_are_steps(record: ControlRecord, law: ControlLaw) -> bool:
+    """True if places move by the velocity after each row and not by that before, as in steps of semi-implicit Euler."""
+    q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
+    if q is None or v is None:
+        return False
+    h = np.diff(record.time)[:, None]
+    rounding = 2 * record.rounding_of("q", law.joints)[1:] + h * record.rounding_of("v", law.joints)[1:]
+    bars = rounding + ROUND_OFF * np.abs(q).max()
+    moved = np.diff(q, axis=0)
+    return bool(np.all(np.abs(moved - h * v[1:]) <= bars) and np.any(np.abs(moved - h * v[:-1]) > 2 * bars))
 
 
 def _of_another_robot(
