@@ -36,7 +36,7 @@ def loop(
         eulerdamp: False where MuJoCo's Euler has its damping at the velocity before the step.
         step: of MuJoCo [s].
         planted: ``heavier``, a factor on the mass and the inertia of the last link; ``torque``, ``friction``,
-            ``stiffness`` and ``damping`` of the second joint, which the file does not have.
+            ``stiffness`` and ``damping`` of the second joint, which the file does not have; ``beat``, a torque.
     """
     file = path / "arm.xml"
     file.write_text(ARM.format(damping=0.4))
@@ -57,6 +57,7 @@ def loop(
         rows.append((data.qpos.copy(), data.qvel.copy(), torques))
         data.qfrc_applied[:] = torques
         data.qfrc_applied[1] += planted.get("torque", 0.0) - planted.get("stiffness", 0.0) * data.qpos[1]
+        data.qfrc_applied[0] += planted.get("beat", 0.0) * np.sin(k * k / 50)
         data.qfrc_applied[1] -= planted.get("friction", 0.0) * np.sign(data.qvel[1])
         mujoco.mj_step(model, data)
     q, v, efforts = map(np.array, zip(*rows, strict=True))
@@ -80,9 +81,42 @@ def test_a_clean_loop_is_not_accused(tmp_path: Path, integrator: str, precision:
     assert not layer.causes
 
 
-@pytest.mark.parametrize(("integrator", "eulerdamp"), [("EULER", True), ("EULER", False), ("IMPLICITFAST", True)])
-def test_a_heavier_link_is_named_alone(tmp_path: Path, integrator: str, eulerdamp: bool) -> None:
-    """A link that is heavier by a hundredth is the only cause, on a robot with joint damping."""
-    (layer,) = loop(tmp_path, integrator, "float64", eulerdamp, heavier=1.01).layers
-    assert [cause.id for cause in layer.causes] == ["payload"]
-    assert "three" in layer.causes[0].sentence
+PLANTED: dict[str, tuple[dict[str, float], list[str]]] = {
+    "a heavier link": ({"heavier": 1.01}, ["payload"]),
+    "a constant torque": ({"torque": 0.3}, ["torque"]),
+    "a spring": ({"stiffness": 0.5}, ["stiffness"]),
+    "dry friction": ({"friction": 0.1}, ["friction"]),
+    "more damping": ({"damping": 0.2}, ["damping"]),
+    "more damping and a spring": ({"damping": 0.2, "stiffness": 0.5}, ["damping", "stiffness"]),
+    "a heavier link and a constant torque": ({"heavier": 1.05, "torque": 0.3}, ["payload", "torque"]),
+}
+
+
+@pytest.mark.drill_of(
+    *(f"{item}-{name}" for item in ("EULER", "IMPLICITFAST") for name in (*[*PLANTED][:1], *[*PLANTED][-2:]))
+)
+@pytest.mark.parametrize("name", PLANTED)
+@pytest.mark.parametrize("integrator", ["EULER", "IMPLICITFAST"])
+def test_what_is_planted_is_named_alone(tmp_path: Path, name: str, integrator: str) -> None:
+    """A link, a torque, a spring, friction or damping that the file does not have is named, two of them as well."""
+    planted, named = PLANTED[name]
+    (layer,) = loop(tmp_path, integrator, "float64", **planted).layers
+    assert sorted(cause.id for cause in layer.causes) == named, [cause.sentence for cause in layer.causes]
+    assert max(cause.after for cause in layer.causes) < 1e-7
+
+
+@pytest.mark.drill
+def test_sizes_come_back_to_their_errors(tmp_path: Path) -> None:
+    """The size of a torque and of a spring at one joint are told with an error in which they lie."""
+    for planted, words in (({"torque": 0.3}, "a constant torque of 0.3"), ({"stiffness": 0.5}, "a spring of 0.5")):
+        (layer,) = loop(tmp_path, "EULER", "float64", **planted).layers
+        assert words in layer.causes[0].sentence
+        assert "at b" in layer.causes[0].sentence
+
+
+@pytest.mark.drill
+def test_what_nothing_explains_is_not_called_rounding(tmp_path: Path) -> None:
+    """A torque that beats is no number of the robot: the layer differs without a cause, or is not decided."""
+    (layer,) = loop(tmp_path, "EULER", "float64", beat=0.05).layers
+    assert not layer.causes
+    assert not layer.holds or layer.undecided

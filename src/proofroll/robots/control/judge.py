@@ -17,7 +17,6 @@ from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.step_limits import servo_steps
-from proofroll.robots.control.air_fit import FITTED
 from proofroll.robots.control.base_frames import BaseFrame
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME, SearchTime
@@ -35,7 +34,7 @@ from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
 from proofroll.robots.control.imported import MOST
 from proofroll.robots.control.layers import InAir, record_layers
-from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
+from proofroll.robots.control.record import FITTED, ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
 _Judged = tuple[StateReading, list[Layer]]

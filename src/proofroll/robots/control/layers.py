@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
-from proofroll.robots.control.air_fit import FITTED, AirFit, acceleration_fit
+from proofroll.robots.control.air_fit import AirFit, acceleration_fit
 from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import (
@@ -43,7 +43,7 @@ from proofroll.robots.control.differences import (
 )
 from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
-from proofroll.robots.control.record import OBSERVED, ControlRecord, Layer, LayerCause
+from proofroll.robots.control.record import FITTED, OBSERVED, ControlRecord, Layer, LayerCause
 from proofroll.robots.control.standing_joints import standing_fit
 from proofroll.robots.model import Array
 
@@ -226,7 +226,7 @@ def _of_another_robot(
         if time.over:
             ended = f"the search for robots as importers read it ended after {SEARCH_TIME:.0f} s of processor time"
             break
-        trial = acceleration_fit(record, law, robot, efforts, held_rows(record, law), usable)
+        trial = acceleration_fit(record, law, robot, efforts, held_rows(record, law), usable, together=False)
         if isinstance(trial, str) or trial.between or any(cause.id == FITTED for cause in trial.causes):
             continue
         if trial.off > trial.bar and not trial.causes:

@@ -19,6 +19,7 @@ from proofroll.robots.model import Array
 # Columns of the base with the names of their components, units and meaning.
 BASE: Mapping[str, str] = {"p_WB": "xyz", "q_WB": "wxyz", "v_WB": "xyz", "w_WB": "xyz"}
 OBSERVED = "observed"
+FITTED = "payload"  # id of the cause that has a mass and an inertia of a body as fitted numbers
 _SINGLE = 2.0**-24  # relative rounding of single precision
 _DOUBLE = 2.0**-53
 _DIGITS = 9  # decimal digits that single precision needs; a file of fewer was rounded to them
