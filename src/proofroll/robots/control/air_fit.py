@@ -150,7 +150,7 @@ def _judged(
 
 
 def _right(law: ControlLaw) -> dict[str, float]:
-    """Numbers that are told in parts of the right ones, or are not zero, by their names."""
+    """Right values of the numbers that are parts of the right ones, or are not zero, by their names."""
     return {"gravity": law.gravity, "effort": 1.0, "armature": float(law.armature.any())}
 
 

@@ -61,7 +61,7 @@ def along(column: Array, values: Array) -> float:
 
 
 class StepScheme(NamedTuple):
-    """State at which a step has its forces: that before it, unless told otherwise.
+    """State at which a step has its forces: that before it, but for these.
 
     Attributes:
         implicit: True if kd acts at the velocity after the step.
@@ -262,7 +262,7 @@ class AirTable:
         Args:
             rows: their indices.
             moving: velocities whose differences are accelerations.
-            scheme: what acts at the velocity after a step.
+            scheme: state at which forces act.
             central: True if accelerations are differences over two intervals.
         """
         law, robot, h, rated = self.law, self.robot, self.step, moving.rates

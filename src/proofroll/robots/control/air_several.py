@@ -26,7 +26,7 @@ class _Group:
 
     Attributes:
         kind: of the numbers.
-        columns: what one more of each takes away, (equations, numbers).
+        columns: forces that one more of each takes away, (equations, numbers).
         where: joint of each number, or the body, or nothing.
     """
 
@@ -77,7 +77,7 @@ def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
 
 
 class _Screen:
-    """What groups of columns leave of numbers, from products of all columns: quick, and exact to half the digits."""
+    """Remainders of groups of columns, from products of all columns: quick, and exact to half the digits."""
 
     def __init__(self, groups: Sequence[_Group], left: Array) -> None:
         columns = np.concatenate([group.columns for group in groups], axis=1)

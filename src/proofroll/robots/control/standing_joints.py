@@ -62,7 +62,7 @@ def standing_fit(
     usable = off_stops & off_friction
     if remarks:
         fit = acceleration_fit(record, law, held, efforts, steady, usable)
-    if isinstance(fit, str) or (_differs(fit) and all(cause.id == FITTED for cause in fit.causes)):
+    if isinstance(fit, str) or (_differs(fit) and (len(fit.causes) != 1 or fit.causes[0].id == FITTED)):
         motors = _held_joints(record, law, held, efforts, off_stops)
         if motors is not None:
             return StandingFit(replace(whole, causes=(motors,), between=False), every, "")
