@@ -181,6 +181,7 @@ def judge_record(
             held=model.held(reading.frame),
             imported=partial(model.imported, reading.frame, imported),
             reported=reading.reported,
+            stepped=model.held(None) if reading.frame is not None else None,
             ranges=model.ranges,
             assumed=assumed,
         )

@@ -108,6 +108,7 @@ class InAir:
         held: the robot.
         imported: robots that are tried where it differs.
         reported: the record with the frame of its base, if that is not the one of the other layers.
+        stepped: the robot with the frame of its file, where a program may step that and report another; else None.
         ranges: joint -> its limits [rad or m].
         assumed: clause on rows that are steps if the program has its usual ones; empty: they are not, or it is known.
     """
@@ -115,6 +116,7 @@ class InAir:
     held: HeldRobot
     imported: Callable[[], Iterable[HeldRobot]] = tuple
     reported: ControlRecord | None = None
+    stepped: HeldRobot | None = None
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: str = ""
 
@@ -164,6 +166,10 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
         return Layer("acceleration", reason="the record has no columns effort.JOINT")
     steady, ranges = held_rows(record, law), evidence.in_air.ranges
     fit, off_stops, remark = standing_fit(record, law, evidence.in_air.held, efforts, steady, ranges)
+    if evidence.in_air.stepped is not None and not isinstance(fit, str) and fit.off > fit.bar:
+        other = standing_fit(evidence.record, law, evidence.in_air.stepped, efforts, steady, ranges)
+        if not isinstance(other.fit, str) and other.fit.off < fit.off:
+            fit, off_stops, remark = other
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
     if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
