@@ -163,7 +163,8 @@ def _judge_record(
         options.write_json(judged)
     else:
         options.show_lines([*judged.lines()])
-    raise typer.Exit(options.CONTRADICTED if not judged.agrees else options.OK if judged.looked_at else options.ENGINE)
+    known = judged.looked_at and judged.decided
+    raise typer.Exit(options.CONTRADICTED if not judged.agrees else options.OK if known else options.ENGINE)
 
 
 def _scene_of_run(run: Path) -> tuple[str, Mapping[str, object]]:

@@ -97,10 +97,12 @@ class JudgedRecord(Protocol):
     Attributes:
         agrees: True if nothing in the record differs.
         looked_at: True if something could be judged.
+        decided: True if nothing differs without the record telling whether that counts.
     """
 
     agrees: bool
     looked_at: bool
+    decided: bool
 
     def lines(self) -> Iterable[str]:
         """Lines of text about it."""

@@ -13,6 +13,9 @@ from proofroll.robots.control.record import ControlRecord
 from proofroll.robots.model import Array, Robot
 
 _EQUAL, _DIGITS = 1e-9, 9  # part of the largest moment by which equal ones differ, and decimals of equal turns
+# Products of inertia that a program takes for none when it turns an inertia to its principal axes, in parts of the sum
+# of its moments; PyBullet's importer does so.
+_LEFT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -23,15 +26,17 @@ class BaseFrame:
         words: clause on a record whose base has its place, attitude and velocity there.
         place: of its origin in the base's frame [m], shape (3,).
         rotation: of its axes against those of the base, shape (3, 3).
+        error: angle by which a program's axes may be off these [rad].
     """
 
     words: str
     place: Array
     rotation: Array
+    error: float = 0.0
 
     def corrected(self, record: ControlRecord) -> ControlRecord:
         """The record with place, attitude and velocity of the base's own frame, where it has those of this one."""
-        columns, spin = dict(record.columns), record.stacked("w_WB", "xyz")
+        columns, rounding, spin = dict(record.columns), dict(record.rounding), record.stacked("w_WB", "xyz")
         attitude = record.stacked("q_WB", "wxyz")
         if attitude is None:
             return record
@@ -43,7 +48,10 @@ class BaseFrame:
             for k, axis in enumerate("xyz"):
                 if f"{name}.{axis}" in columns:
                     columns[f"{name}.{axis}"] = columns[f"{name}.{axis}"] - change[:, k]
-        return ControlRecord(record.path, columns, record.rounding, record.time)
+                    rounding[f"{name}.{axis}"] = rounding[f"{name}.{axis}"] + self.error * np.abs(change).max()
+        for axis in "wxyz":
+            rounding[f"q_WB.{axis}"] = rounding[f"q_WB.{axis}"] + self.error / 2
+        return ControlRecord(record.path, columns, rounding, record.time)
 
     def reported(self, record: ControlRecord) -> ControlRecord:
         """The record as a program reports it that has this frame."""
@@ -79,18 +87,31 @@ def base_frames(robot: Robot) -> tuple[BaseFrame, ...]:
     frames = [
         BaseFrame(centre, link.com, np.eye(3)),
         BaseFrame(f"{centre}, and q_WB has the axes of its <inertial>", link.com, written),
-        BaseFrame(f"{centre}, and q_WB has its principal axes", link.com, written @ _principal(link.inertia, written)),
+        BaseFrame(
+            f"{centre}, and q_WB has its principal axes",
+            link.com,
+            written @ _principal(link.inertia, written),
+            _error(link.inertia),
+        ),
         BaseFrame(f"{centre} (with all links that are fixed to it)", whole.com, np.eye(3)),
         BaseFrame(
             f"{centre} (with all links that are fixed to it), and q_WB has its principal axes",
             whole.com,
             _principal(whole.inertia, np.eye(3)),
+            _error(whole.inertia),
         ),
     ]
     several = [BaseFrame("", np.zeros(3), np.eye(3))]
     for frame in frames:
         several += [] if any(map(frame.equals, several)) else [frame]
     return tuple(several[1:])
+
+
+def _error(inertia: Array) -> float:
+    """Angle by which a program's principal axes may be off [rad]; axes of equal moments are found as those written."""
+    moments = np.linalg.eigvalsh(inertia)
+    gaps = np.diff(moments)[np.diff(moments) > _EQUAL * moments.max()]
+    return _LEFT * float(moments.sum() / gaps.min()) if len(gaps) else 0.0
 
 
 def _principal(inertia: Array, axes: Array) -> Array:

@@ -17,7 +17,6 @@ from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.step_limits import servo_steps
-from proofroll.robots.control.air_fit import FITTED
 from proofroll.robots.control.base_frames import BaseFrame
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import LAYERS, SEARCH_TIME, SearchTime
@@ -34,8 +33,8 @@ from proofroll.robots.control.columns import (
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
 from proofroll.robots.control.imported import MOST
-from proofroll.robots.control.layers import BETWEEN, InAir, record_layers
-from proofroll.robots.control.record import ControlRecord, Layer, read_record, record_of
+from proofroll.robots.control.layers import InAir, record_layers
+from proofroll.robots.control.record import FITTED, ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
 _Judged = tuple[StateReading, list[Layer]]
@@ -77,6 +76,11 @@ class RecordJudgement:
         """True if at least one layer was looked at."""
         return any(layer.residual is not None for layer in self.layers)
 
+    @property
+    def decided(self) -> bool:
+        """True if no layer differs without the record telling whether that counts."""
+        return not any(layer.undecided for layer in self.layers)
+
     def lines(self) -> Iterator[str]:
         """Lines of text: a headline, one for each layer, and the causes at the first that does not hold."""
         failed_layer = next((layer for layer in self.layers if not layer.holds), None)
@@ -85,6 +89,9 @@ class RecordJudgement:
             yield f"{self.step_bound}."
         if not self.looked_at:
             yield f"{self.record} ({rows}): no layer could be looked at"
+        elif failed_layer is None and not self.decided:
+            undecided = next(layer.name for layer in self.layers if layer.undecided)
+            yield f"{self.record} ({rows}): the {undecided} is not decided; every other layer that was looked at holds"
         elif failed_layer is None:
             yield f"{self.record} ({rows}): every layer that was looked at holds"
         else:
@@ -108,7 +115,7 @@ def _unexplained(layer: Layer) -> str:
 
 
 def _mark(layer: Layer) -> str:
-    return "–" if layer.residual is None else "✓" if layer.holds else "✗"
+    return "?" if layer.undecided else "–" if layer.residual is None else "✓" if layer.holds else "✗"
 
 
 def _found(layer: Layer) -> str:
@@ -117,8 +124,7 @@ def _found(layer: Layer) -> str:
     place = "" if layer.holds else f", most in {layer.column}"
     place += f" at {layer.time:.4g} s" if place and np.isfinite(layer.time) else ""
     remark = f"; {layer.reason}" if layer.reason else ""
-    rounding = "" if layer.reason.startswith(BETWEEN) else f", rounding {error(layer.bar)}"
-    return f"off by {error(layer.residual)}{rounding}{place}{remark}"
+    return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{place}{remark}"
 
 
 def judge_record(
@@ -175,6 +181,7 @@ def judge_record(
             held=model.held(reading.frame),
             imported=partial(model.imported, reading.frame, imported),
             reported=reading.reported,
+            stepped=model.held(None) if reading.frame is not None else None,
             ranges=model.ranges,
             assumed=assumed,
         )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
-from proofroll.robots.control.air_fit import FITTED, AirFit, acceleration_fit
+from proofroll.robots.control.air_fit import AirFit, acceleration_fit
 from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import (
@@ -43,15 +43,12 @@ from proofroll.robots.control.differences import (
 )
 from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
-from proofroll.robots.control.record import OBSERVED, ControlRecord, Layer, LayerCause
+from proofroll.robots.control.record import FITTED, OBSERVED, ControlRecord, Layer, LayerCause
 from proofroll.robots.control.standing_joints import standing_fit
 from proofroll.robots.model import Array
 
-# Part of the largest forces up to which what is left without a cause is taken for the program's steps between the rows:
-# fourth order in steps of 5 ms leaves a seventh of it, a thigh that is heavier by a fifth four times as much.
-_STEPS = 1e-2
-# Remark on what is taken for them.
-BETWEEN = "no cause is known; taken for the program's own steps between the rows"
+# Remark on a scheme that has the damping of joints at the velocity after a step.
+_DAMPED = "damping of joints acts at the velocity after the step, or they have an armature of h times it more"
 # Number of random roundings of a record that give the bar of a layer, and the factor on their largest change.
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
@@ -111,6 +108,7 @@ class InAir:
         held: the robot.
         imported: robots that are tried where it differs.
         reported: the record with the frame of its base, if that is not the one of the other layers.
+        stepped: the robot with the frame of its file, where a program may step that and report another; else None.
         ranges: joint -> its limits [rad or m].
         assumed: clause on rows that are steps if the program has its usual ones; empty: they are not, or it is known.
     """
@@ -118,6 +116,7 @@ class InAir:
     held: HeldRobot
     imported: Callable[[], Iterable[HeldRobot]] = tuple
     reported: ControlRecord | None = None
+    stepped: HeldRobot | None = None
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: str = ""
 
@@ -167,34 +166,50 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
         return Layer("acceleration", reason="the record has no columns effort.JOINT")
     steady, ranges = held_rows(record, law), evidence.in_air.ranges
     fit, off_stops, remark = standing_fit(record, law, evidence.in_air.held, efforts, steady, ranges)
+    if evidence.in_air.stepped is not None and not isinstance(fit, str) and fit.off > fit.bar:
+        other = standing_fit(evidence.record, law, evidence.in_air.stepped, efforts, steady, ranges)
+        if not isinstance(other.fit, str) and other.fit.off < fit.off:
+            fit, off_stops, remark = other
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
     if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
-    fit = dataclasses.replace(fit, between=fit.between and not stepwise)
+    fit = dataclasses.replace(fit, between=fit.between and not (stepwise or _rows_are_steps(record, law)))
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
-    if fit.between and (fit.off > _STEPS or assumed):
+    if fit.between:
         off = f"the forces are off by {error(fit.off)} of the largest, and no cause is known"
         advice = f"steps between the rows may explain it: {assumed or 'log every step to decide'}"
         return Layer("acceleration", reason="; ".join(filter(None, (off, advice, remark))), undecided=True)
     implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
-    holds = (fit.off <= fit.bar and not fit.causes) or fit.between
+    holds = fit.off <= fit.bar and not fit.causes
     if assumed and not holds and all(cause.after > fit.bar for cause in fit.causes):
         remark = "; ".join(filter(None, (remark, assumed)))
     earlier = next((layer.name for layer in layers if not layer.holds), "")
     return Layer(
         name="acceleration",
         residual=fit.off,
-        bar=max(fit.off, fit.bar) if holds else min(fit.bar, 0.99 * fit.off),
+        bar=fit.bar if holds else min(fit.bar, 0.99 * fit.off),
         column="the forces",
         reason="; ".join(
-            part for part in (implicit if fit.imitated else BETWEEN if fit.between else "", remark) if part
+            part for part in (implicit if fit.imitated else "", _DAMPED if fit.damped else "", remark) if part
         ),
         causes=fit.causes,
         tried=0 if earlier else fit.tried,
     )
+
+
+def _rows_are_steps(record: ControlRecord, law: ControlLaw) -> bool:
+    """True if places move by the velocity after each row and not by that before, as in steps of semi-implicit Euler."""
+    q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
+    if q is None or v is None:
+        return False
+    h = np.diff(record.time)[:, None]
+    rounding = 2 * record.rounding_of("q", law.joints)[1:] + h * record.rounding_of("v", law.joints)[1:]
+    bars = rounding + ROUND_OFF * np.abs(q).max()
+    moved = np.diff(q, axis=0)
+    return bool(np.all(np.abs(moved - h * v[1:]) <= bars) and np.any(np.abs(moved - h * v[:-1]) > 2 * bars))
 
 
 def _of_another_robot(
@@ -217,12 +232,14 @@ def _of_another_robot(
         if time.over:
             ended = f"the search for robots as importers read it ended after {SEARCH_TIME:.0f} s of processor time"
             break
-        trial = acceleration_fit(record, law, robot, efforts, held_rows(record, law), usable)
+        trial = acceleration_fit(record, law, robot, efforts, held_rows(record, law), usable, together=False)
         if isinstance(trial, str) or trial.between or any(cause.id == FITTED for cause in trial.causes):
             continue
         if trial.off > trial.bar and not trial.causes:
             continue
         left = min((cause.after for cause in trial.causes), default=trial.off)
+        if left > max(trial.bar, _HELPS * fit.off):  # a robot far from this one may be helped by anything
+            continue
         further = bool(trial.causes)  # several of them are alternatives
         if (rank := (len(robot.causes) + further, further, left)) < best:
             proof = f"forces off by {error(fit.off)} of their size, by {error(left, 1)} with that"

@@ -8,7 +8,8 @@ import numpy as np
 
 from proofroll.core.number_format import error
 from proofroll.elements.mechanism import Mechanism
-from proofroll.robots.control.air_fit import AirFit, states_of
+from proofroll.robots.control.air_fit import AirFit
+from proofroll.robots.control.air_rows import states_of
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw, RobotState
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, SEARCH_TIME, SearchTime, mistakes

@@ -19,9 +19,11 @@ from proofroll.robots.model import Array
 # Columns of the base with the names of their components, units and meaning.
 BASE: Mapping[str, str] = {"p_WB": "xyz", "q_WB": "wxyz", "v_WB": "xyz", "w_WB": "xyz"}
 OBSERVED = "observed"
+FITTED = "payload"  # id of the cause that has a mass and an inertia of a body as fitted numbers
 _SINGLE = 2.0**-24  # relative rounding of single precision
 _DOUBLE = 2.0**-53
 _DIGITS = 9  # decimal digits that single precision needs; a file of fewer was rounded to them
+_MANY = 30  # different values that agree in their decimals by no accident
 _DECIMALS = 8  # most decimals of a file that is written with a fixed number of them
 
 
@@ -112,7 +114,8 @@ def record_of(
         columns: name -> values.
         path: of the file, for messages.
         units: column, or ``time`` -> its unit, where that need not be an SI unit.
-        digits: relative rounding of the numbers that the columns were computed from; None: the columns show it.
+        digits: relative rounding of the numbers that the columns were computed from, beside the decimals that they
+            show; None: the columns show it.
 
     Raises:
         InputError: times do not grow, or a value is not finite.
@@ -129,7 +132,11 @@ def record_of(
     if digits is None:
         rounding = _roundings(columns)  # of the digits that are written
     else:
-        rounding = {name: np.full(item.shape, 2 * digits * np.abs(item).max()) for name, item in columns.items()}
+        decimals = _decimal_roundings(columns, digits)
+        rounding = {
+            name: np.full(item.shape, 2 * digits * np.abs(item).max() + decimals[name])
+            for name, item in columns.items()
+        }
     converted, rounding = (
         {name: item * factors.get(name, 1.0) for name, item in part.items()} for part in (columns, rounding)
     )
@@ -156,6 +163,30 @@ def in_world(record: ControlRecord) -> ControlRecord:
         for k, axis in enumerate("xyz"):
             columns[f"{name}.{axis}"], rounding[f"{name}.{axis}"] = turned[:, k], bars
     return ControlRecord(record.path, columns, rounding, record.time)
+
+
+def _decimal_roundings(columns: Mapping[str, Array], digits: float) -> dict[str, float]:
+    """Rounding of each column to a number of decimals that all columns of its kind show; 0 where they show none.
+
+    Velocities of a base may have been computed from rounded numbers: they have at least the rounding of its attitude.
+    """
+    kinds: dict[str, list[Array]] = {}
+    for name, values in columns.items():
+        kinds.setdefault(name.partition(".")[0], []).append(values)
+    shown = {kind: _decimals(np.unique(np.concatenate(values)), digits) for kind, values in kinds.items()}
+    for kind in shown.keys() & {"v_WB", "w_WB"}:
+        shown[kind] = max(shown[kind], shown.get("q_WB", 0.0))
+    return {name: shown[name.partition(".")[0]] for name in columns}
+
+
+def _decimals(values: Array, digits: float) -> float:
+    """Rounding of different values to the fewest decimals that they all have; 0 if there are few of them, or none."""
+    for decimals in range(1, _DECIMALS if len(values) >= _MANY else 1):
+        scaled = values * 10.0**decimals
+        round_off = 4 * digits * np.abs(scaled) + 1e-9
+        if np.all(np.abs(scaled - np.round(scaled)) <= round_off) and round_off.max() < 0.1:
+            return 0.5 * 10.0**-decimals
+    return 0.0
 
 
 def _roundings(columns: Mapping[str, Array]) -> dict[str, Array]:

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.number_format import error
-from proofroll.robots.control.air_fit import FITTED, AirFit, acceleration_fit, states_of
+from proofroll.robots.control.air_fit import AirFit, acceleration_fit
+from proofroll.robots.control.air_rows import states_of
 from proofroll.robots.control.bookkeeping.air import AirRobot, HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.record import ControlRecord, LayerCause
+from proofroll.robots.control.record import FITTED, ControlRecord, LayerCause
 from proofroll.robots.model import Array
 
 _NEAR = 1e-3  # part of a range at whose ends a stop may act
@@ -61,7 +62,7 @@ def standing_fit(
     usable = off_stops & off_friction
     if remarks:
         fit = acceleration_fit(record, law, held, efforts, steady, usable)
-    if isinstance(fit, str) or (_differs(fit) and all(cause.id == FITTED for cause in fit.causes)):
+    if isinstance(fit, str) or (_differs(fit) and (len(fit.causes) != 1 or fit.causes[0].id == FITTED)):
         motors = _held_joints(record, law, held, efforts, off_stops)
         if motors is not None:
             return StandingFit(replace(whole, causes=(motors,), between=False), every, "")

@@ -23,12 +23,27 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.robots.control.bookkeeping.law import ControlLaw, RobotState
 from proofroll.robots.model import NO_BODY, Robot
 
-Scheme = Literal["explicit", "implicit", "explicit_base", "implicit_base", "rk4"]
+DAMPED = "_damped"  # end of the name of a scheme whose damping of joints acts at the velocity after the step
+Scheme = Literal[
+    "explicit",
+    "implicit",
+    "explicit_base",
+    "implicit_base",
+    "explicit_damped",
+    "implicit_damped",
+    "explicit_base_damped",
+    "implicit_base_damped",
+    "rk4",
+]
 SCHEMES: Mapping[Scheme, str] = {
     "explicit": "semi-implicit Euler with kd at the state before the step",
     "implicit": "semi-implicit Euler with kd at the velocity after the step",
     "explicit_base": "the same, whose floating base has its velocity along its own axes",
     "implicit_base": "the same with kd at the velocity after the step",
+    "explicit_damped": "semi-implicit Euler with the joints' own damping at the velocity after the step",
+    "implicit_damped": "the same with kd at the velocity after the step",
+    "explicit_base_damped": "the same, whose floating base has its velocity along its own axes",
+    "implicit_base_damped": "the same with kd at the velocity after the step",
     "rk4": "RK4",
 }
 _STOP = 1e6  # rad/s or m/s: a run that is faster has blown up
@@ -118,6 +133,14 @@ class AirRobot:
     def bare(cls, mechanism: Mechanism, law: ControlLaw) -> AirRobot:
         """Robot without the armature of a law, under the right gravity."""
         return cls(mechanism, law.change(armature=np.zeros(len(law.joints)), gravity=1.0))
+
+    @cached_property
+    def damping(self) -> Array:
+        """Damping of the joints themselves along all velocities, (nv)."""
+        damping = np.zeros(self.mechanism.nv)
+        for joint, place in zip(self.mechanism.joints, self.mechanism.v_slices, strict=True):
+            damping[place] = joint.damping
+        return damping
 
     @cached_property
     def _weightless(self) -> JointCoordinates:
@@ -253,13 +276,15 @@ def _stepped(
     if scheme == "rk4":
         return _rk4(robot, law, state, (efforts, target), h)
     acceleration = robot.solved(q, v, efforts).acceleration
+    damping = robot.damping if scheme.endswith(DAMPED) else np.zeros(len(v))
     if scheme.startswith("implicit"):
         # What is clamped or held does not follow the velocity.
         free = (np.abs(efforts) < law.limit) & (not law.hold_effort)
-        damping = robot.load(np.where(free, law.kd, 0.0))
+        damping = damping + robot.load(np.where(free, law.kd, 0.0))
+    if damping.any():
         M = robot.equations.inertial(robot.equations.tree.at(q, v))[1]
         acceleration = np.asarray(np.linalg.solve(M + h * np.diag(damping), M @ acceleration), float)
-    return _moved(robot, q, v, acceleration, h, along_base=scheme.endswith("_base"))
+    return _moved(robot, q, v, acceleration, h, along_base="_base" in scheme)
 
 
 def _moved(

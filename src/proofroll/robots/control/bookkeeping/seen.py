@@ -14,7 +14,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.robots.control.bookkeeping.air import SCHEMES, AirRobot, Scheme, steps_in_air
+from proofroll.robots.control.bookkeeping.air import DAMPED, SCHEMES, AirRobot, Scheme, steps_in_air
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 
 SHOWN = 0.1  # s: a mistake of bookkeeping shows in the air within it
@@ -80,7 +80,11 @@ class LawMotions:
             self.turning[place] = joint.kind == JointKind.REVOLUTE
             if joint.kind in WITH_QUATERNION:
                 self.quaternions.append(slice(place.stop - 4, place.stop))
-        self.schemes: list[Scheme] = [name for name in SCHEMES if self.quaternions or not name.endswith("_base")]
+        damped = any(joint.damping for joint in self.mechanism.joints)
+        floats = bool(self.quaternions)
+        self.schemes: list[Scheme] = [
+            name for name in SCHEMES if floats >= ("_base" in name) and damped >= name.endswith(DAMPED)
+        ]
 
     def schemes_of(self, treatment: str) -> list[Scheme]:
         """Schemes that treat gains in one way."""
@@ -131,7 +135,12 @@ class LawMotions:
     def imitated(self, scheme: Scheme) -> bool:
         """True if explicit kd with an armature of h kd more moves as implicit kd does."""
         armed = self.law.change(armature=self.law.armature + self.step * self.law.kd)
-        by_armature: Mapping[Scheme, Scheme] = {"implicit": "explicit", "implicit_base": "explicit_base"}
+        by_armature: Mapping[Scheme, Scheme] = {
+            "implicit": "explicit",
+            "implicit_base": "explicit_base",
+            "implicit_damped": "explicit_damped",
+            "implicit_base_damped": "explicit_base_damped",
+        }
         same = scheme in by_armature and self.law.kd.any()
         return bool(same and self.distance(armed, by_armature[scheme]) <= self.seen.bar)
 

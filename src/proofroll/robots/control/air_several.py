@@ -1,0 +1,152 @@
+"""Several numbers of a robot in the air that close its accelerations together, of all joints, links and the whole."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from proofroll.core.number_format import error as short
+from proofroll.core.number_format import with_bar
+from proofroll.robots.control.air_rows import BY_JOINT, NUMBERS, ROUND_OFF, SAFETY, AirRows, rms
+from proofroll.robots.control.record import FITTED, LayerCause
+from proofroll.robots.model import Array
+
+_MOST = 0.5  # part of the equations that numbers may be
+_SCREENED = 1e-3  # part of what is off that the quick look may leave
+_LISTED = 4  # joints whose numbers are told one by one
+_REST = "torque"  # number of a joint that a spring needs, too: its rest is not known
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Numbers that are tried together.
+
+    Attributes:
+        kind: of the numbers.
+        columns: forces that one more of each takes away, (equations, numbers).
+        where: joint of each number, or the body, or nothing.
+    """
+
+    kind: str
+    columns: Array
+    where: tuple[str, ...]
+
+
+def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]) -> list[LayerCause]:
+    """Causes with which, all together, no more than rounding is left; empty without such a set.
+
+    Of the sets of one group of numbers or two the one with the fewest numbers counts; what lies within its error is
+    dropped.
+
+    Args:
+        rows: forces at rows of the record.
+        joints: driven joints.
+        right: number -> its right value, for those that are parts of the right ones.
+    """
+    if rows.slow.any() and not rows.slow.all():  # near rest dry friction is none that a sign tells
+        rows = rows.without(rows.slow)
+    groups = [*_groups(rows, joints)]
+    screen = _Screen(groups, rows.left)
+    sets = [*((k,) for k in range(len(groups))), *itertools.combinations(range(len(groups)), 2)]
+    for numbers in sorted(sets, key=lambda item: sum(groups[k].columns.shape[1] for k in item)):
+        chosen = [groups[k] for k in numbers]
+        count = sum(group.columns.shape[1] for group in chosen)
+        if count > _MOST * len(rows.left) or screen.left(numbers) > max(SAFETY * rows.rounding, _SCREENED * rows.off):
+            continue
+        columns = np.concatenate([group.columns for group in chosen], axis=1)
+        values, remainder = _solved(columns, rows.left)
+        if rms(remainder) <= SAFETY * rows.rounding:
+            return [*_told(rows, chosen, columns, values, right)]
+    return []
+
+
+def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
+    """Groups of numbers: of the whole robot, of all joints, of springs with their rest, and of each link."""
+    for name in NUMBERS:
+        if rows.columns[name].any():
+            yield _Group(name, rows.columns[name][:, None], ("",))
+    for name, columns in rows.by_joint.items():
+        rests = [rows.by_joint[_REST]] if name == "stiffness" else []
+        whole = np.concatenate([columns, *rests], axis=1)
+        yield _Group(name, whole, tuple(joints) * (1 + len(rests)))
+    for body, columns in rows.added.items():
+        yield _Group(FITTED, columns, (body,) * columns.shape[1])
+
+
+class _Screen:
+    """Remainders of groups of columns, from products of all columns: quick, and exact to half the digits."""
+
+    def __init__(self, groups: Sequence[_Group], left: Array) -> None:
+        columns = np.concatenate([group.columns for group in groups], axis=1)
+        sizes = np.linalg.norm(columns, axis=0)
+        scaled = columns / np.where(sizes > 0, sizes, 1.0)
+        self._products, self._along, self._left = scaled.T @ scaled, scaled.T @ left, left
+        ends = np.cumsum([0, *(group.columns.shape[1] for group in groups)])
+        self._places = [np.arange(first, last) for first, last in itertools.pairwise(ends.tolist())]
+
+    def left(self, numbers: Sequence[int]) -> float:
+        """Root mean square of what some groups leave."""
+        place = np.concatenate([self._places[k] for k in numbers])
+        values = np.linalg.lstsq(self._products[np.ix_(place, place)], self._along[place], rcond=ROUND_OFF)[0]
+        square = float(self._left @ self._left - values @ self._along[place])
+        return float(np.sqrt(max(square, 0.0) / len(self._left)))
+
+
+def _solved(columns: Array, left: Array) -> tuple[Array, Array]:
+    """Numbers of least squares, and what they leave."""
+    sizes = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(sizes > 0, sizes, 1.0)
+    values = np.linalg.lstsq(scaled, left, rcond=ROUND_OFF)[0]
+    return values / np.where(sizes > 0, sizes, np.inf), left - scaled @ values
+
+
+def _errors(rows: AirRows, columns: Array) -> Array:
+    """Error of each number by the rounding of the record."""
+    sizes = np.where(np.any(columns, axis=0), np.linalg.norm(columns, axis=0), np.inf)
+    inverse = np.linalg.pinv(columns / sizes, rcond=ROUND_OFF)
+    return np.asarray(SAFETY * rows.rounding * np.linalg.norm(inverse, axis=1) / sizes)
+
+
+def _told(
+    rows: AirRows, groups: Sequence[_Group], columns: Array, values: Array, right: dict[str, float]
+) -> Iterator[LayerCause]:
+    """A cause for each kind of number beyond its error."""
+    bars, remainder = _errors(rows, columns) + ROUND_OFF, rms(rows.left - columns @ values)
+    proof = f"forces off by {short(rows.off / rows.size)} of their size, by {short(remainder / rows.size, 1)} with all"
+    first = 0
+    for group in groups:
+        place = slice(first, first + len(group.where))
+        first = place.stop
+        words = _words(group, values[place], bars[place], right)
+        if words:
+            yield LayerCause(group.kind, f"{words} ({proof})", None, remainder / rows.size)
+
+
+def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -> str:
+    """Clause on the numbers of a group that lie beyond their errors; empty without one."""
+    beyond = [k for k in range(len(values)) if abs(values[k]) > bars[k]]
+    if not beyond:
+        return ""
+    if group.kind == FITTED:
+        return f"mass, centre and inertia of {group.where[0]} are others, {values[0]:+.3g} kg"
+    if group.where == ("",):
+        words, unit = NUMBERS[group.kind]
+        text, interval = with_bar(right.get(group.kind, 0.0) + values[0], bars[0], 1)
+        return f"{words} {text} ± {interval} {unit}"
+    count = len(values) if group.kind != "stiffness" else len(values) // 2
+    beyond = [k for k in beyond if k < count]
+    words, unit = BY_JOINT[group.kind]
+    even = len(beyond) == count and np.ptp(values[:count]) <= 2 * bars[:count].max()
+    if not beyond:
+        return ""
+    shown = [(f"all {count} joints", values[:count].mean(), bars[:count].max())] if even else []
+    shown = shown or [(group.where[k], values[k], bars[k]) for k in beyond]
+    texts = []
+    for where, value, bar in shown[:_LISTED]:
+        text, interval = with_bar(float(value), float(bar), 1)
+        texts.append(f"{text} ± {interval} at {where}")
+    more = f" and at {len(shown) - _LISTED} more" if len(shown) > _LISTED else ""
+    return f"joints have {words} {', '.join(texts)}{more} {unit} that is not told"
