@@ -7,7 +7,7 @@ OUT ?= out
 # A worker process that finds no bytecode compiles the package anew, which is a quarter of its start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install report tradeoff test drills nightly check format readme docs gallery engines clean
+.PHONY: install report test drills nightly check format readme docs gallery engines clean
 
 install: $(VENV)/.installed
 
@@ -22,10 +22,6 @@ $(VENV)/.installed: pyproject.toml constraints.txt benchmarks/pyproject.toml tes
 
 report: install
 	$(BIN)/proofroll report --out $(OUT)
-
-# Error against cost of every engine; some minutes, on a machine that does nothing else.
-tradeoff: install
-	$(BIN)/proofroll tradeoff sphere_in_cylinder --out $(OUT)
 
 # Every test but drills, those that take more than 1 s of processor, of which none may be there without its mark;
 # `make test MARK=` runs all.

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from proofroll.core import number_format
 from proofroll.files.json_data import plain
 from proofroll.report import labels
-from proofroll.report.answer import sentences
+from proofroll.report.answer import picture, sentences
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
@@ -23,8 +23,7 @@ from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page import first_screen, model_lines, verdict_strips
 from proofroll.report.pages import environment, folded, packed, rendered, slug
 from proofroll.report.parts import Part, part_kinds
-from proofroll.report.styles import OUTLINES, styles
-from proofroll.report.tradeoff.tables import FIRST_TOLERANCE
+from proofroll.report.styles import OUTLINES, engine_colours, styles
 from proofroll.running.case import host_sentences
 
 if TYPE_CHECKING:
@@ -131,9 +130,10 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
         "outlines": OUTLINES,
-        "first_tolerance": FIRST_TOLERANCE,
         "first_screen": first_screen,
         "answer_words": sentences,
+        "answer_picture": picture.svg,
+        "engine_colours": engine_colours,
         "model_lines": model_lines,
         "loop_key": slug,
         "scene_words": labels.scene_words,

@@ -40,7 +40,7 @@ from proofroll.studies.answer.setting_search import RUN_CAP, SettingSearch, Stat
 from proofroll.studies.judging.asked_tolerance import AskedTolerance, orientations_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.study_store import conditions_now, keep_study, valid_study
-from proofroll.studies.tradeoff.curve import Curve
+from proofroll.studies.swept_settings import Curve
 
 # Speeds of the cheapest and of all within this factor of it are measured again, one at a time.
 _NEAR = 3.0

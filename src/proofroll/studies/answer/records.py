@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from proofroll.core.validation import FloatOrInf
 from proofroll.studies.answer.setting_search import State
 from proofroll.studies.study_store import Measured
 
@@ -140,7 +141,7 @@ class SceneAnswer:
     """
 
     scene: str
-    parameters: dict[str, float]
+    parameters: dict[str, FloatOrInf]
     until: float
     every: float
     tolerance: str
@@ -183,7 +184,7 @@ class StepAnswer:
     """
 
     scene: str
-    parameters: dict[str, float]
+    parameters: dict[str, FloatOrInf]
     until: float
     every: float
     tolerance: str

@@ -18,8 +18,7 @@ from proofroll.studies.answer.judged_run import JudgedRun, judged_run
 from proofroll.studies.answer.question import AnswerQuestion
 from proofroll.studies.answer.setting_search import CELL_CAP, LOOSEST, RUN_CAP, SettingSearch, State
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.tradeoff.curve import Curve
-from proofroll.studies.tradeoff.sweep import curves_of
+from proofroll.studies.swept_settings import Curve, curves_of
 
 # Wall time of a run over its cap of processor time, and least limit of a run that should be cheap [s].
 _LIMIT, _LEAST_LIMIT = 1.6, 2.0

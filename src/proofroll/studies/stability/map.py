@@ -22,8 +22,7 @@ from proofroll.studies.stability.axis_values import AxisValue, axis_values, case
 from proofroll.studies.stability.bisection import SearchResult, search
 from proofroll.studies.stability.effort import Effort
 from proofroll.studies.stability.records import MappedValue
-from proofroll.studies.tradeoff.curve import Curve
-from proofroll.studies.tradeoff.sweep import curves_of
+from proofroll.studies.swept_settings import Curve, curves_of
 
 _TOLERANCES = [10.0**-power for power in range(1, 14)]
 # Rungs skipped on the way down: a factor of four in the step, three decades of tolerance.

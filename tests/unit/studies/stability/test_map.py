@@ -383,7 +383,7 @@ BROKEN = [
     ('number = "spin"', 'number = "spine"', "choose one of"),
     ("between = [0, 1]", "between = [1, 0]", r"\[low, high\]"),
     ("values = [1, 2]", "values = []", "needs its values"),
-    ('study = "stability"', 'study = "tradeoff"', "can be used here"),
+    ('study = "stability"', 'study = "regimes"', "can be used here"),
     ("parameters.speed = {}", "parameters.spee = {}", "no such parameter"),
     ("values = [1, 2]", "values = [1, nan]", "give a number"),
     ("values = [1, 2]", "values = [1, -inf]", "give a number"),
