@@ -733,6 +733,6 @@ def test_ladder(proofroll: Proofroll, tmp_path: Path) -> None:
 
 def test_a_page_is_refused_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where what draws pages is not installed, one line says so before anything is run."""
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "plotly" else name)
-    with pytest.raises(Missing, match=r"pages need plotly, .*: pip install 'proofroll\[report\]'"):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "itables" else name)
+    with pytest.raises(Missing, match=r"pages need itables, .*: pip install 'proofroll\[report\]'"):
         require_pages()

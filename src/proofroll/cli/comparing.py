@@ -167,7 +167,7 @@ def outcomes_of(
     from proofroll.studies.comparison.planning import plan
 
     begin = processor_seconds() - spent
-    with options.spinner(f"{stage}cases"):
+    with options.spinner(f"{stage}cases"), runner.profile.phase("planning"):
         plans = [affordable(plan(item, engines, runner.workers), runner) for item in comparisons]
     brief = [item.brief for item in plans]
     grown = [(index, item.cases) for index, item in enumerate(plans) if len(item.truths) > len(brief[index].truths)]
@@ -247,7 +247,8 @@ class _Comparing:
 
         self._judged[index] = self._known(index)
         so_far = self.so_far
-        outcome = evaluate(self.plans[index].ended(left_out(so_far)), so_far, self.runner)
+        with self.runner.profile.phase("judging"):
+            outcome = evaluate(self.plans[index].ended(left_out(so_far)), so_far, self.runner)
         if self._judged[index] < len(self.plans[index].cases):
             outcome = replace(outcome, beyond_budget=[])  # missing cases are not left out yet
         self.ended[index] = outcome

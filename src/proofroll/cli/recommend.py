@@ -129,7 +129,7 @@ def _answer(
     from proofroll.report.answer.sentences import sentence
     from proofroll.studies.answer.answers import answer, answer_path, kept, stored
     from proofroll.studies.answer.records import SceneAnswer
-    from proofroll.studies.answer.setting_search import CELL_CAP
+    from proofroll.studies.answer.setting_search import WHOLE
 
     path = answer_path(out, question, asked, engines)
     if not runner.fresh and (earlier := stored(path, SceneAnswer)) is not None:
@@ -138,7 +138,9 @@ def _answer(
     def begin(names: Sequence[str]) -> None:
         if not quiet:
             place = f"{question.scene} over {question.until:g} s"
-            options.complain(f"searching {', '.join(names)} in {place}: at most {CELL_CAP:g} s of processor time each")
+            options.complain(
+                f"searching {', '.join(names)} in {place}: at most {WHOLE.engine:g} s of processor time each"
+            )
 
     def tell(item: EngineAnswer) -> None:
         if not quiet:

@@ -9,7 +9,7 @@ from proofroll.report.comparison.records import ReportedRow
 
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 COLOURS = 8
-# plotly's names of symbols, each with its outline around (0, 0) for the legend, as an SVG path.
+# Symbols by name, each with its outline around (0, 0) as an SVG path.
 OUTLINES = {
     "circle": "M-3.4 0a3.4 3.4 0 1 0 6.8 0a3.4 3.4 0 1 0 -6.8 0Z",
     "square": "M-3 -3H3V3H-3Z",
@@ -28,7 +28,7 @@ OUTLINES = {
 
 @dataclass(frozen=True)
 class Style:
-    """Style of a row: number of the colour, plotly's dashes and symbol, width of the line [px], and opacity."""
+    """Style of a row: number of the colour, dashes and symbol by name, width of the line [px], and opacity."""
 
     colour: int
     dash: str

@@ -59,7 +59,6 @@ def page(
         replay=replay,
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
         data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":")).encode()),
-        plotly=_plotly(),
         datatables=_datatables(),
     )
     return folded(whole)
@@ -69,14 +68,6 @@ def _marked(comparison: ReportedComparison, curves: Sequence[PointCurves]) -> Se
     """Curves with the marks of the scene's kind of element."""
     kind = report_kinds().get(comparison.shown_by)
     return curves if kind is None else kind.mark(comparison, curves)
-
-
-@functools.cache
-def _plotly() -> str:
-    """Source of plotly.js, compressed."""
-    import plotly.offline
-
-    return packed(plotly.offline.get_plotlyjs().encode())
 
 
 @functools.cache

@@ -176,7 +176,7 @@ def test_what_is_beyond_counts_its_own_silent_failures() -> None:
     ("more", "said"),
     [
         ({}, "good only, tuned at V0 = 200: sank in at every step down to dt 1.25e-4 s, off by 150 % of the range"),
-        ({"too_slow": 1e-5}, "sank in down to dt 1.25e-4 s, finer ones have too many steps"),
+        ({"too_slow": 1e-5}, "sank in down to dt 1.25e-4 s, finer ones take too long"),
         ({"resolution": "rtol", "finest": 1e-9}, "sank in at every tolerance down to rtol 1e-9"),
         ({"sides": {"stable": Boundary(1e-3, True, {}, 2e-3, "", True, None, None, None)}}, "just beyond dt 1e-3 s"),
         (
