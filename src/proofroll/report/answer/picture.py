@@ -151,7 +151,7 @@ def _stroke(line: DrawnSetting) -> str:
 
 
 def _curves(lines: Sequence[DrawnSetting], axes: _Axes) -> Iterator[str]:
-    """DrawnSetting and points of each setting; a point tells itself when it is pointed at."""
+    """Curve of each setting; a point under the pointer tells its run."""
     for line in lines:
         places = [axes.place(point) for point in line.points]
         path = "L".join(f"{x:g} {y:g}" for x, y in places)

@@ -12,7 +12,7 @@ from proofroll.report.changes import EarlierReport, against
 from proofroll.report.comparison.plots import PointCurves, point_curves
 from proofroll.report.kinds import kind_of
 from proofroll.report.page.first_screen import ReportedAnswer
-from proofroll.report.page.html import page
+from proofroll.report.page.html import page, studies_page
 from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.parts import Part, PartEntry, absent, attempt
 from proofroll.report.replay.records import Replay
@@ -93,7 +93,7 @@ class Report:
         self._put(part, absent(part, reason))
 
     def write(self, out: Path) -> None:
-        """Writes ``report.html``, ``report.json`` and ``report.csv``.
+        """Writes ``report.html``, ``report.json`` and ``report.csv``; ``studies.html`` if there are further studies.
 
         Raises:
             ProofrollError: the folder cannot be written.
@@ -107,7 +107,9 @@ class Report:
         text = json.dumps(content_json, indent=1, allow_nan=False).removesuffix("\n}")
         write_text(out / "report.json", f'{text},\n "table": {head}, "data": [{rows}]}}\n}}\n')
         write_text(out / "report.csv", content.table.csv)
-        write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
+        if content.further:
+            write_text(out / "studies.html", studies_page(content, self.pictures))
+        write_text(out / "report.html", page(content, self.curves, self.replay))
 
     def _put(self, part: Part, entry: PartEntry) -> None:
         self._made[id(part)] = part, entry

@@ -9,7 +9,6 @@ import shlex
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from proofroll.core import number_format
@@ -35,13 +34,22 @@ if TYPE_CHECKING:
     from proofroll.report.replay.records import Replay
 
 
-def page(
-    content: ReportContent,
-    curves: Sequence[Sequence[PointCurves]],
-    pictures: Mapping[str, str] = MappingProxyType({}),
-    replay: Replay | None = None,
-) -> str:
-    """HTML page from content, curves of each comparison, markup of further pictures by name, and the replay if any."""
+def studies_page(content: ReportContent, pictures: Mapping[str, str]) -> str:
+    """HTML page of the further studies, from a report's content and markup of their pictures by name."""
+    screen = first_screen.FirstScreen(content)
+    whole = rendered(
+        templates(),
+        "studies_page.html",
+        content=content,
+        pictures=pictures,
+        screen=screen,
+        datatables=_datatables(),
+    )
+    return folded(whole)
+
+
+def page(content: ReportContent, curves: Sequence[Sequence[PointCurves]], replay: Replay | None = None) -> str:
+    """HTML page from content, curves of each comparison, and the replay if any."""
     drawn = {
         "engines": content.engines,
         "titles": {name: labels.engine_title(name) for name in content.engines},
@@ -53,7 +61,6 @@ def page(
         "page.html",
         content=content,
         curves=curves,
-        pictures=pictures,
         screen=first_screen.FirstScreen(content),
         styles=[styles(comparison.rows, content.engines) for comparison in content.comparisons],
         replay=replay,
@@ -124,7 +131,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "first_screen": first_screen,
         "answer_words": sentences,
         "answer_picture": picture.svg,
-        "engine_colours": engine_colours,
+        "colours_of": engine_colours,
         "model_lines": model_lines,
         "loop_key": slug,
         "scene_words": labels.scene_words,

@@ -49,7 +49,7 @@ const address = (() => {
 const folds = (() => {
   const button = document.getElementById("unfold");
   const place = (number) => document.querySelector(`[data-fold="${number}"]`);
-  let texts = null;
+  let texts = null, atFirst = new Set();
   const ready = async () => (texts ??= JSON.parse(await stored("folds")));
 
   function build(empty) {
@@ -82,21 +82,17 @@ const folds = (() => {
     document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
   }
   const all = () => ready().then(open);
-  // Opens what is in sight, the rest when it is scrolled to or printed: all at once would take a browser seconds.
-  let watch = null;
-  const follow = (part) => part.querySelectorAll("details:not([open])").forEach((fold) => watch.observe(fold));
+  // Opens every fold, or closes those that were closed at first.
   button.addEventListener("click", async () => {
+    const opening = button.getAttribute("aria-pressed") === "false";
+    const before = new Set(document.querySelectorAll("details[open]"));
     await ready();
-    watch ??= new IntersectionObserver((entries) => entries.filter((entry) => entry.isIntersecting).forEach(({ target }) => {
-      watch.unobserve(target);
-      target.open = true;
-    }), { rootMargin: "50%" });
-    follow(document);
-    button.setAttribute("aria-pressed", "true");
+    if (opening) open();
+    else document.querySelectorAll("details").forEach((fold) => { fold.open = atFirst.has(fold); });
+    if (opening) atFirst = before;
+    button.setAttribute("aria-pressed", String(opening));
+    button.textContent = opening ? "Close all" : "Open all";
   });
-  document.addEventListener("built", ({ target }) => { if (watch) follow(target); });
-  // Print shows what is open; all of it after "Open all".
-  addEventListener("beforeprint", () => { if (watch) open(); });
   addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(ready));
   // What a reader opened is in the address: folds of the class "kept".
   const opened = () => [...document.querySelectorAll("details.kept[open]")];
