@@ -32,6 +32,7 @@ def test_a_phase_within_another_is_taken_off_it() -> None:
 def test_parts_of_a_case_belong_to_phases_of_their_own() -> None:
     """Its truth, its clean runs and its start leave the phase in which it was run; activities are counted besides."""
     profile = ProcessorProfile()
+    assert profile.total > 0, "it counts from the start of the process on"
     before = profile.phases[START]
     with profile.phase("search"):
         spent = {"process start": 1.0, "truth": 2.0, "clean runs": 4.0, "advance": 8.0}
