@@ -47,7 +47,7 @@ def test_counts_are_of_engines(screen: FirstScreen) -> None:
 def test_a_number_has_its_measure() -> None:
     """Each engine has speed, setting, step and error of what is allowed; or its state and what it needs at best."""
     assert figure_of(HELD) == "50×"
-    assert how(HELD) == "fine, matched, dt 1e-3 s; 2.5e-5 of 1e-4"
+    assert how(HELD) == "fine, best, dt 1e-3 s; 2.5e-5 of 1e-4"
     assert how(THROUGH) == "only, as installed, dt 1e-3 s; 2.5e-5 of 1e-4; through proofroll's integrator"
     assert figure_of(FINER) == "· finer not run"
     assert "at best it needs dt 8e-5 s, 21 s of computing" in how(FINER)

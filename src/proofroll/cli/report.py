@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     from proofroll.running.runner import Runner
     from proofroll.studies.comparison.outcome import Outcome
 
-# Part of the processor time that writing unfinished pages may take.
-_WRITING = 0.03
+# Part of the processor time that writing unfinished pages may take, and processor time after which further studies that
+# were made are written [s].
+_WRITING, _UNWRITTEN = 0.03, 30.0
 
 
 def report(
@@ -293,7 +294,7 @@ def _make_all(
 ) -> set[str]:
     """Makes the further studies that are missing; returns names of those for which a budget left no ``rest`` [s]."""
     keys = {part.key: part.words for part in parts}
-    start, unmade = 1 + 2 * bool(made.content.comparisons), set()
+    start, unmade, written = 1 + 2 * bool(made.content.comparisons), set(), runner.profile.total
     for number, (key, words) in enumerate(keys.items(), start=start):
         to_make = [part for part in missing if part.key == key]
         stage = _begin(number, len(keys) + start - 1, words if to_make else f"{words}: kept from before")
@@ -302,13 +303,20 @@ def _make_all(
                 unmade.add(part.head["name"])
                 made.leave_out(part, "Not run: the budget is used")
             else:
+                if runner.profile.total - written > _UNWRITTEN:
+                    written = _write(made, runner, out)
                 with runner.profile.phase(part.kind):
                     _make(made, part, runner, out, stage)
-                with runner.profile.phase("page"):
-                    made.write(out)
-    if unmade:
-        made.write(out)
+    if missing:
+        _write(made, runner, out)
     return unmade
+
+
+def _write(made: Report, runner: Runner, out: Path) -> float:
+    """Writes the report; returns the processor time at its end [s]."""
+    with runner.profile.phase("page"):
+        made.write(out)
+    return runner.profile.total
 
 
 def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from proofroll.core.number_format import number
 from proofroll.core.plugins import parse_engine
-from proofroll.report.answer.sentences import tolerance_words
+from proofroll.report.answer.sentences import INSTALLED, tolerance_words
 from proofroll.report.labels import engine_words
 from proofroll.report.styles import DASHES, engine_colours
 from proofroll.running.case import Status
@@ -52,7 +52,8 @@ def lines_of(made: SceneAnswer) -> list[DrawnSetting]:
         formulations: dict[str, int] = {}
         for tried in engine.settings:
             options = parse_engine(tried.spec).options
-            formulation, preset = str(options.get("formulation", "")), str(options.get("preset", ""))
+            formulation = str(options.get("formulation", ""))
+            preset = str(options.get("preset", "")).replace("default", INSTALLED)
             points = [*_points(tried)]
             if points:
                 dash = formulations.setdefault(formulation, len(formulations)) % len(DASHES)

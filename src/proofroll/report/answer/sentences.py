@@ -7,10 +7,18 @@ import shlex
 from collections.abc import Iterator
 
 from proofroll.core.number_format import number
+from proofroll.core.plugins import parse_engine
 from proofroll.report.labels import engine_title, engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
 from proofroll.running.case import Status
-from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, StepAnswer, StepTried
+from proofroll.studies.answer.records import (
+    AllowedError,
+    EngineAnswer,
+    SceneAnswer,
+    SettingTried,
+    StepAnswer,
+    StepTried,
+)
 from proofroll.studies.answer.setting_search import State
 
 # State -> sign and short word.
@@ -24,6 +32,7 @@ SIGNS = {
     State.SILENT: ("◐", "not reported"),
     State.NOT_RUN: ("·", "not run"),
 }
+INSTALLED = "as installed"
 _QUANTITIES = {"p_WB": "body positions"}
 _PREFIXES = {-3: "m", -6: "µ", -9: "n"}
 
@@ -62,10 +71,44 @@ def quantity_words(name: str) -> str:
 
 
 def setting_words(item: EngineAnswer) -> str:
-    """Engine, formulation, preset and step of an answer for a reader; ``as installed`` is the preset ``default``."""
-    preset = "as installed" if item.preset == "default" else item.preset
-    words = engine_words(item.engine, item.formulation), preset, step(item.resolution or None, item.step)
-    return ", ".join(filter(None, words))
+    """Engine, formulation, settings in two words and step of an answer for a reader.
+
+    ``as installed`` is the preset ``default``; ``best`` the cheaper of ``matched`` and ``tuned`` that holds. Which
+    options these are, the lines for a model tell.
+    """
+    words = preset_words(item.preset), step(item.resolution or None, item.step)
+    return ", ".join(filter(None, (engine_words(item.engine, item.formulation), *words)))
+
+
+def preset_words(preset: str) -> str:
+    """Settings for a reader: ``as installed`` or ``best``; empty without a preset."""
+    return {"default": INSTALLED, "": ""}.get(preset, "best")
+
+
+def installed_words(item: EngineAnswer) -> str:
+    """Clause on the settings as installed beside the best ones; empty if the answer is of these, or none was tried.
+
+    The search leaves a setting that cannot be cheaper, so that a step of it that holds may not be confirmed.
+    """
+    if not item.holds or item.preset == "default":
+        return ""
+    tried = [setting for setting in item.settings if parse_engine(setting.spec).options.get("preset") == "default"]
+    held = [(setting, run) for setting in tried for run in setting.steps if run.holds and run.seconds_per_second]
+    if held:
+        setting, run = min(held, key=lambda pair: pair[1].seconds_per_second or math.inf)
+        return f"{INSTALLED}: {_at(item, setting, run)}: {speed(run.seconds_per_second)}"
+    failed = [(setting, run) for setting in tried for run in setting.steps if run.of_allowed is not None]
+    if failed:
+        setting, run = min(failed, key=lambda pair: pair[1].of_allowed or math.inf)
+        return f"{INSTALLED}: {_at(item, setting, run)} is off by {number(run.of_allowed)} times what is allowed"
+    return f"{INSTALLED}: {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
+
+
+def _at(item: EngineAnswer, setting: SettingTried, run: StepTried) -> str:
+    """Formulation of a setting, where it is another than the answer's, and the step of a run."""
+    formulation = str(parse_engine(setting.spec).options.get("formulation", ""))
+    words = "" if formulation == item.formulation else formulation.replace("_", " ")
+    return ", ".join(filter(None, (words, step(setting.resolution or None, run.step))))
 
 
 def brought_words(item: EngineAnswer) -> str:
@@ -82,7 +125,8 @@ def sentence(item: EngineAnswer, until: float) -> str:
     told += f" in {quantity_words(item.bound.quantity)} over {until:g} s"
     told += f"; not confirmed: {item.why}" if item.state is State.UNCONFIRMED else ""
     brought = f" ({brought_words(item)})" if item.brought else ""
-    return f"{setting_words(item)}{brought}: {told}."
+    installed = installed_words(item)
+    return f"{setting_words(item)}{brought}: {told}{f'; {installed}' if installed else ''}."
 
 
 def reason(item: EngineAnswer) -> str:

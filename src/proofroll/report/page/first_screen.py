@@ -8,13 +8,21 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from proofroll.report.answer.sentences import brought_words, error_words, reason, setting_words, speed, tolerance_words
+from proofroll.report.answer.sentences import (
+    brought_words,
+    error_words,
+    installed_words,
+    reason,
+    setting_words,
+    speed,
+    tolerance_words,
+)
 from proofroll.report.kinds import group_words
 from proofroll.report.labels import engine_title, scene_words
 from proofroll.report.parts import Part, PartEntry, part_kinds
 from proofroll.report.pen import Disc, Lettering, Picture, Polyline
 from proofroll.studies.answer.records import EngineAnswer, SceneAnswer
-from proofroll.studies.answer.setting_search import State
+from proofroll.studies.answer.setting_search import BRIEF, State
 
 if TYPE_CHECKING:
     from proofroll.report.page.records import ReportContent
@@ -158,7 +166,13 @@ def how(item: EngineAnswer) -> str:
         return f"{setting_words(item)}: {told}" if item.spec and told else told
     error = error_words(item.bound, item.error) if item.bound is not None and item.error is not None else ""
     name = setting_words(item).removeprefix(f"{engine_title(item.engine)} ")
-    return "; ".join(filter(None, (name, error, brought_words(item))))
+    return "; ".join(filter(None, (name, error, brought_words(item), installed_words(item))))
+
+
+def caps_words() -> str:
+    """Sentences on what a report's searches are asked, and how to ask for more."""
+    limits = f"at most {BRIEF.run:g} s of processor time a run and {BRIEF.engine:g} s an engine"
+    return f"Searched once for each scene of a kind, {limits}; proofroll recommend SCENE searches longer."
 
 
 def figure_of(item: EngineAnswer) -> str:

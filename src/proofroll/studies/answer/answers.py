@@ -46,7 +46,7 @@ from proofroll.studies.swept_settings import Curve
 # Speeds of the cheapest and of all within this factor of it are measured again, one at a time.
 _NEAR = 3.0
 # Rounds and length of such a measurement [s]; a slower run is measured once.
-_ROUNDS, _SECONDS, _ONCE = 2, 0.1, 0.3
+_ROUNDS, _SECONDS, _ONCE = 2, 0.05, 0.1
 
 Tell = Callable[[EngineAnswer], None]
 _Answer = TypeVar("_Answer")
@@ -259,7 +259,7 @@ def _of_setting(
 def _setting_tried(item: SettingSearch) -> SettingTried:
     why = "; ".join(filter(None, [item.why, *item.unsafe.values()]))
     steps = [step for divisor in sorted(item.runs) if (step := _step_tried(item, divisor))]
-    return SettingTried(item.spec, item.state, why, steps)
+    return SettingTried(item.spec, item.state, why, steps, item.facts.resolution or "")
 
 
 def _step_tried(item: SettingSearch, divisor: int) -> StepTried | None:

@@ -51,6 +51,11 @@ class StepTried:
     seconds_per_second: float | None
     message: str = ""
 
+    @property
+    def holds(self) -> bool:
+        """True if the run ended within what is allowed; the step may not be confirmed."""
+        return self.of_allowed is not None and self.of_allowed <= 1
+
 
 @dataclass(frozen=True)
 class SettingTried:
@@ -61,12 +66,14 @@ class SettingTried:
         state: result of the search.
         why: clause with the reason, or empty.
         steps: all runs, coarse first.
+        resolution: ``dt``, ``rtol`` or empty.
     """
 
     spec: str
     state: State
     why: str
     steps: list[StepTried]
+    resolution: str = ""
 
 
 @dataclass(frozen=True)
