@@ -29,7 +29,7 @@ def test_a_chip_for_each_engine_and_one_for_a_part_of_proofroll(screen: FirstScr
     other = ReportedAnswer(scene_answer(THROUGH, scene="four_bar"), "four_bar", "loops", "")
     whole = FirstScreen(replace(screen.content, answers=[*screen.content.answers, other]))
     assert [(chip.engine, chip.hollow, chip.words) for chip in whole.chips("1e-4")] == [
-        ("alpha", False, "for invented"),
+        ("alpha", False, "for sphere in cylinder (invented)"),
         ("beta", True, "for four bar"),
     ]
     assert [chip.title for chip in whole.chips("1e-6")] == ["None shown"]
@@ -53,7 +53,7 @@ def test_a_number_has_its_measure() -> None:
     assert "at best it needs dt 8e-5 s, 21 s of computing" in how(FINER)
     assert 0 < bar(HELD) < bar(THROUGH) <= 100
     assert bar(FINER) == 0
-    assert answers_sentence(reported()) == "The cheapest that holds 1e-4 of the path: alpha for invented."
+    assert answers_sentence(reported()) == "The cheapest that holds 1e-4 of the path: alpha for sphere in cylinder (invented)."
     assert answers_sentence([]) == "Nothing was run that could be advised."
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 # Part of the processor time that writing unfinished pages may take, and processor time after which further studies that
 # were made are written [s].
-_WRITING, _UNWRITTEN = 0.03, 30.0
+_WRITING, _UNWRITTEN = 0.01, 30.0
 
 
 def report(

@@ -18,7 +18,7 @@ from proofroll.studies.answer.records import SceneAnswer, SettingTried
 
 # Size of the picture, its margins, and height of a line of the legend [px].
 _WIDTH, _HEIGHT = 620.0, 300.0
-_LEFT, _RIGHT, _TOP, _BOTTOM = 58.0, 12.0, 22.0, 40.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 58.0, 18.0, 22.0, 42.0
 _LINE = 15.0
 # Decades above and below what is allowed that are shown.
 _ABOVE, _BELOW = 4.0, 8.0
@@ -122,7 +122,7 @@ def _frame(axes: _Axes) -> Iterator[str]:
     for decade in range(axes.left, axes.right + 1):
         x, _ = axes.place(DrawnRun(10.0**decade, 1.0))
         yield _rule(x, _TOP, x, bottom)
-        yield _text(x, bottom + 14, _speed_words(decade), "middle")
+        yield _text(x, bottom + 16, _speed_words(decade), "middle")
     for decade in range(axes.low, axes.high + 1, max(1, round((axes.high - axes.low) / 6))):
         _, y = axes.place(DrawnRun(10.0**axes.left, 10.0**decade))
         yield _rule(_LEFT, y, end, y)
@@ -131,12 +131,12 @@ def _frame(axes: _Axes) -> Iterator[str]:
     yield f'<path d="M{_LEFT:g} {y:g}H{end:g}" stroke="currentColor" stroke-width="1.5" fill="none"/>'
     yield _text(end - 2, y - 4, "allowed", "end")
     yield _text(_LEFT, 12, "largest error over what is allowed", "start")
-    yield _text(end, bottom + 30, "speed, times real time; the fastest at the left", "end")
+    yield _text(end, bottom + 32, "speed, times real time; the fastest at the left", "end")
 
 
 def _speed_words(decade: int) -> str:
     """Speed of a cost of 10 to a power."""
-    return f"{10.0**-decade:,.0f}×" if decade <= 0 else f"{10.0**-decade:g}×"
+    return f"{10.0**-decade:g}×"
 
 
 def _rule(x: float, y: float, to_x: float, to_y: float) -> str:

@@ -100,7 +100,8 @@ def installed_words(item: EngineAnswer) -> str:
     failed = [(setting, run) for setting in tried for run in setting.steps if run.of_allowed is not None]
     if failed:
         setting, run = min(failed, key=lambda pair: pair[1].of_allowed or math.inf)
-        return f"{INSTALLED}: {_at(item, setting, run)} is off by {number(run.of_allowed)} times what is allowed"
+        dearer = "dearer, " if setting.state is State.DEARER else ""
+        return f"{INSTALLED}: {dearer}{number(run.of_allowed)} times too far off at {_at(item, setting, run)}"
     return f"{INSTALLED}: {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
 
 
@@ -218,10 +219,20 @@ def answer_lines(made: SceneAnswer) -> Iterator[str]:
 
 def command_of(made: SceneAnswer, item: EngineAnswer) -> str:
     """Command that asks whether a setting holds the tolerance, with all that the answer was given."""
-    words = ["proofroll", "compare", made.scene, "--engine", item.spec, "--tolerance", made.tolerance]
+    return shlex.join(["proofroll", "compare", made.scene, "--engine", item.spec, *_given(made)])
+
+
+def plot_command(made: SceneAnswer) -> str:
+    """Command that draws error against cost, with all that the answer was given."""
+    return shlex.join(["proofroll", "recommend", made.scene, *_given(made), "--plot", "cost.svg"])
+
+
+def _given(made: SceneAnswer) -> list[str]:
+    """Words of a command that ask the question of an answer."""
+    words = ["--tolerance", made.tolerance]
     for name, value in made.parameters.items():
         words += ["--set", f"{name}={value!r}"]
-    return shlex.join([*words, "--until", f"{made.until!r}"])
+    return [*words, "--until", f"{made.until!r}"]
 
 
 def step_sentence(made: StepAnswer) -> str:

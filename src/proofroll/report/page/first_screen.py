@@ -153,10 +153,9 @@ class ReportedAnswer:
 
     @property
     def words(self) -> str:
-        """Scene, or the comparison of it that has another name, for a reader."""
-        return (
-            scene_words(self.answer.scene).lower() if self.study == self.answer.scene else self.study.replace("_", " ")
-        )
+        """Scene, with the comparison of it if that has another name, for a reader."""
+        scene, study = scene_words(self.answer.scene).lower(), self.study.replace("_", " ")
+        return scene if self.study == self.answer.scene else f"{scene} ({study})"
 
 
 def how(item: EngineAnswer) -> str:
@@ -166,7 +165,8 @@ def how(item: EngineAnswer) -> str:
         return f"{setting_words(item)}: {told}" if item.spec and told else told
     error = error_words(item.bound, item.error) if item.bound is not None and item.error is not None else ""
     name = setting_words(item).removeprefix(f"{engine_title(item.engine)} ")
-    return "; ".join(filter(None, (name, error, brought_words(item), installed_words(item))))
+    unsure = f"not confirmed: {item.why}" if item.state is State.UNCONFIRMED else ""
+    return "; ".join(filter(None, (name, error, brought_words(item), unsure, installed_words(item))))
 
 
 def caps_words() -> str:
@@ -176,10 +176,10 @@ def caps_words() -> str:
 
 
 def figure_of(item: EngineAnswer) -> str:
-    """Speed of an engine that holds, or its state in a word."""
+    """Speed of an engine that holds, with ○ if that is not confirmed; or its state in a word."""
     if not item.holds:
         return f"· {item.state}" if item.state is not State.FINER else "· finer not run"
-    return f"{speed(item.seconds_per_second)}{' · not confirmed' if item.state is State.UNCONFIRMED else ''}"
+    return f"{'○ ' if item.state is State.UNCONFIRMED else ''}{speed(item.seconds_per_second)}"
 
 
 def bar(item: EngineAnswer) -> int:

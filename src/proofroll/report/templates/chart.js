@@ -26,7 +26,7 @@ const chart = (() => {
     }
     const rough = (high - low) / most, size = 10 ** Math.floor(Math.log10(rough));
     const step = size * [1, 2, 5, 10].find((factor) => factor * size >= rough), found = [];
-    for (let at = Math.ceil(low / step - 1e-9) * step; at <= high + 1e-9 * step; at += step) found.push([at, String(Number(at.toPrecision(6)) + 0)]);
+    for (let at = Math.ceil(low / step - 1e-9) * step; at <= high + 1e-9 * step; at += step) found.push([at, String(Math.abs(at) < 1e-9 * step ? 0 : Number(at.toPrecision(6)))]);
     return found;
   }
 

@@ -58,9 +58,6 @@ const folds = (() => {
     empty.replaceWith(made.content);
     fold.dispatchEvent(new Event("built", { bubbles: true }));
   }
-  function every(which) {
-    for (let empty = document.querySelector(which); empty; empty = document.querySelector(which)) build(empty);
-  }
   // The element with an id; builds the folds around it first.
   async function find(id) {
     if (document.getElementById(id)) return document.getElementById(id);
@@ -77,21 +74,45 @@ const folds = (() => {
     await ready();
     if (empty()) build(empty());
   }, true);
-  function open() {
-    every("[data-fold]");
-    document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
+  // Builds and opens every fold, some at a time where a reader waits, so that the page answers meanwhile.
+  function* opening() {
+    for (let folds = [...document.querySelectorAll("details")]; folds.length;) {
+      const made = [];
+      for (const fold of folds) {
+        const empty = fold.querySelector(":scope > [data-fold]");
+        if (empty) {
+          build(empty);
+          made.push(...fold.querySelectorAll("details"));
+        }
+        fold.open = true;
+        yield;
+      }
+      folds = made;
+    }
   }
+  function open() { for (const _ of opening()); }
   const all = () => ready().then(open);
   // Opens every fold, or closes those that were closed at first.
+  async function openSlowly() {
+    const steps = opening(), pause = () => new Promise((go) => { setTimeout(go); });
+    for (let begun = performance.now(); !steps.next().done;) {
+      if (performance.now() - begun < 40) continue;
+      await pause();
+      begun = performance.now();
+    }
+  }
   button.addEventListener("click", async () => {
-    const opening = button.getAttribute("aria-pressed") === "false";
-    const before = new Set(document.querySelectorAll("details[open]"));
-    await ready();
-    if (opening) open();
-    else document.querySelectorAll("details").forEach((fold) => { fold.open = atFirst.has(fold); });
-    if (opening) atFirst = before;
-    button.setAttribute("aria-pressed", String(opening));
-    button.textContent = opening ? "Close all" : "Open all";
+    const isOpening = button.getAttribute("aria-pressed") === "false";
+    button.disabled = true;
+    if (isOpening) {
+      atFirst = new Set(document.querySelectorAll("details[open]"));
+      button.textContent = "Opening all …";
+      await ready();
+      await openSlowly();
+    } else document.querySelectorAll("details").forEach((fold) => { fold.open = atFirst.has(fold); });
+    button.setAttribute("aria-pressed", String(isOpening));
+    button.textContent = isOpening ? "Close all" : "Open all";
+    button.disabled = false;
   });
   addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(ready));
   // What a reader opened is in the address: folds of the class "kept".

@@ -43,7 +43,7 @@ def test_settings_are_told_in_two_words() -> None:
     assert sentence(replace(HELD, settings=[tried]), 2.0).endswith("; as installed: rough, dt 5e-4 s: 25×.")
     off = replace(tried, steps=runs[:1])
     assert installed_words(replace(HELD, settings=[off])) == (
-        "as installed: rough, dt 2e-3 s is off by 4 times what is allowed"
+        "as installed: dearer, 4 times too far off at rough, dt 2e-3 s"
     )
     refused = replace(tried, state=State.REFUSED, why="it cannot", steps=[])
     assert installed_words(replace(HELD, settings=[refused])) == "as installed: it cannot"
