@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 FASTEST = 3000.0
 # Looks of marks that a small picture leaves out: arrows of gravity and of forces.
 _NOT_SMALL = ("force", "force-head", "axis")
-_STATES = ("holds", "finer", "elsewhere", "cannot", "open")
+_STATES = ("holds", "unsure", "finer", "elsewhere", "cannot", "open")
 _LOOKS = {
     State.HOLDS: "holds",
-    State.UNCONFIRMED: "holds",
+    State.UNCONFIRMED: "unsure",
     State.FINER: "finer",
     State.ELSEWHERE: "elsewhere",
     State.REFUSED: "cannot",
