@@ -120,7 +120,7 @@ BAD = {
     ),
     "a version in a name": (["engines", "add", "mujoco==99"], 2, ["add mujoco --requirement mujoco==VERSION"]),
     "no version": (["engines", "add", "mujoco"], 2, ["--requirement is missing", "mujoco==VERSION"]),
-    "a scene for a map": (["ladder", "/dev/null/scene.toml"], 2, ["scene.toml", "cannot be read"]),
+    "a scene for a map": (["stability", "/dev/null/scene.toml"], 2, ["scene.toml", "cannot be read"]),
     "orientation of an engine without": (with_option("--ask", "orientation"), 3, ["orientation of a ball"]),
     "ladder of nothing": (["ladder", "sphere_in_cylinder", "--quantity", "height"], 2, ["quantity = 'height'"]),
     "ladder of no length": (["ladder", "sphere_in_cylinder", "--until", "0"], 2, ["until = 0", "positive"]),

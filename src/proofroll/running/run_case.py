@@ -128,16 +128,20 @@ def _known_certificate(case: Case) -> list[Line] | None:
 
     What the first steps tell differs from the scene by less with a finer step, so that it holds there, too.
     """
-    step, lines = _certificates.get(_without_step(case), (0.0, None))
-    return lines if case.engine.resolution == "dt" and step >= case.engine.settings["dt"] else None
+    coarsest, lines = _certificates.get(_without_step(case), (0.0, None))
+    return lines if (step := _fixed_step(case)) and coarsest >= step else None
 
 
 def _keep_certificate(case: Case, lines: list[Line]) -> None:
     """Keeps a certificate that holds for cases with finer steps."""
-    if case.engine.resolution == "dt":
-        coarsest, _ = _certificates.get(_without_step(case), (0.0, lines))
-        if case.engine.settings["dt"] >= coarsest:
-            _certificates[_without_step(case)] = case.engine.settings["dt"], lines
+    coarsest, _ = _certificates.get(_without_step(case), (0.0, lines))
+    if (step := _fixed_step(case)) and step >= coarsest:
+        _certificates[_without_step(case)] = step, lines
+
+
+def _fixed_step(case: Case) -> float:
+    """Fixed step of a case [s]; 0: it adapts, or the engine has none of its own."""
+    return float(case.engine.settings.get("dt") or 0.0) if case.engine.resolution == "dt" else 0.0
 
 
 def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:

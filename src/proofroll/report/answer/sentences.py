@@ -106,7 +106,7 @@ def installed_words(item: EngineAnswer) -> str:
 
 
 def _at(item: EngineAnswer, setting: SettingTried, run: StepTried) -> str:
-    """Formulation of a setting, where it is another than the answer's, and the step of a run."""
+    """Formulation of a setting, unless the answer has the same, and the step of a run."""
     formulation = str(parse_engine(setting.spec).options.get("formulation", ""))
     words = "" if formulation == item.formulation else formulation.replace("_", " ")
     return ", ".join(filter(None, (words, step(setting.resolution or None, run.step))))
@@ -227,7 +227,12 @@ def plot_command(made: SceneAnswer) -> str:
     return shlex.join(["proofroll", "recommend", made.scene, *_given(made), "--plot", "cost.svg"])
 
 
-def _given(made: SceneAnswer) -> list[str]:
+def lines_command(made: StepAnswer, engine: str) -> str:
+    """Command that prints the lines of an engine's own model that hold the tolerance of an answer."""
+    return shlex.join(["proofroll", "recommend", made.scene, "--engine", engine, *_given(made), "--lines"])
+
+
+def _given(made: SceneAnswer | StepAnswer) -> list[str]:
     """Words of a command that ask the question of an answer."""
     words = ["--tolerance", made.tolerance]
     for name, value in made.parameters.items():

@@ -259,7 +259,7 @@ def _of_setting(
 def _setting_tried(item: SettingSearch) -> SettingTried:
     why = "; ".join(filter(None, [item.why, *item.unsafe.values()]))
     steps = [step for divisor in sorted(item.runs) if (step := _step_tried(item, divisor))]
-    return SettingTried(item.spec, item.state, why, steps, item.facts.resolution or "")
+    return SettingTried(spec=item.spec, state=item.state, why=why, steps=steps, resolution=item.facts.resolution or "")
 
 
 def _step_tried(item: SettingSearch, divisor: int) -> StepTried | None:
