@@ -118,6 +118,23 @@ def test_what_is_folded_is_built_when_it_is_opened(everything: Any, tmp_path: Pa
         assert seen.messages == []
 
 
+@pytest.mark.drill
+def test_open_all_opens_all_and_closes_again(report_page: Path, visit: Visiting) -> None:
+    """The button builds and opens every fold; pressed again, those are open that were so at first."""
+    opened = "document.querySelectorAll('details[open]').length"
+    with visit(report_page, before=UNDRAWN) as seen:
+        first = seen.page.evaluate(opened)
+        button = seen.page.locator("#unfold")
+        button.click()
+        seen.until(lambda: button.inner_text() == "Close all", what="all is open")
+        assert seen.page.evaluate("document.querySelectorAll('[data-fold], details:not([open])').length") == 0
+        assert button.get_attribute("aria-pressed") == "true"
+        button.click()
+        seen.until(lambda: button.inner_text() == "Open all", what="all is closed")
+        assert seen.page.evaluate(opened) == first
+        assert seen.messages == []
+
+
 def test_an_address_with_a_fragment_opens_its_evidence(report_page: Path, visit: Visiting) -> None:
     """A link from elsewhere into a folded part unfolds it, and what lies around it."""
     name = "evidence-invented.beta.speed-4"
