@@ -1,4 +1,5 @@
-# Two commands do everything: `make report` (the main comparisons and studies, on one page) and `make test`. Each makes .venv itself; another
+# Two commands do everything: `make report` (the main comparisons and studies, on one page; where its time goes:
+# `make report REPORT=--profile`) and `make test`. Each makes .venv itself; another
 # Python beside it: make test PYTHON=python3.12 VENV=.venv-3.12
 PYTHON ?= python3
 VENV ?= .venv
@@ -7,7 +8,7 @@ OUT ?= out
 # A worker process that finds no bytecode compiles the package anew, which is a quarter of its start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install report tradeoff test drills nightly check format readme docs gallery engines clean
+.PHONY: install report test drills nightly check format readme docs gallery engines clean
 
 install: $(VENV)/.installed
 
@@ -21,11 +22,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt benchmarks/pyproject.toml tes
 	touch $@
 
 report: install
-	$(BIN)/proofroll report --out $(OUT)
-
-# Error against cost of every engine; some minutes, on a machine that does nothing else.
-tradeoff: install
-	$(BIN)/proofroll tradeoff sphere_in_cylinder --out $(OUT)
+	$(BIN)/proofroll report --out $(OUT) $(REPORT)
 
 # Every test but drills, those that take more than 1 s of processor, of which none may be there without its mark;
 # `make test MARK=` runs all.

@@ -50,8 +50,8 @@ HEAD = """# Gallery of scenes
 
 Scenes with what they ask, what is true of them, and what each engine makes of them. Written by `make gallery`
 from real runs of the comparisons, with the values that a brief report has; do not edit it. Errors are the largest over
-all points of the parameters; what the words mean: [read a verdict](read_a_verdict.md). What each costs says the
-[trade-off](tradeoff.md).
+all points of the parameters; what the words mean: [read a verdict](read_a_verdict.md). Which step to take
+for a tolerance says [an answer](answers.md).
 
 ```{include} gallery/matrix.inc
 ```

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from proofroll.core.comparison import Tolerance
-from proofroll.core.engine_abilities import Level
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
+from proofroll.report.answer.sentences import reason, setting_words, speed, tolerance_words
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.tables import observables
-from proofroll.report.labels import SYMBOLS, engine_title, engine_words, name_of, step, verdict_text
-from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.tradeoff.requirements import Requirements, holding
+from proofroll.report.labels import SYMBOLS, engine_title, engine_words, step, verdict_text
+from proofroll.studies.answer.records import EngineAnswer, SceneAnswer
+from proofroll.studies.answer.setting_search import State
 
 # What a sign of the matrix means.
 CHOICE_MEANINGS = {
@@ -93,27 +92,20 @@ def remark_list(content: ReportedComparison) -> str:
     return "".join(f"- {name}: {text}\n" for name, text in remarks(content))
 
 
-# Among what the cheapest is named: everything that is an engine's model, contact models, and the scene's own equations.
-_AMONG: tuple[tuple[str, tuple[str, ...]], ...] = (
-    ("cheapest engine", ()),
-    ("cheapest contact model", (Level.CONTACT,)),
-    ("the scene's own equations", (Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION)),
-)
-
-
-def cheapest_table(study: TradeoffStudy, tolerances: Sequence[float]) -> str:
-    """One line per tolerance of the study's quantity: the cheapest that holds it, with step and cost."""
-    name = study.quantity
-    unit = study.quantities[name].unit
-    lines = [f"| {name} to | " + " | ".join(words for words, _ in _AMONG) + " |", "|---" * (1 + len(_AMONG)) + "|"]
-    for tolerance in tolerances:
-        cells = [f"{number(tolerance)} {unit}"]
-        for _, levels in _AMONG:
-            held = holding(study, Requirements(name, Tolerance(tolerance, False, unit), levels=levels))
-            cells.append(_cell(held[0]) if held else "none")
+def cheapest_table(answers: Sequence[SceneAnswer]) -> str:
+    """One line per tolerance: what each engine needs to hold it, and how fast that is."""
+    names = sorted({item.engine for made in answers for item in made.engines})
+    lines = ["| to | " + " | ".join(map(engine_title, names)) + " |", "|---" * (1 + len(names)) + "|"]
+    for made in answers:
+        of_engine = {item.engine: item for item in made.engines}
+        cells = [tolerance_words(made), *(_cell(of_engine[name]) if name in of_engine else "" for name in names)]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def _cell(choice: MeasuredPoint) -> str:
-    return f"{name_of(choice)}, {step(choice.resolution, choice.step)}: {number(choice.seconds_per_second)} s/s"
+def _cell(item: EngineAnswer) -> str:
+    """Setting, step and speed of an engine that holds a tolerance, or why none is shown to."""
+    if not item.holds:
+        return reason(item)
+    name = setting_words(item).removeprefix(f"{engine_title(item.engine)} ")
+    return f"{name}: {speed(item.seconds_per_second)}{' (not confirmed)' if item.state is State.UNCONFIRMED else ''}"

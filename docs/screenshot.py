@@ -15,9 +15,9 @@ from playwright.sync_api import sync_playwright
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 # In CSS pixels, drawn with two device pixels to each, so that the numbers can be read.
-WIDTH, MOST_HEIGHT, DENSITY = 1400, 1100, 2
+WIDTH, MOST_HEIGHT, DENSITY = 1400, 980, 2
 # A page of text and flat cells has few colours; a palette makes the file a third as large.
-COLOURS = 128
+COLOURS = 64
 # The end of the picture, and the first table of verdicts, which is folded below it.
 CARDS, FOLDED, VERDICTS = ".kinds-of-scene >> nth=0", "#verdicts details", ".matrix"
 # Row for row: what the comparison file calls it, and its verdict.

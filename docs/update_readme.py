@@ -22,20 +22,20 @@ from screenshot import screenshot
 from proofroll.files.comparison_file import load_comparison
 from proofroll.papers.blajer_2006.report.regime_map import draw as draw_regimes
 from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_maps
+from proofroll.report.answer.picture import svg
 from proofroll.report.comparison.summary import outcome_content
-from proofroll.report.tradeoff.work_precision import svg
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store, write_text
+from proofroll.studies.answer.answers import answer
+from proofroll.studies.answer.by_name import question_named
 from proofroll.studies.comparison.compare import compare
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import point_name
-from proofroll.studies.tradeoff.claims import claims_for
-from proofroll.studies.tradeoff.records import TradeoffStudy
-from proofroll.studies.tradeoff.study import make_tradeoff
-from proofroll.studies.tradeoff.tradeoff import Extent
+from proofroll.studies.judging.asked_tolerance import AskedTolerance
 
 ROOT = Path(__file__).resolve().parents[1]
-TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)
+TOLERANCES = ("1e-2", "1e-4", "1e-6")
+DRAWN = "1e-4"
 POINT = {"speed": 4.0, "rolling_resistance": 0.0}
 SHOWN = (
     "mujoco[formulation=chart,preset=default]",
@@ -80,16 +80,6 @@ def draw(outcome: Outcome, path: Path) -> None:
     figure.savefig(path, metadata={"Date": None})
 
 
-def measured(runner: Runner, folder: Path) -> TradeoffStudy:
-    """The trade-off that the comparison file asks for, without the finest steps: four lines need none of them."""
-    claims = claims_for("sphere_in_cylinder")
-    assert claims is not None  # the file is part of this repository
-    study, _ = make_tradeoff(claims.swept, runner, folder, Extent(over=claims.over, brief=True), claims)
-    for sentence in (*claims.contradictions(study), *claims.undecided(study)):
-        sys.stderr.write(f"{sentence}\n")
-    return study
-
-
 def between(text: str, name: str, table: str) -> str:
     """The page with this table between the two marks of a name."""
     begin, end = f"<!-- {name}:begin -->\n", f"<!-- {name}:end -->"
@@ -107,11 +97,13 @@ def verdicts(runner: Runner, folder: Path) -> dict[str, str]:
     return {"verdicts": verdict_table(content), "caveats": caveat_list(content), "remarks": remark_list(content)}
 
 
-def costs(runner: Runner, folder: Path) -> dict[str, str]:
+def costs(runner: Runner, _: Path) -> dict[str, str]:
     """Table of what is cheapest, and the picture of error against cost."""
-    study = measured(runner, folder)
-    write_text(ROOT / "docs" / "work_precision.svg", svg(study, [study.quantity]))
-    return {"cheapest": cheapest_table(study, TOLERANCES)}
+    question = question_named("sphere_in_cylinder", {})
+    answers = answer(question, [AskedTolerance.of([text], question.loaded) for text in TOLERANCES], [], runner)
+    drawn = next(made for made in answers if made.tolerance == DRAWN)
+    write_text(ROOT / "docs" / "work_precision.svg", svg(drawn, alone=True))
+    return {"cheapest": cheapest_table(answers)}
 
 
 def regimes(_: Runner, __: Path) -> dict[str, str]:

@@ -31,7 +31,6 @@ from proofroll import cli
 from proofroll.files.scene_file import load_scene
 from proofroll.running import idle_workers, stopwatch
 from proofroll.running.case import Case, EngineFacts
-from proofroll.studies.tradeoff import tradeoff
 
 PLUGINS = Path(__file__).parent / "plugins"
 _METADATA = "Metadata-Version: 2.1\nName: throwaway\nVersion: 1.0\nRequires-Dist: no-such-library>=2\n"
@@ -55,8 +54,6 @@ settings.load_profile("repeatable")
 
 # Each measurement of speed is a real one, but short [s]: no test asks how exact it is.
 stopwatch.SECONDS = 0.002
-# The finest steps of a curve take as long as all others together; tests/unit/studies/tradeoff/test_sweep.py has them.
-tradeoff.FINER = ()
 
 # Each core has a pytest process (``make test``): more worker processes at once would be more to start, and no faster.
 os.cpu_count = lambda: 1

@@ -120,7 +120,7 @@ BAD = {
     ),
     "a version in a name": (["engines", "add", "mujoco==99"], 2, ["add mujoco --requirement mujoco==VERSION"]),
     "no version": (["engines", "add", "mujoco"], 2, ["--requirement is missing", "mujoco==VERSION"]),
-    "a scene for a map": (["tradeoff", "/dev/null/scene.toml"], 2, ["scene.toml", "cannot be read"]),
+    "a scene for a map": (["stability", "/dev/null/scene.toml"], 2, ["scene.toml", "cannot be read"]),
     "orientation of an engine without": (with_option("--ask", "orientation"), 3, ["orientation of a ball"]),
     "ladder of nothing": (["ladder", "sphere_in_cylinder", "--quantity", "height"], 2, ["quantity = 'height'"]),
     "ladder of no length": (["ladder", "sphere_in_cylinder", "--until", "0"], 2, ["until = 0", "positive"]),
@@ -733,6 +733,6 @@ def test_ladder(proofroll: Proofroll, tmp_path: Path) -> None:
 
 def test_a_page_is_refused_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where what draws pages is not installed, one line says so before anything is run."""
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "plotly" else name)
-    with pytest.raises(Missing, match=r"pages need plotly, .*: pip install 'proofroll\[report\]'"):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "itables" else name)
+    with pytest.raises(Missing, match=r"pages need itables, .*: pip install 'proofroll\[report\]'"):
         require_pages()

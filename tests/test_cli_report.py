@@ -38,18 +38,18 @@ tolerances.tight = { because = "the engine is the closed form", z = "1e-9 m", ga
 engine = "oracle"
 tolerance = "tight"
 """
-TRADEOFF = """
-study = "tradeoff"
+STABILITY = """
+study = "stability"
 title = "Speed"
-question = "What does it cost?"
+question = "Where does it break?"
 scene = "sphere_in_cylinder"
-until = 0.1
-quantity = "z"
 
-[[cheapest]]
-tolerance = "1e-2 m"
-engine = "exudyn"
-because = "of nothing that this test measures"
+[[axes]]
+name = "speed"
+unit = "m/s"
+meaning = "how fast it begins"
+values = [4]
+parameters.speed = {}
 """
 FIGURES = """
 study = "figures"
@@ -110,7 +110,7 @@ def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path, out: 
     content = json.loads((out / "report.json").read_text(encoding="utf-8"))
     (figures,) = content["figures"]
     assert figures["study"]["statements"][0]["holds"] is True
-    assert content["tradeoffs"] == content["stability"] == []
+    assert content["stability"] == []
     html = whole((out / "report.html").read_text(encoding="utf-8"))
     assert "1 of 1 statements hold" in html
     assert 'id="figures0-height-' in html
@@ -133,15 +133,15 @@ def test_a_part_that_fails_does_not_take_the_report_away(
     proofroll: Proofroll, tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Exit code 3 and one line on standard error; the comparison is on the page, and what is missing too."""
-    names = files(tmp_path, claim=COMPARISON, speed=TRADEOFF)
+    names = files(tmp_path, claim=COMPARISON, speed=STABILITY)
 
     def fail(*_: object, **__: object) -> None:
         raise MemoryError("no memory left")
 
-    monkeypatch.setattr("proofroll.report.tradeoff.part.make_tradeoff", fail)
+    monkeypatch.setattr("proofroll.report.stability.part.make_stability", fail)
     code, said, err = proofroll("report", *names, "--out", str(out))
     assert code == 3
-    assert "no memory left; proofroll tradeoff sphere_in_cylinder makes it." in err
+    assert "no memory left; proofroll stability sphere_in_cylinder makes it." in err
     assert "Traceback" not in err
     assert "Missing (1): Speed" in said
     html = (out / "report.html").read_text(encoding="utf-8")

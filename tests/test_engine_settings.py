@@ -22,8 +22,6 @@ PATHS = {
     "comparison of a file": "compare inclined_plane",
     "comparison of a robot": "compare {robot} --until 0.02",
     "comparison under control": "compare {robot} --control {control} --until 0.02",
-    "trade-off of a scene": "tradeoff pendulum --until 0.1",
-    "trade-off under control": "tradeoff {robot} --control {control} --until 0.02",
     "recommendation for a scene": "recommend pendulum --until 0.1 --tolerance 1e-3",
     "recommendation under control": "recommend {robot} --control {control} --until 0.02 --tolerance 1e-3",
     "balance": "balance pendulum",

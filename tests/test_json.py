@@ -68,16 +68,6 @@ from proofroll.studies.stability.records import (
     StabilityStudy,
 )
 from proofroll.studies.study_store import Measured
-from proofroll.studies.tradeoff.records import (
-    Corner,
-    CurveBudget,
-    DroppedStep,
-    MeasuredPoint,
-    MeasuredQuantity,
-    SparseRun,
-    TradeoffStudy,
-    TruthCost,
-)
 from proofroll.studies.versions.two_runs import TwoRuns
 from proofroll_drill.mutants.drilling import Mutated
 from proofroll_drill.row import Drilled
@@ -177,10 +167,6 @@ COMPARISON = (
 )  # fmt: skip
 LADDER = (LadderContent, RungFound, Ran, TermFound, SideFound, KnownTruth, Absence)
 MAP = (StabilityStudy, Axis, BoundaryPoint, Boundary, ExplainedBoundary, MappedValue, Effort, Measured, JudgedFile)
-TRADEOFF = (
-    TradeoffStudy, MeasuredQuantity, MeasuredPoint, SparseRun, Corner, DroppedStep, CurveBudget, TruthCost, Measured,
-    JudgedFile,
-)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -192,9 +178,9 @@ TRADEOFF = (
         ("json.md", "`compare --json`", COMPARISON),
         ("json.md", "`stability --json`", MAP),
         (
-            "tradeoff.md",
+            "answers.md",
             "JSON",
-            (*TRADEOFF, SceneAnswer, StepAnswer, EngineAnswer, AllowedError, StepTried, SettingTried),
+            (SceneAnswer, StepAnswer, EngineAnswer, AllowedError, StepTried, SettingTried),
         ),
         ("json.md", "`ladder --json`", LADDER),
         ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
@@ -216,7 +202,7 @@ TRADEOFF = (
             ),
         ),
     ],
-    ids=["robots", "against", "record", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
+    ids=["robots", "against", "record", "compare", "stability", "answers", "ladder", "onset", "others"],
 )
 def test_fields_of_records(page: str, title: str, records: tuple[type, ...]) -> None:
     """Each field of what a command prints as records is named where its JSON is described."""
@@ -237,7 +223,7 @@ def _with_json(group: Any, before: str = "") -> Iterator[str]:
 
 def test_each_command_that_prints_json_is_described() -> None:
     """What takes --json has its section, or its line, in the pages about JSON."""
-    described = TEXT + (DOCS / "tradeoff.md").read_text(encoding="utf-8")
+    described = TEXT + (DOCS / "answers.md").read_text(encoding="utf-8")
     lacking = [
         name for name in _with_json(typer.main.get_command(app)) if not re.search(rf"`{name}( --json)?`", described)
     ]

@@ -48,7 +48,7 @@ for name in ("run.npz", "run.nc"):
     write(xarray.Dataset({"z": ("time", [1.0])}), Path(name))
     assert float(read(Path(name)).z[0]) == 1.0
 """
-_ARRAYS = {"numpy", "scipy", "xarray", "plotly", "pydantic", "mujoco", "pinocchio", "exudyn", "heyoka"}
+_ARRAYS = {"numpy", "scipy", "xarray", "matplotlib", "pydantic", "mujoco", "pinocchio", "exudyn", "heyoka"}
 _WRONG_NAME = {"xarray", "pandas", "rich.console", "proofroll.report.run.run"}
 # Step -> program, and modules that neither it nor a step before it has loaded.
 STEPS: dict[str, tuple[str, set[str]]] = {

@@ -132,29 +132,14 @@ def test_compare(command_line: Proofroll) -> None:
 
 
 @pytest.mark.drill
-def test_tradeoff_and_recommend(command_line: Proofroll, springs: Path) -> None:
-    """Tradeoff goes by the deciding observable, and recommend bounds it."""
-    code, out, err = command_line("tradeoff", str(springs), "--engine", "sprung", "--until", "0.1", "--json")
-    assert code == 0, err
-    assert json.loads(out)["quantity"] == "x"
+def test_recommend(command_line: Proofroll, springs: Path) -> None:
+    """Recommend bounds the deciding observable."""
     arguments = ("--until", "0.1", "--tolerance", "1e-3", "--engine", "sprung", "--json")
     code, out, err = command_line("recommend", str(springs), *arguments)
     assert code == 0, err
-    assert json.loads(out)["engines"][0]["engine"].startswith("sprung")
-
-
-@pytest.mark.drill
-def test_tradeoff_of_two_elements(command_line: Proofroll, springs: Path) -> None:
-    """In a scene of two elements a column is headed by the element whose quantity it has."""
-    two = springs.parent / "two"
-    two.mkdir()
-    mass = '[[masses]]\nname = "n"\nmass = 1.0\nstiffness = 80.0\nx0 = 0.1\n'
-    (two / "scene.toml").write_text(SCENE + mass)
-    given = ("--engine", "sprung", "--until", "0.1", "--quantity", "x.m", "--quantity", "x.n", "--all")
-    code, out, err = command_line("tradeoff", str(two), *given)
-    assert code == 0, err
-    assert "x.m [m]" in out
-    assert "x.n [m]" in out
+    found = json.loads(out)
+    assert found["engines"][0]["engine"].startswith("sprung")
+    assert [bound["quantity"] for bound in found["bounds"]] == ["x"]
 
 
 @pytest.mark.drill

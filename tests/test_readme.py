@@ -16,12 +16,9 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from proofroll.core.number_format import number
-from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
-from proofroll.report.labels import engine_title, engine_words, step
+from proofroll.report.labels import engine_title, step
 from proofroll.running.case import EngineFacts
-from proofroll.studies.tradeoff.claims import claims_for
 
 ROOT = Path(__file__).resolve().parents[1]
 _SPEC = importlib.util.spec_from_file_location("made_from", ROOT / "docs" / "made_from.py")
@@ -223,24 +220,6 @@ def test_the_stamp_of_the_verdict_table_follows_what_it_is_made_from(
         before = now()
         change(name, old, new)
         assert now() != before, name
-
-
-def test_the_table_of_the_cheapest_is_as_claimed() -> None:
-    """For every claim of tradeoff.toml the table has a line, which names the engine and its formulation."""
-    text = PAGE.read_text(encoding="utf-8")
-    table = text.partition("<!-- cheapest:begin -->\n")[2].partition("<!-- cheapest:end -->")[0].splitlines()
-    lines = {line.split("|")[1].strip(): line.split("|") for line in table[2:]}
-    claims = claims_for("sphere_in_cylinder")
-    assert claims is not None
-    assert len(lines) == 4
-    assert {number(claim.tolerance.value) + " m" for claim in claims.cheapest} == lines.keys()
-    for claim in claims.cheapest:
-        cells = lines[number(claim.tolerance.value) + " m"]
-        cell = cells[3] if claim.levels else cells[2]
-        names = [parse_engine(text) for text in claim.engine]
-        assert any(
-            cell.strip().startswith(f"{engine_words(spec.name, spec.options['formulation'])}, ") for spec in names
-        )
 
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])

@@ -372,7 +372,7 @@ def test_every_comparison_is_in_the_matrix() -> None:
     """Every comparison of this repository, of the folders below, and of articles is in the matrix."""
     found = {Path(name).stem for name in comparison_files()}
     assert {"paper", "stick_slip", "accuracy", "turntable", "andrews_squeezer"} <= found
-    assert {"stability", "stability_plane", "tradeoff", "regimes", "ladder:double_pendulum"} <= found
+    assert {"stability", "stability_plane", "regimes", "ladder:double_pendulum"} <= found
     assert {path.stem for path in REPOSITORY.glob("comparisons/*/*.toml")} <= found
 
 

@@ -30,16 +30,15 @@ from proofroll.core.scene import Scene
 from proofroll.core.verdict import Allowance, Judgement, LimitResult, Refinement, RunCurve, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running import time_case
-from proofroll.running.case import Result, Status
 from proofroll.running.recording import record
 from proofroll.running.simulation import simulate
 from proofroll.running.time_case import clean_runs
+from proofroll.studies.answer.judged_run import errors_of
 from proofroll.studies.comparison.default_comparison import bounds
 from proofroll.studies.judging import judge as judging
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.judge import judge as judge_run
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.tradeoff.curve import CurvePoint, with_errors
 
 # A truth of its own at other times, of what switches.
 SLOW = {"a clock 1 % slow", "a clock 1 % slow from the start of a slide"}
@@ -73,12 +72,9 @@ LIES = [
 _STATE = ("v_WB", "w_WB", "q_WB")
 
 
-_POINT = CurvePoint(None, Result(Status.DONE, ""))  # type: ignore[arg-type]  # what it ran is a dataset here
-
-
 @dataclass(frozen=True)
 class Heard:
-    """What is said of a run: that it agrees in all, or what is wrong; causes; and what a trade-off measures of it.
+    """What is said of a run: that it agrees in all, or what is wrong; causes; and what an answer measures of it.
 
     That is its error of each observable in parts of its size, infinite where it has none; empty: there is no point.
     """
@@ -109,7 +105,7 @@ def hear(scene: Scene, kind: Any, band: dict[str, str], until: float, **settings
 
 def _errors(scene: Scene, run: Any, asked: Iterable[str]) -> dict[str, float]:
     reference = Reference.of(scene, _true(scene, run))
-    errors = with_errors(_POINT, reference, run).errors
+    errors, *_ = errors_of(run, reference, whole=True)
     known = [name for name in asked if name in reference.curves]
     return {name: errors.get(name, np.inf) / (reference.scale(name) or 1.0) for name in known}
 

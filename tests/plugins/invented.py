@@ -1,4 +1,4 @@
-"""Parts of a report with invented numbers: a trade-off, a stability map, a map of regimes, figures."""
+"""Parts of a report with invented numbers: a stability map, a map of regimes, figures."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from proofroll.papers.blajer_2006.figures.study import run_figures
 from proofroll.papers.blajer_2006.report.regimes_part import RegimesPart
 from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_map
 from proofroll.report.stability.part import StabilityPart
-from proofroll.report.tradeoff.part import TradeoffPart
-from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies import study_store
@@ -22,75 +20,6 @@ from proofroll.studies.stability.axes import Axis
 from proofroll.studies.stability.claims import file_for
 from proofroll.studies.stability.effort import QUICK
 from proofroll.studies.stability.records import Boundary, BoundaryPoint, ExplainedBoundary, StabilityStudy
-from proofroll.studies.tradeoff.claims import claims_for
-from proofroll.studies.tradeoff.records import CurveBudget, MeasuredPoint, MeasuredQuantity, TradeoffStudy, TruthCost
-
-
-def measured_point(**more: Any) -> MeasuredPoint:
-    """A point of an invented trade-off."""
-    values: dict[str, Any] = {
-        "id": 0, "engine": "good", "level": "engine constraint", "resolution": "dt", "step": 1e-3, "order": 2,
-        "settings": {"formulation": "only", "preset": "tuned", "dt": 1e-3}, "status": Status.DONE,
-        "message": "reached 2 s", "error": {"z": 1e-5}, "confidence": 0.97, "corners": None,
-    } | more  # fmt: skip
-    curve = f"{values['engine']}[formulation={values['settings']['formulation']}]"
-    return MeasuredPoint(**({"curve": curve, "envelope": values["error"]} | values))
-
-
-def timed(seconds: float) -> dict[str, Any]:
-    """Fields of a cost that was measured six times [s per simulated second]."""
-    interval = (0.9 * seconds, 1.1 * seconds)
-    return {"seconds_per_second": seconds, "interval": interval, "rounds": 6 * [seconds], "measurements": 6}
-
-
-def invented_study(*points: MeasuredPoint, **more: Any) -> TradeoffStudy:
-    """Record of an invented trade-off."""
-    values: dict[str, Any] = {
-        "scene": "sphere_in_cylinder", "parameters": {}, "until": 2.0, "every": 0.05, "quantity": "z",
-        "quantities": {"z": MeasuredQuantity("m", 0.1, 1e-13, "z", column=True)}, "absent": {}, "budgets": [],
-        "pareto": {},
-        "pareto_engines": {}, "truth": TruthCost(route=""), "over": {}, "findings": [], "brief": False,
-        "measured": study_store.conditions_now(),
-    }  # fmt: skip
-    return TradeoffStudy(points=list(points), **(values | more))
-
-
-def invented_budget(**more: Any) -> CurveBudget:
-    """An error budget."""
-    values: dict[str, Any] = {
-        "engine": "good", "curve": "good[formulation=only]", "quantity": "z", "model_form": 2e-10,
-        "model_form_bar": 1e-10, "order": 1.97, "order_low": 1.9, "order_high": 2.04, "declared": 2, "floor": 1e-12,
-        "truth": 1e-13, "coarse": "time step", "fine": "model form", "contradicts_declaration": False,
-        "sentence": "At dt 0.05 s the time step dominates.",
-    }  # fmt: skip
-    return CurveBudget(**(values | more))
-
-
-def tradeoff_study() -> TradeoffStudy:
-    """A trade-off of a rough and cheap engine, a good and dear one, and the scene's own equations."""
-    once: dict[str, Any] = {
-        "seconds_per_second": 0.5,
-        "interval": None,
-        "confidence": 0.0,
-        "rounds": [0.5],
-        "measurements": 1,
-    }
-    return invented_study(
-        measured_point(id=0, engine="rough", error={"z": 3e-3, "N": 3e-2}, **timed(1e-3)),
-        measured_point(id=1, engine="good", error={"z": 1e-9, "N": 1e-8}, **once),
-        measured_point(id=2, engine="own", error={"z": 1e-12, "N": 1e-11}, level="reduced equations", **timed(0.01)),
-        quantities={
-            "z": MeasuredQuantity("m", 0.1, 1e-13, "z", column=True),
-            "N": MeasuredQuantity("N", 40.0, 1e-12, "N", column=True),
-        },
-        absent={"lost": "lost is not installed here"},
-        budgets=[invented_budget()],
-        pareto={"z": [0, 2]},
-        pareto_engines={"z": [0, 1]},
-        truth=TruthCost(seconds_per_second=1.0, route=""),
-        findings=["3 runs: none refused."],
-        brief=True,
-    )
 
 
 def boundary_point(**more: Any) -> BoundaryPoint:
@@ -126,12 +55,10 @@ def stability_study() -> StabilityStudy:
 
 
 def further() -> list[Any]:
-    """A trade-off and a map with invented studies."""
-    claims = claims_for("sphere_in_cylinder")
-    assert claims is not None
+    """A map with an invented study."""
     file = file_for("sphere_in_cylinder")
     folder = "stability/sphere_in_cylinder"
-    return [TradeoffPart(claims, study=tradeoff_study()), StabilityPart(file, study=stability_study(), folder=folder)]
+    return [StabilityPart(file, study=stability_study(), folder=folder)]
 
 
 FIGURES = """

@@ -32,7 +32,7 @@ from proofroll.papers.blajer_2006.report.onsets import RunSlips, TrueSlips
 from proofroll.papers.blajer_2006.truth.onset import Onset
 from proofroll.report.comparison.plots import PointCurves
 from proofroll.report.page.growing import begun
-from proofroll.report.page.html import page
+from proofroll.report.page.html import page, studies_page
 from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.replay.records import Replay
 from proofroll.running.case import Case, EngineFacts, Result, Status
@@ -209,8 +209,9 @@ class Parts:
     replay: Replay | None
 
     def write(self, file: Path) -> Path:
-        """The page as a file."""
-        file.write_text(page(self.content, self.curves, self.pictures, self.replay), encoding="utf-8")
+        """The page as a file, with that of the further studies beside it."""
+        file.write_text(page(self.content, self.curves, self.replay), encoding="utf-8")
+        (file.parent / "studies.html").write_text(studies_page(self.content, self.pictures), encoding="utf-8")
         return file
 
 

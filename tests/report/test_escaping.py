@@ -69,7 +69,7 @@ def poisoned(poisoned_page: Path, visit: Visiting) -> Iterator[Visit]:
 def test_nothing_that_others_write_runs(drawn_page: Drawn, poisoned_page: Path, poisoned: Visit) -> None:
     """Read to its end, unfolded, drawn, pointed at and clicked through: no script, element or handler of theirs.
 
-    The label at the pointer, which plotly writes with markup of its own, shows the poison as text.
+    The label at the pointer shows the poison as text.
     """
     page = poisoned.page
     for seen in (drawn_page.seen, poisoned):  # the script of a picture comes once the replay has been in sight
@@ -80,7 +80,7 @@ def test_nothing_that_others_write_runs(drawn_page: Drawn, poisoned_page: Path, 
     page.evaluate(
         """() => {
           const element = document.querySelector("figure[data-o] .canvas");
-          Plotly.Fx.hover(element, [{ curveNumber: 1, pointNumber: 9 }]);
+          chart.hover(element, 1, 9);
         }"""
     )
     label = page.locator("figure[data-o] .hovertext").first

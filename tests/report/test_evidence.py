@@ -26,7 +26,7 @@ from proofroll.report.comparison.records import clean_cost
 from proofroll.report.comparison.tables import cost_interval, cost_title, costs, expectations
 from proofroll.report.page.html import page
 from proofroll.report.page.records import report_content
-from proofroll.report.styles import OUTLINES, styles
+from proofroll.report.styles import OUTLINES, engine_colours, styles
 from proofroll.running.case import Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import Outcome
@@ -134,12 +134,13 @@ def test_no_two_rows_of_an_engine_look_alike_and_none_by_colour_alone() -> None:
 
 
 def test_an_engine_has_one_colour_on_a_page() -> None:
-    """Whatever engine comes first in a comparison, colours follow the order of the page."""
+    """Whatever engine comes first in a comparison, colours follow the order of the page; no two are alike."""
     rows: Any = [
         SimpleNamespace(name=name, formulation="one", preset="", verdict="agrees") for name in ("beta", "new", "alpha")
     ]
-    assert [style.colour for style in styles(rows, ["alpha", "beta"])] == [1, 2, 0]
-    assert [style.colour for style in styles(rows)] == [0, 1, 2]
+    beta, new, alpha = (style.colour for style in styles(rows, ["alpha", "beta"]))
+    assert (beta, new) == (alpha + 1, alpha + 2)
+    assert {alpha, beta, new}.isdisjoint(engine_colours().values())
 
 
 def test_cost_has_an_interval_where_there_is_one() -> None:

@@ -99,7 +99,7 @@ GROUND = "getComputedStyle(document.body).backgroundColor"
 def test_colours_follow_the_screen_while_it_is_open_and_paper_is_white(seen: Visit) -> None:
     """Page, figures and drawings change with the scheme, a zoom stays; for print they are light in any scheme."""
     light = [seen.page.evaluate(INK), seen.page.evaluate(SKETCH), seen.page.evaluate(GROUND)]
-    seen.page.evaluate(f"Plotly.relayout(document.querySelector('{FIGURE}'), {{'xaxis.range': [0.25, 0.5]}})")
+    seen.page.evaluate(f"chart.zoom(document.querySelector('{FIGURE}'), [0.25, 0.5])")
     seen.page.emulate_media(color_scheme="dark")
     seen.wait(f"{INK} !== '{light[0]}' && {SKETCH} !== '{light[1]}' && {GROUND} !== '{light[2]}'")
     assert seen.page.evaluate(f"document.querySelector('{FIGURE}').layout.xaxis.range") == [0.25, 0.5]
@@ -121,7 +121,7 @@ NAMES = """() => [...document.querySelectorAll('figure[data-o] .canvas')].map((c
   const meets = (one, other) => one.top < other.bottom - 1 && other.top < one.bottom - 1;
   const ends = canvas.layout.annotations.filter(({ name }) => name === 'end');
   return {
-    told: ends.flatMap(({ hovertext }) => hovertext.split('<br>')),
+    told: ends.flatMap(({ hovertext }) => hovertext.split('\\n')),
     curves: canvas.data.filter(({ mode, visible, meta }) =>
       visible && mode.includes('lines') && !Array.isArray(meta)).length,
     overlap: boxes.some((one, k) => boxes.slice(k + 1).some((other) => meets(one, other))),

@@ -29,7 +29,7 @@ def test_a_chip_for_each_engine_and_one_for_a_part_of_proofroll(screen: FirstScr
     other = ReportedAnswer(scene_answer(THROUGH, scene="four_bar"), "four_bar", "loops", "")
     whole = FirstScreen(replace(screen.content, answers=[*screen.content.answers, other]))
     assert [(chip.engine, chip.hollow, chip.words) for chip in whole.chips("1e-4")] == [
-        ("alpha", False, "for invented"),
+        ("alpha", False, "for sphere in cylinder (invented)"),
         ("beta", True, "for four bar"),
     ]
     assert [chip.title for chip in whole.chips("1e-6")] == ["None shown"]
@@ -38,7 +38,7 @@ def test_a_chip_for_each_engine_and_one_for_a_part_of_proofroll(screen: FirstScr
 def test_counts_are_of_engines(screen: FirstScreen) -> None:
     """Pairs of an engine and a scene are counted by what was found; an unconfirmed winner wins no scene alone."""
     counts = screen.counts("1e-4")
-    assert counts.states == {"holds": 2, "finer": 1, "elsewhere": 0, "cannot": 0, "open": 0}
+    assert counts.states == {"holds": 2, "unsure": 0, "finer": 1, "elsewhere": 0, "cannot": 0, "open": 0}
     assert (counts.scenes, counts.alone) == (1, 1)
     unsure = ReportedAnswer(scene_answer(replace(HELD, state=State.UNCONFIRMED)), "x", "loops", "")
     assert FirstScreen(replace(screen.content, answers=[unsure])).counts("1e-4").alone == 0
@@ -47,13 +47,16 @@ def test_counts_are_of_engines(screen: FirstScreen) -> None:
 def test_a_number_has_its_measure() -> None:
     """Each engine has speed, setting, step and error of what is allowed; or its state and what it needs at best."""
     assert figure_of(HELD) == "50×"
-    assert how(HELD) == "fine, matched, dt 1e-3 s; 2.5e-5 of 1e-4"
+    assert how(HELD) == "fine, best, dt 1e-3 s; 2.5e-5 of 1e-4"
     assert how(THROUGH) == "only, as installed, dt 1e-3 s; 2.5e-5 of 1e-4; through proofroll's integrator"
     assert figure_of(FINER) == "· finer not run"
     assert "at best it needs dt 8e-5 s, 21 s of computing" in how(FINER)
     assert 0 < bar(HELD) < bar(THROUGH) <= 100
     assert bar(FINER) == 0
-    assert answers_sentence(reported()) == "The cheapest that holds 1e-4 of the path: alpha for invented."
+    assert (
+        answers_sentence(reported())
+        == "The cheapest that holds 1e-4 of the path: alpha for sphere in cylinder (invented)."
+    )
     assert answers_sentence([]) == "Nothing was run that could be advised."
 
 

@@ -9,7 +9,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import plotly.offline
 import pytest
 from folded import texts, whole
 from poison import Poison
@@ -22,7 +21,6 @@ from proofroll.report.labels import symbol
 from proofroll.report.page.growing import begun
 from proofroll.report.page.html import page
 from proofroll.report.page.records import report_content
-from proofroll.report.pages import packed
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import Outcome
 
@@ -65,14 +63,6 @@ def test_an_address_is_the_same_in_a_report_of_more(everything: Any, tmp_path: P
     }  # fmt: skip
 
 
-def test_plotly_is_there_once_and_comes_back_as_it_was(html: str, unpack: Any) -> None:
-    """The bundle is in the page once, compressed, and unpacked it is what its makers ship."""
-    bundle = plotly.offline.get_plotlyjs()
-    assert unpack(html, "plotly") == bundle
-    assert html.count(packed(bundle.encode())) == 1
-    assert len(html) < 0.8 * len(bundle)
-
-
 def test_json_file_is_the_content_and_has_no_nan(written: tuple[dict[str, Any], Path]) -> None:
     """What is returned is what is written, in JSON that every reader accepts."""
 
@@ -88,7 +78,6 @@ def test_json_file_is_the_content_and_has_no_nan(written: tuple[dict[str, Any], 
         "replay",
         "figures",
         "regimes",
-        "tradeoffs",
         "stability",
         "awaited",
         "left_out",

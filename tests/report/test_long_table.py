@@ -13,21 +13,18 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from invented import further
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
-from proofroll.core.verdict import LimitResult, Verdict
+from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.lines import _ended, lines_of
 from proofroll.report.long_table import LongTable
 from proofroll.report.page.growing import begun
 from proofroll.report.page.records import ReportContent
-from proofroll.report.tradeoff.part import _limit
 from proofroll.running.case import Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.comparison.compare import compare
 from proofroll.studies.comparison.outcome import Outcome
-from proofroll.studies.tradeoff.records import CurveBudget
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -84,11 +81,8 @@ def test_a_rough_cost_is_without_time_of_other_processes() -> None:
 def test_the_documented_line_reads_the_table(
     made: tuple[Outcome, Store], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The lines of docs/json.md give pandas the same frame from JSON and from CSV, trade-offs among its rows."""
+    """The lines of docs/json.md give pandas the same frame from JSON and from CSV."""
     whole = begun([made[0]], "proofroll report")
-    for part in further():
-        whole.parts.append(part)
-        whole._put(part, part.entry())
     (tmp_path / "out").mkdir()
     whole.write(tmp_path / "out")
     text = (DOCS / "json.md").read_text(encoding="utf-8")
@@ -99,7 +93,7 @@ def test_the_documented_line_reads_the_table(
     exec(program[1], names)
     frame, same = names["frame"], names["same"]
     assert len(frame) == len(whole.content.table.lines)
-    assert {"invented", *(part.asked.name for part in further())} >= set(frame.study) > {"invented"}
+    assert set(frame.study) == {"invented"}
     for name in frame:
         both = zip(frame[name].astype(object), same[name].astype(object), strict=True)
         assert all(one == other or ((one in ("", None) or pd.isna(one)) and pd.isna(other)) for one, other in both), (
@@ -132,13 +126,3 @@ def test_infinite_numbers_are_empty(content: ReportContent) -> None:
     line = dataclasses.replace(content.table.lines[0], error=math.inf)
     (values,) = csv.DictReader(LongTable([line]).csv.splitlines())
     assert values["error"] == ""
-
-
-def test_a_trade_off_says_what_its_curves_tend_to() -> None:
-    """A limit that is off by far more than its bars is another; one within them is the truth's; none is none."""
-    budget = CurveBudget(engine="a", curve="a", quantity="z", model_form=1e-3, model_form_bar=1e-6, truth=1e-9)
-    assert _limit(budget, "m")["limit"] == LimitResult.ANOTHER
-    assert _limit(dataclasses.replace(budget, model_form_bar=1e-3), "m")["limit"] == LimitResult.WITHIN
-    assert _limit(dataclasses.replace(budget, model_form=None), "m")["limit"] == LimitResult.NOT_SHOWN
-    single = dataclasses.replace(budget, best_step=5e-4, floor=2e-5)
-    assert _limit(single, "m")["floor"] == "best step 5e-4 s, floor 2e-5 m: single precision"

@@ -61,7 +61,7 @@ def test_file_is_a_picture_of_its_own(maps: list[xr.Dataset], tmp_path: Path) ->
 
 @pytest.mark.drill
 def test_report_shows_the_maps(made: tuple[Outcome, Store], maps: Any, tmp_path: Path, parse: Any) -> None:
-    """Twice on one page, no id is used twice."""
+    """Twice on the page of further studies, no id is used twice."""
     whole = begun([made[0]], "proofroll report")
     asked = load_regimes("regimes")
     parts = [RegimesPart(replace(asked, name=name), maps=maps) for name in ("regimes", "more")]
@@ -71,7 +71,7 @@ def test_report_shows_the_maps(made: tuple[Outcome, Store], maps: Any, tmp_path:
     whole.write(tmp_path)
     assert [len(item.study["maps"]) for item in whole.content.entries["regimes"]] == [2, 2]
     assert part_lines(whole.content)[0] == f"regimes: {RegimesPart.line(whole.content.entries['regimes'][0])}."
-    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    html = (tmp_path / "studies.html").read_text(encoding="utf-8")
     elements = parse(html)
     ids = [attributes["id"] for _, attributes in elements.tags if "id" in attributes]
     assert len(ids) == len(set(ids))

@@ -128,7 +128,7 @@ def test_every_list_sorts_and_downloads(report_page: Path, visit: Visiting) -> N
 @pytest.mark.drill
 def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, tmp_path: Path) -> None:
     """A map offers no sorting, as its text says; it filters, and its file names axis and value of each column."""
-    with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
+    with visit(report_page.parent / "studies.html", viewport={"width": 1280, "height": 900}) as opened:
         opened.page.evaluate("folds.find('study-stability')")
         opened.wait("document.querySelector('.heat') !== null")
         opened.page.evaluate("""['40 d', '– d!', '5'].forEach((text) => {

@@ -56,13 +56,13 @@ def claimed(**more: Any) -> Any:
 
 
 @pytest.mark.parametrize("unexpected", [[], ["alpha at speed=4 differs, " + 40 * "expected\n" + "otherwise"]])
-@pytest.mark.parametrize("missing", ["", "It has not been made yet; proofroll tradeoff x makes it."])
+@pytest.mark.parametrize("missing", ["", "It has not been made yet; proofroll stability x makes it."])
 def test_what_to_look_at_first_is_three_sentences_at_most(
     content: ReportContent, unexpected: list[str], missing: str
 ) -> None:
     """The unexpected before all, then what is missing; whatever is quoted arrives whole, without breaks of its own."""
     comparison = replace(content.comparisons[0], contradictions=unexpected)
-    lines = first_lines(replace(content, comparisons=[comparison], entries={"tradeoffs": [entry(missing=missing)]}))
+    lines = first_lines(replace(content, comparisons=[comparison], entries={"stability": [entry(missing=missing)]}))
     assert 1 <= len(lines) <= 3
     assert not any("\n" in line for line in lines)
     assert not unexpected or lines[0].endswith("otherwise")
@@ -79,11 +79,9 @@ def test_each_further_study_has_its_line(content: ReportContent) -> None:
     entries: dict[str, Any] = {
         "figures": [entry(study={"statements": stated}, name="figs")],
         "regimes": [],
-        "tradeoffs": [claimed(study=claimed(points=[1, 2, 3]), claims=held, name="speed"), entry(name="absent")],
-        "stability": [claimed(study=claimed(silent=4, boundaries=9), claims=[held[0], held[2]], name="map")],
+        "stability": [claimed(study=claimed(silent=4, boundaries=9), claims=held, name="map"), entry(name="absent")],
     }
     assert part_lines(replace(content, entries=entries)) == [
         "figs: 1 of 2 statements and 0 of 1 of this project's own hold.",
-        "speed: 3 points; 1 of 2 claims hold, 1 undecided.",
-        "map: 4 of 9 boundaries are silent; 1 of 1 claims hold, 1 undecided.",
+        "map: 4 of 9 boundaries are silent; 1 of 2 claims hold, 1 undecided.",
     ]

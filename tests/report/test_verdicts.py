@@ -143,7 +143,7 @@ def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
     assert "did not even finish" not in " ".join(found.sentences)
     assert "⊘ 1 refused" in counted(content)
     assert "1 refuses the scene, or some case of it" in three_sentences([content], {}, [])[0]
-    text = whole(page(report_content([with_runs(made[0], {number: [refused]})], ""), [[]], {}, None))
+    text = whole(page(report_content([with_runs(made[0], {number: [refused]})], ""), [[]]))
     assert '<p class="status refused"><b>refused</b>: no wall, no ball</p>' in text
 
 

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-from invented import further, stability_study, tradeoff_study
+from invented import further, stability_study
 from invented_answers import reported
 from report_schema import SCHEMA, problems
 
 from proofroll.core.errors import ProofrollError
 from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.growing import Report, begun
-from proofroll.report.page.html import page
+from proofroll.report.page.html import page, studies_page
 from proofroll.report.pages import slug
 from proofroll.report.parts import PartEntry, absent, all_parts, attempt, part_kinds, parts_of
 from proofroll.report.stability.part import StabilityPart
@@ -24,7 +24,6 @@ from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.stability.effort import QUICK, Effort
 from proofroll.studies.stability.map import stability_path
 from proofroll.studies.study_store import keep_study
-from proofroll.studies.tradeoff.tradeoff import study_path
 
 POISON = "</script><script>alert('poison')</script><img src=x onerror=alert(1)>\"'"
 COMMAND = "proofroll report"
@@ -32,7 +31,7 @@ COMMAND = "proofroll report"
 
 @pytest.fixture(scope="module")
 def report(made: tuple[Outcome, Store]) -> Report:
-    """A report with one comparison, a trade-off and a map; no test changes it."""
+    """A report with one comparison and a map; no test changes it."""
     whole = begun([made[0]], COMMAND)
     for part in further():
         whole.parts.append(part)
@@ -45,19 +44,25 @@ def report(made: tuple[Outcome, Store]) -> Report:
 @pytest.fixture(scope="module")
 def written_page(report: Report) -> str:
     """Its page."""
-    return page(report.content, report.curves, report.pictures)
+    return page(report.content, report.curves)
+
+
+@pytest.fixture(scope="module")
+def written_studies(report: Report) -> str:
+    """The page of its further studies."""
+    return studies_page(report.content, report.pictures)
 
 
 @pytest.mark.drill
 def test_every_part_of_the_default_report_is_found_in_its_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Figures, regime maps, trade-offs, stability: one for each file of a study, and each by its name alone."""
+    """Figures, regime maps, stability: one for each file of a study, and each by its name alone."""
     assert "stability_plane" not in [part.head["name"] for part in all_parts([], tmp_path)], "it is made on request"
     monkeypatch.setattr(StabilityPart, "keeps", lambda part, out: bool(part and out))
     parts = all_parts([], tmp_path)
     keys = [kind.key for kind in part_kinds()]
-    assert keys == ["figures", "regimes", "tradeoffs", "stability"]
+    assert keys == ["figures", "regimes", "stability"]
     assert "stability_plane" in [part.head["name"] for part in parts], "where it is kept it is there"
     assert [part.key for part in parts] == sorted((part.key for part in parts), key=keys.index)
     assert {part.key for part in parts} == set(keys)
@@ -79,7 +84,7 @@ def test_content_is_made_once_for_each_part(made: tuple[Outcome, Store]) -> None
 
 
 @pytest.mark.drill
-def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
+def test_sections_answer_in_order(written_page: str, written_studies: str, parse: Any) -> None:
     """What agrees, what to use, why; each section is there, has a heading and says something."""
     elements = parse(written_page)
     ids = [attributes["id"] for tag, attributes in elements.tags if tag == "section" and "id" in attributes]
@@ -87,17 +92,20 @@ def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
         "answer",
         "verdicts",
         "evidence-invented",
-        "chapter-sphere_in_cylinder",
-        "study-tradeoff",
-        "study-stability",
+        "studies",
         "made",
     ]
+    links = {attributes["href"] for tag, attributes in elements.tags if tag == "a"}
+    assert "studies.html#study-stability" in links
+    elements = parse(written_studies)
+    ids = [attributes["id"] for tag, attributes in elements.tags if tag == "section" and "id" in attributes]
+    assert ids == ["chapter-sphere_in_cylinder", "study-stability"]
     assert "1 of 2 boundaries are passed in silence" in elements.text
     assert "good depends on mass" in elements.text
     assert "with at most 3 values for each axis" in elements.text
-    assert "lost is not installed here" in elements.text
     assert "stability/sphere_in_cylinder/good-V0-8.py" in elements.text
-    links = {attributes["href"][1:] for tag, attributes in elements.tags if tag == "a"}
+    hashes = [attributes["href"].partition("#") for tag, attributes in elements.tags if tag == "a"]
+    links = {name for file, _, name in hashes if not file}
     assert links <= {attributes.get("id") for _, attributes in elements.tags}
     curve = slug(stability_study().points[0].curve)
     assert {f"study-stability.{curve}-v0-{value}" for value in (4, 8)} <= links, (
@@ -117,28 +125,17 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
         "1 setting differs from the truth and runs to the end without a warning, worst alpha fine, default"
     )
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a warning.")
-    assert found[2] == "The cheapest that holds 1e-4 of the path: alpha for invented."
+    assert found[2] == "The cheapest that holds 1e-4 of the path: alpha for sphere in cylinder (invented)."
     nothing = three_sentences([], {}, [])
     assert len(nothing) == 3
     assert all(sentence.endswith(".") for sentence in nothing)
 
 
-def test_a_chapter_is_closed_with_its_result_in_its_title(written_page: str, parse: Any) -> None:
-    """Studies of a scene lie in one fold, named with a result; within, the trade-off lists only what holds."""
-    start = written_page.index('<section id="chapter-sphere_in_cylinder"')
-    title = written_page[start : written_page.index("</summary>", start)]
-    assert "Sphere in cylinder" in title
-    assert "claims hold" in title
-    assert "study-tradeoff" not in written_page[start : written_page.index("</section>", start)], "it is folded"
-    table = (
-        parse(written_page)
-        .text.partition("Speed against accuracy")[2]
-        .partition("holds 1e-4")[2]
-        .partition("Price: relative")[0]
-    )
-    assert "good" in table
-    assert "rough" not in table
-    assert "do not hold it and are left out" in table
+def test_a_further_study_is_told_with_its_result(written_page: str, parse: Any) -> None:
+    """The page has a line for each study of a scene, with what it found and a link to its own page."""
+    text = " ".join(parse(written_page).text.partition("Further studies")[2].split())
+    assert "Sphere in cylinder" in text
+    assert "Where engines stop being right: 1 of 2 boundaries are silent" in text
 
 
 def poisoned(value: Any) -> Any:
@@ -152,16 +149,22 @@ def poisoned(value: Any) -> Any:
     return value + POISON if isinstance(value, str) else value
 
 
-def test_nothing_in_a_further_study_becomes_markup(report: Report, written_page: str, parse: Any) -> None:
-    """Poison in every string of the trade-off and of the map is text on the page."""
+def test_nothing_in_a_further_study_becomes_markup(
+    report: Report, written_page: str, written_studies: str, parse: Any
+) -> None:
+    """Poison in every string of the map is text on the page."""
     missing = [absent(report.parts[0], f"broken {POISON}")]
     bad = replace(report.content, entries={**poisoned(report.content.entries), "figures": missing})
-    elements = parse(page(bad, report.curves))
-    assert elements.text.count("alert('poison')") > 40
-    for tag, attributes in elements.tags:
-        assert tag != "img"
-        assert not any(name.startswith("on") for name in attributes)
-    assert sum(tag == "script" for tag, _ in elements.tags) == len(parse(written_page).scripts)
+    for html, least, scripts in (
+        (page(bad, report.curves), 0, parse(written_page).scripts),
+        (studies_page(bad, {}), 40, parse(written_studies).scripts),
+    ):
+        elements = parse(html)
+        assert elements.text.count("alert('poison')") > least
+        for tag, attributes in elements.tags:
+            assert tag != "img"
+            assert not any(name.startswith("on") for name in attributes)
+        assert sum(tag == "script" for tag, _ in elements.tags) == len(scripts)
 
 
 @pytest.mark.drill
@@ -174,7 +177,7 @@ def test_json_has_no_nan_and_no_path_outside(report: Report, tmp_path: Path) -> 
     report.write(tmp_path)
     content = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"), parse_constant=refuse)
     assert list(problems(content, SCHEMA)) == []
-    assert content["tradeoffs"][0]["study"]["points"]
+    assert content["stability"][0]["study"]["points"]
     comparison = content["comparisons"][0]
     named = [item["trajectory"] for item in (*comparison["runs"], *comparison["truths"]) if item["trajectory"]]
     named += [p["reproducer"] for p in content["stability"][0]["study"]["points"] if p["reproducer"]]
@@ -188,7 +191,7 @@ def test_json_has_no_nan_and_no_path_outside(report: Report, tmp_path: Path) -> 
 class Broken:
     """A part that cannot be made."""
 
-    key: ClassVar[str] = "tradeoffs"
+    key: ClassVar[str] = "stability"
     order: ClassVar[float] = 30
     words: ClassVar[str] = "a part"
 
@@ -198,7 +201,7 @@ class Broken:
     @property
     def head(self) -> dict[str, str]:
         """What it is."""
-        return dict.fromkeys(("name", "title", "question", "scene"), "broken") | {"command": "proofroll tradeoff it"}
+        return dict.fromkeys(("name", "title", "question", "scene"), "broken") | {"command": "proofroll stability it"}
 
     def keeps(self, out: Path) -> bool:
         """Nothing."""
@@ -227,7 +230,7 @@ def test_a_part_that_fails_leaves_a_sentence(
     assert whole.expect([part], tmp_path) == [part]
     whole.write(tmp_path)
     text = parse((tmp_path / "report.html").read_text(encoding="utf-8")).text
-    assert "It has not been made yet; proofroll tradeoff it makes it." in text
+    assert "It has not been made yet; proofroll stability it makes it." in text
     said = whole.make(part, part.make)
     whole.write(tmp_path)
     assert str(error) in said.missing
@@ -245,27 +248,14 @@ def test_an_interrupted_part_takes_nothing_away(made: tuple[Outcome, Store], tmp
     with pytest.raises(KeyboardInterrupt):
         whole.make(part, part.make)
     content = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
-    assert content["tradeoffs"][0]["missing"].startswith("It has not been made yet")
+    assert content["stability"][0]["missing"].startswith("It has not been made yet")
     assert content["comparisons"][0]["runs"]
 
 
 @pytest.mark.drill
 def test_what_is_kept_is_taken_and_what_is_outdated_is_not(tmp_path: Path) -> None:
-    """The whole study before the brief one; none of another code; the map likewise."""
-    tradeoff, stability = further()
-    question = tradeoff.asked.swept
-    for name, study, brief in (("whole", tradeoff_study(), False), ("brief", tradeoff_study(), True)):
-        path = study_path(tmp_path, question, brief=brief)
-        path.parent.mkdir(exist_ok=True)
-        keep_study(replace(study, findings=[name]), path)
-    assert tradeoff.keeps(tmp_path)
-    assert tradeoff.study.findings == ["whole"]
-    study_path(tmp_path, question).unlink()
-    assert tradeoff.keeps(tmp_path)
-    assert tradeoff.study.findings == ["brief"]
-    old = tradeoff_study()
-    keep_study(replace(old, measured=replace(old.measured, code="another")), study_path(tmp_path, question, brief=True))
-    assert not tradeoff.keeps(tmp_path)
+    """The whole map, or a quick one; none of another code."""
+    (stability,) = further()
     assert not stability.keeps(tmp_path)
     axes = stability.asked.axes
     paths = [stability_path(tmp_path, stability.asked.scene, axes, [], effort) for effort in (QUICK, Effort())]
@@ -274,6 +264,9 @@ def test_what_is_kept_is_taken_and_what_is_outdated_is_not(tmp_path: Path) -> No
     keep_study(stability_study(), paths[0])
     assert stability.keeps(tmp_path)
     assert stability.folder == f"stability/{paths[0].stem}"
+    old = stability_study()
+    keep_study(replace(old, measured=replace(old.measured, code="another")), paths[0])
+    assert not stability.keeps(tmp_path)
 
 
 def test_an_attempt_survives_what_nobody_foresaw() -> None:
@@ -282,5 +275,5 @@ def test_an_attempt_survives_what_nobody_foresaw() -> None:
     said = attempt(part, part.make)
     assert said is not None
     assert said.missing == (
-        "an error of proofroll's own, RuntimeError: first line second; proofroll tradeoff it makes it."
+        "an error of proofroll's own, RuntimeError: first line second; proofroll stability it makes it."
     )

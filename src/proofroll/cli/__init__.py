@@ -34,7 +34,6 @@ from proofroll.cli.recommend import recommend
 from proofroll.cli.report import report
 from proofroll.cli.run import run
 from proofroll.cli.stability import stability
-from proofroll.cli.tradeoff import tradeoff
 from proofroll.cli.versions import versions
 from proofroll.core.entry_points import broken, leave_out, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, choices
@@ -48,7 +47,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _ALIKE = 0.7  # least likeness, of 1, of an option that a wrong one may mean
-_STUDIES = (compare, report, tradeoff, recommend, ladder, stability, fuzz, diff, versions)
+_STUDIES = (compare, report, recommend, ladder, stability, fuzz, diff, versions)
 for _command in (scenes, run, judge, plot, replay, export, findings, cite, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")

@@ -34,7 +34,7 @@ def search_answers(
     rest: Callable[[], float] | None,
     stage: str,
 ) -> None:
-    """Adds the answers of all scenes to a report; a scene that two comparisons have is searched once.
+    """Adds the answers of all scenes to a report; of comparisons with one scene of one kind the first is asked about.
 
     Args:
         made: the report.
@@ -51,14 +51,17 @@ def search_answers(
     from proofroll.report.page.first_screen import ReportedAnswer
     from proofroll.studies.judging.asked_tolerance import AskedTolerance
 
-    seen: set[tuple[str, float]] = set()
+    seen: set[tuple[str, str]] = set()
     with options.progress_bar(f"{stage}scenes", total=len(outcomes)) as advance:
         for outcome in outcomes:
             advance(f"{stage}{outcome.comparison.name}")
             question = _question(outcome)
-            if question is None or (question.loaded.digest, question.until) in seen or (rest and rest() <= 0):
+            if question is None or (rest and rest() <= 0):
                 continue
-            seen.add((question.loaded.digest, question.until))
+            place = question.scene, group_of(question.loaded)
+            if place in seen:
+                continue
+            seen.add(place)
             asked = []
             for text in tolerances or DEFAULTS:
                 try:
@@ -70,7 +73,7 @@ def search_answers(
                     ReportedAnswer(
                         answer=answer,
                         study=outcome.comparison.name,
-                        group=group_of(outcome.scene),
+                        group=place[1],
                         sentence=taken_sentence(answer),
                     )
                 )
@@ -110,15 +113,23 @@ def _question(outcome: Outcome) -> AnswerQuestion | None:
 def answers_of(
     question: AnswerQuestion, asked: Sequence[AskedTolerance], engines: Sequence[str], runner: Runner, out: Path
 ) -> list[SceneAnswer]:
-    """Stored answers of a scene, or new ones; none, with a line on standard error, if there is no truth."""
+    """Stored answers of a scene, or new ones by a brief search.
+
+    Without a truth there are none, with a line on standard error.
+    """
     from proofroll.studies.answer.answers import answer, answer_path, kept, stored
     from proofroll.studies.answer.records import SceneAnswer
+    from proofroll.studies.answer.setting_search import BRIEF
 
-    paths = [answer_path(out, question, item, engines) for item in asked]
-    answers = [None if runner.fresh else stored(path, SceneAnswer) for path in paths]
+    paths = [answer_path(out, question, item, engines, BRIEF) for item in asked]
+    whole = [answer_path(out, question, item, engines) for item in asked]
+    answers = [
+        None if runner.fresh else stored(longer, SceneAnswer) or stored(path, SceneAnswer)
+        for path, longer in zip(paths, whole, strict=True)
+    ]
     missing = [item for item, earlier in zip(asked, answers, strict=True) if earlier is None]
     try:
-        made = iter(answer(question, missing, engines, runner) if missing else [])
+        made = iter(answer(question, missing, engines, runner, caps=BRIEF) if missing else [])
     except ProofrollError as error:
         options.complain(f"{question.scene}: {error}")
         return [earlier for earlier in answers if earlier is not None]

@@ -10,11 +10,13 @@ from typer.core import TyperGroup
 GROUPS = {
     "Ask": ("scenes", "run", "plot", "replay", "compare", "recommend", "report", "diff"),
     "Bring your own scene, engine or trajectory": ("new", "vocabulary", "check", "judge", "export"),
-    "Study": ("tradeoff", "stability", "ladder", "fuzz", "balance"),
+    "Study": ("stability", "ladder", "fuzz", "balance"),
     "Blajer's article (2006)": ("onset", "regimes", "figures"),
     "Maintain": ("engines", "versions", "findings", "cite", "bench", "drill"),
 }
 _OTHERS = "Others"
+# Command of earlier versions -> what does the same now.
+_NOW = {"tradeoff": "recommend SCENE --plot FILE.svg"}
 # Command -> folder of the package that brings it; the wheel does not contain these.
 _OF_THE_REPOSITORY = {"bench": "benchmarks", "drill": "tests/drill"}
 
@@ -39,7 +41,9 @@ class GroupedCommands(TyperGroup):
 
 
 def origin(name: str) -> str:
-    """Sentence on where a command comes from that the wheel does not contain; empty for others."""
+    """Sentence on where a command comes from that the wheel does not contain, or what it became; empty for others."""
+    if name in _NOW:
+        return f"{name} is now proofroll {_NOW[name]}"
     if name not in _OF_THE_REPOSITORY:
         return ""
     folder = _OF_THE_REPOSITORY[name]

@@ -56,6 +56,10 @@ def compare(
     budget: options.Budget = None,
     until: options.Until = None,
     tolerance: options.Tolerances = None,
+    like: Annotated[
+        Path | None,
+        typer.Option(help="Your own MuJoCo model, *.xml: are its integrator, step and cone good enough for the scene?"),
+    ] = None,
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default about a fiftieth of --until.")
     ] = None,
@@ -76,7 +80,8 @@ def compare(
     the file gets a row without claims.
 
     With --tolerance a scene is judged by it. With --engine, too, the answer is one line for each: whether that step
-    is good enough over the scene's own duration, by how much, and which one would do.
+    is good enough over the scene's own duration, by how much, and which one would do. With --like that is the step of
+    your own model, to 1e-4 of the path by default, and the line to change is named.
     """
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.screen import WIDTH
@@ -86,9 +91,9 @@ def compare(
 
     comparison, workers = options.controlled(comparison, control), Workers()
     assigned, bounds = options.assignments(settings), tolerance or []
-    if engine and bounds:
+    if like is not None or (engine and bounds):
         runner = options.new_runner(out, fresh, jobs, scheduler, workers)
-        answer_steps(comparison, engine, bounds, assigned, until, runner, out, as_json=as_json)
+        answer_steps(comparison, engine or [], bounds, assigned, until, runner, out, like=like, as_json=as_json)
     with options.spinner(comparison):
         loaded = comparison_named(comparison, assigned, workers, budget, scheduler, engine or [], until, every, bounds)
     mention_absent(loaded.absent)
@@ -167,7 +172,7 @@ def outcomes_of(
     from proofroll.studies.comparison.planning import plan
 
     begin = processor_seconds() - spent
-    with options.spinner(f"{stage}cases"):
+    with options.spinner(f"{stage}cases"), runner.profile.phase("planning"):
         plans = [affordable(plan(item, engines, runner.workers), runner) for item in comparisons]
     brief = [item.brief for item in plans]
     grown = [(index, item.cases) for index, item in enumerate(plans) if len(item.truths) > len(brief[index].truths)]
@@ -247,7 +252,8 @@ class _Comparing:
 
         self._judged[index] = self._known(index)
         so_far = self.so_far
-        outcome = evaluate(self.plans[index].ended(left_out(so_far)), so_far, self.runner)
+        with self.runner.profile.phase("judging"):
+            outcome = evaluate(self.plans[index].ended(left_out(so_far)), so_far, self.runner)
         if self._judged[index] < len(self.plans[index].cases):
             outcome = replace(outcome, beyond_budget=[])  # missing cases are not left out yet
         self.ended[index] = outcome

@@ -90,7 +90,14 @@ def judge(
     if as_json:
         options.write_json(judged.content())
     else:
-        asked = f"proofroll judge {shlex.quote(str(run))} --scene {shlex.quote(scene or str(named))}"
+        asked = shlex.join(
+            [
+                *("proofroll", "judge", str(run), "--scene", scene or str(named)),
+                *(word for text in settings or () for word in ("--set", text)),
+                *(word for text in tolerance or () for word in ("--tolerance", text)),
+                *(("--because", because) if because else ()),
+            ]
+        )
         lines = _lines(judged, run.name, asked, _names(columns), everything=everything)
         options.show_lines(lines, widest=WIDTH)
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)

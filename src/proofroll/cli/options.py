@@ -373,9 +373,7 @@ def require_pages() -> None:
     """
     from importlib.util import find_spec
 
-    lacking = [
-        name for name in ("itables", "jinja2", "matplotlib", "plotly", "tsdownsample") if find_spec(name) is None
-    ]
+    lacking = [name for name in ("itables", "jinja2", "matplotlib", "tsdownsample") if find_spec(name) is None]
     if lacking:
         raise Missing(f"pages need {', '.join(lacking)}, not installed here: pip install 'proofroll[report]'")
 

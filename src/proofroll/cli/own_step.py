@@ -12,7 +12,10 @@ from proofroll.cli import options
 
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
+    from proofroll.core.scene import Scene
+    from proofroll.files.scene_sources import OwnOptions
     from proofroll.running.runner import Runner
+    from proofroll.studies.answer.records import StepAnswer
 
 
 def answer_steps(
@@ -24,6 +27,7 @@ def answer_steps(
     runner: Runner,
     out: Path,
     *,
+    like: Path | None = None,
     as_json: bool,
 ) -> NoReturn:
     """Prints a line for each engine, and exits: 1 if a step is not good enough.
@@ -31,11 +35,12 @@ def answer_steps(
     Args:
         name: of a scene or a comparison.
         engines: ``name[key=value,…]``.
-        tolerances: texts of the option.
+        tolerances: texts of the option; empty: the default.
         parameters: values of the scene's parameters.
         until: length of the runs [s]; None: the scene's own duration.
         runner: runs the cases.
         out: folder of results.
+        like: a person's own model, whose options are a further engine; None: there is none.
         as_json: True for JSON.
     """
     from proofroll.files.json_data import plain
@@ -45,11 +50,18 @@ def answer_steps(
     from proofroll.studies.answer.by_name import question_named
     from proofroll.studies.answer.own_step import engine_facts, step_answer
     from proofroll.studies.answer.records import StepAnswer
-    from proofroll.studies.judging.asked_tolerance import AskedTolerance
+    from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
     from proofroll.studies.study_store import keep_study
 
     whole = question_named(name, parameters, until)
-    asked = AskedTolerance.of(tolerances, whole.loaded)
+    asked = AskedTolerance.of(tolerances or [DEFAULT], whole.loaded)
+    heads = [f"{engine}: " if len(engines) > 1 or like else "" for engine in engines]
+    further: list[str] = []
+    if like is not None:
+        own, engine = _own_engine(like, whole.loaded, runner)
+        heads.append(f"yours ({own.words}): ")
+        engines = [*engines, engine]
+        further = [f"Not compared, as the adapter has its own: {', '.join(own.others)}."] if own.others else []
     facts = [engine_facts(engine, whole, runner) for engine in engines]
     made = []
     for engine, pair in zip(engines, facts, strict=True):
@@ -65,10 +77,57 @@ def answer_steps(
         content = [{"sentence": step_sentence(item), **plain(item)} for item in made]
         options.write_json(content[0] if len(content) == 1 else content)
     else:
-        heads = [f"{engine}: " if len(engines) > 1 else "" for engine in engines]
         lines = [f"{head}{step_sentence(item)}" for head, item in zip(heads, made, strict=True)]
-        options.show_lines([*lines, scope_sentence(made[0])], widest=WIDTH)
+        lines += _change(made[-1]) if like else []
+        options.show_lines([*lines, *further, scope_sentence(made[0])], widest=WIDTH)
     raise typer.Exit(options.OK if all(item.holds for item in made) else options.CONTRADICTED)
+
+
+def _own_engine(like: Path, scene: Scene, runner: Runner) -> tuple[OwnOptions, str]:
+    """Options of a person's own model, and the engine with them, in its first formulation that represents a scene.
+
+    Raises:
+        InputError: the file has no options that can be compared, or no formulation represents the scene.
+    """
+    from proofroll.core.errors import InputError
+    from proofroll.core.plugins import EngineSpec, parse_engine
+    from proofroll.files.scene_sources import ReadsOptions, source_of
+    from proofroll.running.engine_questions import resolve
+    from proofroll.studies.comparison.default_comparison import able
+
+    source = source_of(str(like))
+    if source is None or not isinstance(source[0], ReadsOptions):
+        raise InputError("--like", like, "give the path of your own MuJoCo model, *.xml")
+    own = source[0].own_options(like)
+    formulations = able(scene, runner.workers, names=[own.engine])
+    if not formulations:
+        raise InputError("--like", like, f"no formulation of {own.engine} represents {scene.name}")
+    given = {**parse_engine(formulations[0]).options, "preset": "default", **own.settings}
+    choices = [EngineSpec(own.engine, options) for options in ({**given, **own.of_contacts}, given)]
+    resolved = resolve([(choice.name, choice.options) for choice in choices], runner.workers)
+    taken = choices[1] if isinstance(resolved[0], InputError) else choices[0]
+    return own, str(taken)
+
+
+def _change(made: StepAnswer) -> list[str]:
+    """The line of a person's own model that makes the step that would do, or the command that looks for other settings.
+
+    None where theirs is good enough.
+    """
+    from proofroll.core.errors import ProofrollError
+    from proofroll.core.plugins import parse_engine
+    from proofroll.report.answer.sentences import lines_command
+    from proofroll.report.page.model_lines import own_lines
+
+    if made.holds:
+        return []
+    spec = parse_engine(made.advised.spec or made.spec)
+    try:
+        lines = own_lines(spec.name, spec.options) if made.advised.holds else []
+    except ProofrollError:
+        lines = []
+    changed = [f"Change this line: {line}" for line in lines if line.startswith("<option")]
+    return changed or [f"Lines that do, if any: {lines_command(made, spec.name)}"]
 
 
 def stored_sentences(comparison: Comparison, out: Path) -> list[str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
-from proofroll.core.errors import ProofrollError
+from proofroll.core.errors import InputError, ProofrollError
 
 if TYPE_CHECKING:
     from proofroll.running.runner import Runner
@@ -43,6 +43,9 @@ def recommend(
         bool,
         typer.Option("--lines", help="Print only the lines that make the choice in a model of your own."),
     ] = False,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw error against cost of all runs of the search into this file, *.svg.")
+    ] = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,
@@ -61,6 +64,8 @@ def recommend(
     from proofroll.studies.answer.by_name import question_named
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
 
+    if plot is not None:
+        _require_drawable(plot, scenes)
     scenes = [options.controlled(scene, control) for scene in scenes]
     questions = [question_named(scene, options.assignments(settings), until) for scene in scenes]
     questions = [item.sampled_for(_given_step(engine or [])) for item in questions]
@@ -72,12 +77,38 @@ def recommend(
         if not as_json and not lines:
             head = [question.scene] if len(questions) > 1 else []
             options.show_lines([*head, *answer_lines(made[-1])], widest=WIDTH)
+    if plot is not None:
+        _draw(made[0], plot)
     if as_json:
         content = [{"sentence": taken_sentence(item), **plain(item)} for item in made]
         options.write_json(content[0] if len(content) == 1 else content)
     elif lines:
         _print_lines(made)
     raise typer.Exit(options.OK if all(item.taken for item in made) else options.CONTRADICTED)
+
+
+def _require_drawable(path: Path, scenes: list[str]) -> None:
+    """Raises InputError for a picture of several scenes, or one that is no SVG or cannot be written."""
+    if len(scenes) > 1:
+        raise InputError("--plot", path, "a picture is of one scene")
+    if path.suffix != ".svg":
+        raise InputError("--plot", path, "name a file *.svg")
+    options.require_writable(path, "--plot")
+
+
+def _draw(made: SceneAnswer, path: Path) -> None:
+    """Writes error against cost of all runs of a search.
+
+    Raises:
+        ProofrollError: no run reached its end.
+    """
+    from proofroll.report.answer.picture import svg
+    from proofroll.running.store import write_text
+
+    drawn = svg(made, alone=True)
+    if not drawn:
+        raise ProofrollError("--plot: no run reached its end, so there is nothing to draw")
+    write_text(path, drawn)
 
 
 def _given_step(engines: list[str]) -> float | None:
@@ -98,7 +129,7 @@ def _answer(
     from proofroll.report.answer.sentences import sentence
     from proofroll.studies.answer.answers import answer, answer_path, kept, stored
     from proofroll.studies.answer.records import SceneAnswer
-    from proofroll.studies.answer.setting_search import CELL_CAP
+    from proofroll.studies.answer.setting_search import WHOLE
 
     path = answer_path(out, question, asked, engines)
     if not runner.fresh and (earlier := stored(path, SceneAnswer)) is not None:
@@ -107,7 +138,9 @@ def _answer(
     def begin(names: Sequence[str]) -> None:
         if not quiet:
             place = f"{question.scene} over {question.until:g} s"
-            options.complain(f"searching {', '.join(names)} in {place}: at most {CELL_CAP:g} s of processor time each")
+            options.complain(
+                f"searching {', '.join(names)} in {place}: at most {WHOLE.engine:g} s of processor time each"
+            )
 
     def tell(item: EngineAnswer) -> None:
         if not quiet:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     from proofroll.running.runner import Runner
     from proofroll.studies.comparison.outcome import Outcome
 
-# Part of the processor time that writing unfinished pages may take.
-_WRITING = 0.03
+# Part of the processor time that writing unfinished pages may take, and processor time after which further studies that
+# were made are written [s].
+_WRITING, _UNWRITTEN = 0.01, 30.0
 
 
 def report(
@@ -64,6 +65,9 @@ def report(
         typer.Option(help="An earlier report.json: tells what changed; exit 1 if a verdict, an error or a cost did."),
     ] = None,
     comment: options.Comment = None,
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Print processor-seconds by phase, workers included, at the end.")
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
@@ -83,10 +87,9 @@ def report(
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
     from proofroll.report.page.growing import begun
-    from proofroll.report.page.html import templates
     from proofroll.report.parts import all_parts, parts_of
     from proofroll.report.terminal.screen import WIDTH
-    from proofroll.report.terminal.tables import report_lines
+    from proofroll.report.terminal.tables import profile_lines, report_lines
     from proofroll.running.idle_workers import Workers
     from proofroll.running.store import alone_in
     from proofroll.studies.comparison.by_name import comparison_named
@@ -108,29 +111,49 @@ def report(
     loaded = [comparison_named(name, assigned, workers, None, scheduler) for name in names]
     if budget or not studies:
         loaded = [replace(item, budget=None) if budget else item.briefly() for item in loaded]
-    require_tolerances(tolerance or [], loaded)
-    options.require_pages()
-    templates()  # read before the work, during which the files may change
+    _require(tolerance or [], loaded)
     runner, chosen = options.new_runner(out, fresh, jobs, scheduler, workers), engine or []
     list_omitted_engines(loaded, chosen)
     total = len({part.key for part in parts}) + 2 * bool(loaded)
     command = _command(studies or [], chosen, settings or [], budget, out, only, tolerance or [])
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
-        growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out))
-        with growing.resumable():
+        growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out), runner)
+        with growing.resumable(), runner.profile.phase("comparisons"):
             outcomes: list[Outcome] = []
             if loaded:
                 stage, spent = _begin(1, total, "comparisons"), _processor_seconds() - begin
                 outcomes = outcomes_of(loaded, chosen, runner, stage, growing.add, budget, spent)
-        made = begun(outcomes, command, left_out=left_out)
-        missing = _expected(made, earlier, parts, out, fresh=fresh)
+        with runner.profile.phase("page"):
+            made = begun(outcomes, command, left_out=left_out)
+            missing = _expected(made, earlier, parts, out, fresh=fresh)
         rest = (lambda: budget - _processor_seconds() + begin) if budget else None
         stage = _begin(2, total, "the cheapest of each engine") if outcomes else ""
-        search_answers(made, outcomes, tolerance or [], chosen, runner, out, rest, stage)
+        with runner.profile.phase("search"):
+            search_answers(made, outcomes, tolerance or [], chosen, runner, out, rest, stage)
         unmade = _make_all(made, parts, missing, runner, out, rest)
         _comment(comment, made.content)
         options.show(made.content, as_json, lambda: report_lines(made.content, out), widest=WIDTH)
+    _tell(profile_lines(runner.profile) if profile else ())
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes), unmade))
+
+
+def _require(tolerances: list[str], comparisons: list[Comparison]) -> None:
+    """Reads the templates before the work, during which their files may change.
+
+    Raises:
+        InputError: no scene takes a tolerance.
+        Missing: a package that draws pages is not installed.
+    """
+    from proofroll.report.page.html import templates
+
+    require_tolerances(tolerances, comparisons)
+    options.require_pages()
+    templates()
+
+
+def _tell(lines: Iterable[str]) -> None:
+    for line in lines:
+        options.complain(line)
 
 
 def _expected(made: Report, earlier: EarlierReport | None, parts: list[Part], out: Path, *, fresh: bool) -> list[Part]:
@@ -176,7 +199,9 @@ class _Growing:
         parts: list[Part],
         out: Path,
         made: Callable[[list[Outcome], list[str]], Report],
+        runner: Runner,
     ) -> None:
+        self._runner = runner
         self._comparisons, self._parts, self._out, self._made = comparisons, parts, out, made
         self._ended: dict[int, Outcome] = {}
         self._start, self._spent = _processor_seconds(), 0.0
@@ -207,9 +232,10 @@ class _Growing:
     def _write(self) -> None:
         ended = [self._ended[index] for index in sorted(self._ended)]
         awaited = [item.title for index, item in enumerate(self._comparisons) if index not in self._ended]
-        page = self._made(ended, awaited)
-        page.expect(self._parts, self._out)
-        page.write(self._out)
+        with self._runner.profile.phase("page"):
+            page = self._made(ended, awaited)
+            page.expect(self._parts, self._out)
+            page.write(self._out)
 
 
 def _of_groups(names: list[str], only: str) -> list[str]:
@@ -268,7 +294,7 @@ def _make_all(
 ) -> set[str]:
     """Makes the further studies that are missing; returns names of those for which a budget left no ``rest`` [s]."""
     keys = {part.key: part.words for part in parts}
-    start, unmade = 1 + 2 * bool(made.content.comparisons), set()
+    start, unmade, written = 1 + 2 * bool(made.content.comparisons), set(), runner.profile.total
     for number, (key, words) in enumerate(keys.items(), start=start):
         to_make = [part for part in missing if part.key == key]
         stage = _begin(number, len(keys) + start - 1, words if to_make else f"{words}: kept from before")
@@ -277,11 +303,20 @@ def _make_all(
                 unmade.add(part.head["name"])
                 made.leave_out(part, "Not run: the budget is used")
             else:
-                _make(made, part, runner, out, stage)
-                made.write(out)
-    if unmade:
-        made.write(out)
+                if runner.profile.total - written > _UNWRITTEN:
+                    written = _write(made, runner, out)
+                with runner.profile.phase(part.kind):
+                    _make(made, part, runner, out, stage)
+    if missing:
+        _write(made, runner, out)
     return unmade
+
+
+def _write(made: Report, runner: Runner, out: Path) -> float:
+    """Writes the report; returns the processor time at its end [s]."""
+    with runner.profile.phase("page"):
+        made.write(out)
+    return runner.profile.total
 
 
 def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> None:

@@ -40,8 +40,6 @@ _LARGE, _WORSE = 0.1, 1.5
 _FAR_ABOVE = 100.0
 # Observed orders below this show no limit.
 _NO_CONVERGENCE = 0.25
-# Number of finer runs that must not be worse; the error of a single one may cancel by chance, too.
-_NEIGHBOURS = 2
 
 
 @dataclass(frozen=True)
@@ -282,21 +280,3 @@ def floor_of(errors: Mapping[float, float], scale: float | None, unit: str) -> s
     best = min(errors, key=lambda step: errors[step])
     falling = [errors[step] for step in sorted(errors, reverse=True)]
     return floor_text(best, errors[best], unit) if is_floor(falling, scale) else ""
-
-
-def envelope(errors: Sequence[float], floor: int | None = None) -> list[float]:
-    """Largest error of each run and of the next two finer ones that have a result; coarse first.
-
-    So a coarse run whose error cancels by chance does not count as accurate. Only the next runs matter: round-off that
-    grows at much smaller steps does not make a coarse run worse.
-
-    Args:
-        errors: coarse first; inf: no result.
-        floor: number of the run at the error floor of single precision; finer runs do not count. None: no floor.
-    """
-    last = len(errors) if floor is None else floor + 1
-    largest = []
-    for index, error in enumerate(errors[:last]):
-        finer = [finer_error for finer_error in errors[index + 1 : last] if finer_error != float("inf")][:_NEIGHBOURS]
-        largest.append(max([error, *finer]))
-    return [*largest, *errors[last:]]

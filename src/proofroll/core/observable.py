@@ -31,9 +31,8 @@ class Observable:
         always: part of its size against which it is judged without a tolerance, too, events by their number; 0: it is
             not.
         asked_as: word in a scene's ``asks`` for which a first look judges it, e.g. ``orientation``; empty: none.
-        decides: True if trade-offs, stability maps and recommendations use it by default.
+        decides: True if stability maps and ladders use it by default.
         asked_for: True if a person may ask for a recommendation by it.
-        column: True if a trade-off shows it by default beside the deciding one.
         audit: True if it compares the reactions that an engine reports with the motion that it computed.
         hangs_on_events: True if it is unpredictable once the time of an event is ill-posed.
         at_impacts: False if it has no value beside an impact, whose length is an engine's own, nor where the question
@@ -59,7 +58,6 @@ class Observable:
     asked_as: str = ""
     decides: bool = False
     asked_for: bool = True
-    column: bool = False
     audit: bool = False
     hangs_on_events: bool = True
     at_impacts: bool = True

@@ -95,7 +95,7 @@ class Scene:
 
     @property
     def deciding(self) -> str:
-        """Default observable for trade-off, map and recommendation."""
+        """Default observable of a stability map and of a ladder."""
         return next(name for name, item in self.observables.items() if item.decides)
 
     def observable(self, name: str, field: str = "quantity") -> Observable:

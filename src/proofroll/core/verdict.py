@@ -53,7 +53,7 @@ class LimitResult(StrEnum):
     NOT_SHOWN = "no limit shown"  # the runs do not settle, or too slowly to tell
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Judgement:
     """Verdict on one observable of one run.
 
@@ -95,6 +95,11 @@ class Judgement:
     def of_allowed(self) -> float:
         """Error over what is allowed; infinite for an error where none is."""
         return self.error / self.tolerance if self.tolerance else math.inf if self.error else 0.0
+
+    def __repr__(self) -> str:
+        """One line: the observable, its verdict, and its error of what is allowed."""
+        sizes = f"{number(self.error)} of {number(self.tolerance)}{spaced(self.unit)}"
+        return f"{self.observable}: {self.verdict}, {sizes}{f' ({self.reason})' if self.reason else ''}"
 
 
 @dataclass(frozen=True)

@@ -130,6 +130,34 @@ class JudgesRecords(Protocol):
         """
 
 
+@dataclass(frozen=True, kw_only=True)
+class OwnOptions:
+    """Options of an engine in a person's own file, as settings of its adapter.
+
+    Attributes:
+        engine: name of the engine.
+        words: options for a reader.
+        settings: setting -> its value, as text.
+        of_contacts: further settings, of formulations that have contacts.
+        others: clauses on options that the adapter sets otherwise.
+    """
+
+    engine: str
+    words: str
+    settings: Mapping[str, str]
+    of_contacts: Mapping[str, str]
+    others: list[str]
+
+
+@runtime_checkable
+class ReadsOptions(Protocol):
+    """Ability of a reader whose files have options of an engine."""
+
+    @staticmethod
+    def own_options(path: Path) -> OwnOptions:
+        """Options of a file. Raises InputError if it has none, or none that can be compared."""
+
+
 @dataclass(frozen=True)
 class ProbeStart:
     """Start of a robot that moves in the air under known efforts.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import MappingProxyType
@@ -53,21 +52,3 @@ def drawn_file(
     with styled(settings):
         drawn().savefig(out, format=form, dpi=dpi, metadata={**metadata, **_NO_DATE.get(form, {})})
     return out.getvalue()
-
-
-def svg_text(settings: Mapping[str, Any], drawn: Callable[[], Figure]) -> str:
-    """Figure as SVG text; see :func:`drawn_file`."""
-    return drawn_file("svg", settings, drawn).decode()
-
-
-def panels(count: int) -> tuple[Figure, list[Any], int, int]:
-    """A figure, its ``count`` panels in at most two columns, and its numbers of rows and columns."""
-    from matplotlib.figure import Figure
-
-    columns = min(2, count) or 1
-    rows = math.ceil(count / columns) or 1
-    figure = Figure(layout="constrained")
-    made = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
-    for panel in made[count:]:
-        panel.set_visible(False)
-    return figure, made[:count], rows, columns

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from proofroll.core.verdict import Judgement
     from proofroll.report.comparison.records import ReportedComparison, ReportedRow, ReportedRun, Setting
     from proofroll.running.case import EngineFacts
-    from proofroll.studies.tradeoff.records import SweptSetting
+    from proofroll.studies.swept_settings import SweptSetting
 
 SYMBOLS = {
     "agrees": "✓",

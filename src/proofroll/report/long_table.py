@@ -15,7 +15,7 @@ from proofroll.running.environments import shown_name
 
 if TYPE_CHECKING:
     from proofroll.running.case import EngineFacts
-    from proofroll.studies.tradeoff.records import SweptSetting
+    from proofroll.studies.swept_settings import SweptSetting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class TableLine:
         case: all parameters of the scene in words, defaults included.
         own_case: True if all of them are the scene's own.
         until: length of the run [s].
-        row: number of the run's row in its study; of a trade-off, of its curve.
+        row: number of the run's row in its study.
         engine, version, formulation, preset, setting, precision: of the run; ``setting`` has preset and further
         options.
         own_equations: the run solves equations derived for the scene, as its truth does.
@@ -95,23 +95,11 @@ class TableLine:
     clean: bool
 
     @property
-    def timed_case(self) -> str:
-        """All parameters and the length of the run in words; runs of different studies compete where it is the same."""
-        return ", ".join(filter(None, (self.case, f"{self.until:.12g} s")))
-
-    @property
     def relative(self) -> float:
         """Error plus the truth's error bar, relative to the quantity's size; inf without either."""
         if self.error is None or not self.scale:
             return math.inf
         return (self.error + (self.truth_error_bar or 0.0)) / self.scale
-
-    @property
-    def limit_least(self) -> float | None:
-        """Least error that the limit of small steps can have, relative to the quantity's size; None without a limit."""
-        if self.limit_error is None or not self.scale:
-            return None
-        return max(0.0, self.limit_error - (self.limit_doubt or 0.0)) / self.scale
 
 
 def case_words(parameters: Mapping[str, float]) -> str:

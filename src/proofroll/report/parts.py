@@ -16,7 +16,6 @@ from proofroll.core.entry_points import loaded
 from proofroll.core.errors import ProofrollError, require_known
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml, study_files
-from proofroll.report.long_table import TableLine
 from proofroll.report.pages import section_id
 from proofroll.running.runner import Runner
 
@@ -107,10 +106,6 @@ class Part(Protocol):
 
     def entry(self) -> PartEntry:
         """Entry of the part, with the additional names of its template; only after :meth:`make` or :meth:`keeps`."""
-
-    def lines(self) -> Sequence[TableLine]:
-        """Lines of its runs in the long table; only after :meth:`make` or :meth:`keeps`."""
-        return ()
 
     def pictures(self, prefix: str) -> dict[str, str]:  # noqa: ARG002 -- for those that have any
         """Pictures as markup, by name; every id in them begins with ``prefix``."""

@@ -1,13 +1,15 @@
 """Style of a row in all figures of a comparison: colour with dashes, width and symbol."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from proofroll.core.entry_points import announced
+from proofroll.core.plugins import GROUP
 from proofroll.report.comparison.records import ReportedRow
 
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 COLOURS = 8
-# plotly's names of symbols, each with its outline around (0, 0) for the legend, as an SVG path.
+# Symbols by name, each with its outline around (0, 0) as an SVG path.
 OUTLINES = {
     "circle": "M-3.4 0a3.4 3.4 0 1 0 6.8 0a3.4 3.4 0 1 0 -6.8 0Z",
     "square": "M-3 -3H3V3H-3Z",
@@ -26,7 +28,7 @@ OUTLINES = {
 
 @dataclass(frozen=True)
 class Style:
-    """Style of a row: number of the colour, plotly's dashes and symbol, width of the line [px], and opacity."""
+    """Style of a row: number of the colour, dashes and symbol by name, width of the line [px], and opacity."""
 
     colour: int
     dash: str
@@ -35,15 +37,28 @@ class Style:
     opacity: float
 
 
+def engine_colours(engines: Iterable[str] = ()) -> dict[str, int]:
+    """Number of the colour of each engine, the same in every report of an installation.
+
+    Engines that proofroll brings come first, then those of other packages.
+
+    Args:
+        engines: further ones, as of other interpreters, in the order of the page.
+    """
+    points = sorted(announced(GROUP), key=lambda point: (not point.value.startswith("proofroll."), point.name))
+    names = dict.fromkeys([*(point.name for point in points), *engines])
+    return {name: number % COLOURS for number, name in enumerate(names)}
+
+
 def styles(rows: Sequence[ReportedRow], page_engines: Sequence[str] = ()) -> list[Style]:
     """Style of each row: colour by engine, dashes by formulation, width by preset, symbol by number in the engine.
 
     Args:
         rows: of a comparison.
-        page_engines: engines of the page in its order, so that each has one colour in all comparisons.
+        page_engines: engines of the page in its order.
     """
-    engines = list(dict.fromkeys([*page_engines, *(row.name for row in rows)]))
-    formulations = {name: list(dict.fromkeys(r.formulation for r in rows if r.name == name)) for name in engines}
+    colours = engine_colours([*page_engines, *(row.name for row in rows)])
+    formulations = {name: list(dict.fromkeys(r.formulation for r in rows if r.name == name)) for name in colours}
     widths = {"default": 1.1, "tuned": 2.4}
     names = list(OUTLINES)
     seen: dict[str, int] = {}
@@ -52,7 +67,7 @@ def styles(rows: Sequence[ReportedRow], page_engines: Sequence[str] = ()) -> lis
         place = seen[row.name] = seen.get(row.name, -1) + 1
         looks.append(
             Style(
-                colour=engines.index(row.name) % COLOURS,
+                colour=colours[row.name],
                 dash=DASHES[formulations[row.name].index(row.formulation) % len(DASHES)],
                 width=widths.get(row.preset or "", 1.7),
                 symbol=names[place % len(names)] + ("-open" if place // len(names) % 2 else ""),

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from proofroll.core.number_format import counted
+from proofroll.files.scene_sources import OwnOptions
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.opening import BASES
@@ -43,6 +44,13 @@ class RobotScenes:
     def under(control: Path) -> Any:
         """See :class:`proofroll.files.scene_sources.TakesControllers`."""
         return ControlledScenes(control)
+
+    @staticmethod
+    def own_options(path: Path) -> OwnOptions:
+        """See :class:`proofroll.files.scene_sources.ReadsOptions`."""
+        from proofroll.robots.own_options import own_options  # MuJoCo is needed for this alone
+
+        return own_options(path)
 
     @staticmethod
     def content(path: Path) -> dict[str, Any]:

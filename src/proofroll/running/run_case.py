@@ -8,7 +8,7 @@ import statistics
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from proofroll.running.integrity import changed
 from proofroll.running.manifest import manifest
 from proofroll.running.manifest import versions as made_with
 from proofroll.running.time_case import clean_runs
+
+if TYPE_CHECKING:
+    from proofroll.core.certificate import Line
 
 
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
@@ -69,8 +72,12 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         building = spent.seconds["building"]
         step = step_of(engine, settings)
         require_whole_steps(times, step)
-        lines_of_certificate = certificate(kind, engine, scene, settings)
+        lines_of_certificate = _known_certificate(case)
+        if lines_of_certificate is None:
+            lines_of_certificate = certificate(kind, engine, scene, settings)
         difference = first_difference(lines_of_certificate)
+        if difference is None:
+            _keep_certificate(case, lines_of_certificate)
         spent.on("certificate")
         lines = [line.as_dict() for line in lines_of_certificate]
         if difference is not None:
@@ -104,6 +111,37 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     write(recording.columns.assign(**attrs), out)
     spent.on("writing")
     return result
+
+
+# Case without its step -> the coarsest step whose model was held against the scene [s], and the lines of that.
+_certificates: dict[str, tuple[float, list[Line]]] = {}
+
+
+def _without_step(case: Case) -> str:
+    """Text of all that a case's model is made from, but for the step."""
+    settings = {name: value for name, value in case.engine.settings.items() if name != "dt"}
+    return repr((case.scene, case.scene_digest, case.asks, case.engine.name, settings))
+
+
+def _known_certificate(case: Case) -> list[Line] | None:
+    """Certificate of the same model with a coarser step, which held in this process; None: there is none.
+
+    What the first steps tell differs from the scene by less with a finer step, so that it holds there, too.
+    """
+    coarsest, lines = _certificates.get(_without_step(case), (0.0, None))
+    return lines if (step := _fixed_step(case)) and coarsest >= step else None
+
+
+def _keep_certificate(case: Case, lines: list[Line]) -> None:
+    """Keeps a certificate that holds for cases with finer steps."""
+    coarsest, _ = _certificates.get(_without_step(case), (0.0, lines))
+    if (step := _fixed_step(case)) and step >= coarsest:
+        _certificates[_without_step(case)] = step, lines
+
+
+def _fixed_step(case: Case) -> float:
+    """Fixed step of a case [s]; 0: it adapts, or the engine has none of its own."""
+    return float(case.engine.settings.get("dt") or 0.0) if case.engine.resolution == "dt" else 0.0
 
 
 def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:

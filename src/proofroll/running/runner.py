@@ -21,6 +21,7 @@ from proofroll.running.case import Case, Result, Status
 from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker, WorkerDied, status_of
+from proofroll.running.profile import ProcessorProfile
 from proofroll.running.store import Store
 from proofroll.running.time_budget import TimeBudget
 from proofroll.running.waiting_cases import WaitingCases
@@ -60,6 +61,8 @@ class Runner:
         self.cluster = cluster
         self.workers = workers or Workers()
         """Idle workers, also for questions of the same study to engines."""
+        self.profile = ProcessorProfile()
+        """Processor time by phase."""
         self.jobs = jobs or os.cpu_count() or 1
         self.fresh = fresh
         self.reused = 0
@@ -149,8 +152,7 @@ class Runner:
                     running -= 1
                     case, result = item
                     self._run_here.add(case.key)
-                    if case.key in self.damaged:
-                        result = dataclasses.replace(result, message=f"{result.message}; what was stored was damaged")
+                    result = self._remarked(case, result)
                 results[case.key] = result
                 self.hosts[result.host] += 1
                 running += sum([ask(further) for further in then(case, result)])
@@ -163,6 +165,13 @@ class Runner:
             pool.shutdown(wait=True, cancel_futures=True)
             self._stopping.clear()
         return results
+
+    def _remarked(self, case: Case, result: Result) -> Result:
+        """Result of a case that was run just now, booked in the profile, with a remark on a damaged earlier one."""
+        self.profile.add(result)
+        if case.key not in self.damaged:
+            return result
+        return dataclasses.replace(result, message=f"{result.message}; what was stored was damaged")
 
     def _begin(self, pool: ThreadPoolExecutor, waiting: WaitingCases, arrived: _Arrived) -> None:
         """Starts serving the waiting cases, on the cluster or in workers of this machine."""

@@ -1,4 +1,4 @@
-"""Timings that are comparable on a noisy machine: in rounds, with a confidence interval, in pyperf's data model.
+"""Timings that are comparable on a noisy machine: in rounds, with a confidence interval.
 
 A disturbance slows all tasks of its round, so a ratio of two timings is taken round by round.
 """
@@ -15,16 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.files.atomic import replacing
-
 # Least confidence of an interval.
 CONFIDENCE = 0.95
 # Fewest rounds that give this confidence: the whole range of five values holds the median with 94 %.
 ROUNDS = 6
-# A claim about cost is contradicted if its engine takes more than this many times as long as another one. Steps of a
-# sweep differ by factors of 2 to 2.5, and so do the costs at which an engine meets a tolerance: a smaller ratio might
-# reverse with one more step in the sweep, or on another processor.
-FACTOR = 2.0
 
 
 @dataclass(frozen=True)
@@ -150,39 +144,3 @@ def _processor() -> str:
         lines = []
     named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
     return next(named, platform.processor() or platform.machine())
-
-
-def write_benchmarks(timings: Mapping[str, Timing], path: Path) -> None:
-    """Writes all timings as a pyperf suite, for ``python -m pyperf stats`` and ``compare_to``; none are no file.
-
-    Raises:
-        ProofrollError: the file cannot be written.
-    """
-    import pyperf
-
-    if not timings:  # pyperf has no empty suite
-        return
-
-    facts = machine()
-    metadata = {
-        "cpu_model_name": facts["processor"],
-        "cpu_count": int(facts["cores"]),
-        "platform": facts["system"],
-        "python_version": facts["python"],
-        "unit": "second",
-    }
-    benchmarks = [
-        pyperf.Benchmark(
-            [
-                pyperf.Run(
-                    timing.values,
-                    warmups=[(1, value) for value in timing.warmups],
-                    metadata={**metadata, "name": name},
-                    collect_metadata=False,
-                )
-            ]
-        )
-        for name, timing in timings.items()
-    ]
-    with replacing(path) as temporary:
-        pyperf.BenchmarkSuite(benchmarks).dump(str(temporary), replace=True)

@@ -26,7 +26,6 @@ from proofroll.files.scene_file import SceneFile
 from proofroll.files.scene_parameters import Parameter
 from proofroll.studies.stability import axes
 from proofroll.studies.stability import claims as stability_claims
-from proofroll.studies.tradeoff import claims
 
 
 class KeyTable(NamedTuple):
@@ -71,12 +70,6 @@ CHAPTERS: dict[str, tuple[KeyTable, ...]] = {
         KeyTable("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out", "budget", "spent")),
         KeyTable("[[rows]]", comparison.Row, ("except_at",)),
         KeyTable("[[rows.except_at]]", comparison.ExceptAt),
-    ),
-    'A trade-off: `study = "tradeoff"`': (
-        KeyTable("", claims.TradeoffClaims, (*_OF_FILE, "over", "parameters", "cheapest", "holds", "converges")),
-        KeyTable("[[cheapest]]", claims.Cheapest),
-        KeyTable("[[holds]]", claims.Holds),
-        KeyTable("[[converges]]", claims.Converges),
     ),
     'A stability map: `study = "stability"`': (
         KeyTable("", stability_claims.StabilityFile, (*_OF_FILE, "axes", "claims")),
@@ -131,10 +124,6 @@ Parameter = list of values. `[vary]`: every combination is run. `[brief]`: a rep
 ### `[tolerances.NAME]`
 
 `because` (required), and observable = a number with its unit, `"1e-3 m"`, or `"1 %"` of its size in the truth.
-""",
-    'A trade-off: `study = "tradeoff"`': """### `[parameters]`, `[over]`
-
-Parameter = value of the scene; parameter = values at whose every combination the best points are run too.
 """,
 }
 INTRODUCTION = """# The vocabulary of scenes and comparisons

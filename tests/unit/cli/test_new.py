@@ -95,7 +95,7 @@ def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
 @pytest.mark.parametrize(
     ("what", "name"),
     [("scene", "pendulum"), ("engine", "mujoco"), ("engine", "truth"), ("scene", "class"),
-     ("comparison", "paper"), ("comparison", "tradeoff")],
+     ("comparison", "paper"), ("comparison", "regimes")],
 )  # fmt: skip
 def test_a_name_that_stands_for_something_else(proofroll: Proofroll, what: str, name: str) -> None:
     """A scene is not called as one of the package, which commands would take, nor an engine as what is installed."""

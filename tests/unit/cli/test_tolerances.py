@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import proofroll
+import proofroll as rolled
 from proofroll.core.errors import InputError
 from proofroll.running.idle_workers import Workers
 from proofroll.studies.comparison.by_name import comparison_named
@@ -19,7 +20,7 @@ Proofroll = Callable[..., tuple[int, str, str]]
 @pytest.fixture(scope="module")
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A table of a pendulum's tip that is off by 0.1 mm."""
-    true = proofroll.simulate(proofroll.load_scene("pendulum"), "truth", until=0.2, every=0.05)
+    true = rolled.simulate(rolled.load_scene("pendulum"), "truth", until=0.2, every=0.05)
     path = tmp_path_factory.mktemp("table") / "run.csv"
     columns = np.column_stack([true["time"].values, true["tip.x"].values + 1e-4])
     np.savetxt(path, columns, delimiter=",", header="time,tip.x", comments="")
@@ -46,3 +47,21 @@ def test_a_comparison_of_a_scene_is_judged_by_it() -> None:
     assert band.because == "1 mm was asked for"
     with pytest.raises(InputError, match="has its own"):
         comparison_named("stick_slip", {}, workers, None, tolerance=["1 mm"])
+
+
+def test_a_line_that_judge_proposes_asks_the_same_question(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has all that was given, parameters, tolerance and reason too, and run as it stands it closes the cause."""
+    monkeypatch.chdir(tmp_path)
+    scene = rolled.load_scene("pendulum", length=0.6)
+    true = rolled.simulate(scene, "truth", until=0.5, every=0.05)
+    columns = np.column_stack([true["time"].values, np.degrees(true["q.pivot"].values)])
+    np.savetxt("mine.csv", columns, delimiter=",", header="t,theta", comments="", fmt="%.17g")
+    asked = ["--set", "length=0.6", "--tolerance", "q.pivot=1e-6 rad", "--because", "a table shows no less"]
+    code, out, _ = proofroll("judge", "mine.csv", "--scene", "pendulum", *asked, "--map", "t=time,theta=q.pivot")
+    line = " ".join(out.partition("Say so: ")[2].partition("All quantities")[0].split())
+    assert code == 1, out
+    assert shlex.split(line)[2:-2] == ["mine.csv", "--scene", "pendulum", *asked]
+    code, out, _ = proofroll(*shlex.split(line)[1:])
+    assert code == 0, out

@@ -28,7 +28,6 @@ from proofroll.core.verdict import LimitResult, Verdict
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 from proofroll.studies.judging.judge import judge as judge_run
-from proofroll.studies.tradeoff.curve import Curve, CurvePoint
 
 SCENES = ("pendulum", "double_pendulum", "free_body")
 TIMES = np.linspace(0, 1, 21)
@@ -203,51 +202,6 @@ def test_a_comparison_tells_precision_and_floor(
     assert "single precision" in out, out
     code, out, err = command_line("run", "free_body", "--engine", "single", "--until", "0.01")
     assert ", f32, dt 1e-3 s reached 0.01 s" in out
-
-
-@pytest.mark.nightly
-@pytest.mark.usefixtures("single")
-def test_a_tradeoff_tells_the_best_step(command_line: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
-    """The study names the best step and the floor, fits no order through it, and advice knows both."""
-    asked = ("free_body", "--engine", "single[formulation=rk4]", "--until", "0.1", "--quantity", "positions")
-    code, out, err = command_line("tradeoff", *asked, "--out", str(tmp_path), "--json")
-    assert code == 0, err
-    study = json.loads(out)
-    (budget,) = (item for item in study["budgets"] if item["quantity"] == "positions")
-    assert budget["best_step"] > min(point["step"] for point in study["points"])
-    assert not budget["contradicts_declaration"]
-    assert budget["order"] is None or abs(budget["order"] - 4) < 0.5
-    assert "single precision, smaller steps are worse" in budget["sentence"]
-    assert any("best step" in said and "single precision" in said for said in study["findings"])
-    assert {point["precision"] for point in study["points"]} == {"single"}
-
-
-def point(step: float, error: float, curve: np.ndarray) -> CurvePoint:
-    """A run with its error."""
-    facts = SimpleNamespace(settings={"dt": step}, resolution="dt")
-    case: Any = SimpleNamespace(engine=facts, every=0.05)
-    nothing: Any = None
-    return CurvePoint(case, nothing, {"x": curve}, {"x": error}, {"x": 0.0})
-
-
-def test_growing_round_off_takes_nothing_from_the_best_step() -> None:
-    """The envelope of the best step does not hold what smaller steps lose; a lucky coarse one is still not believed."""
-    errors = [1e-3, 1e-9, 1e-4, 1e-5, 1e-6, 4e-6, 1e-5]
-    steps = [2.0**-n for n in range(7)]
-    points = [point(step, error, error * np.ones(5)) for step, error in zip(steps, errors, strict=True)]
-    facts: Any = SimpleNamespace(precision="single", resolution="dt")
-    found = Curve("single", facts, points)
-    floor = found.floor("x")
-    assert floor is not None
-    assert floor.best.step == steps[4]
-    assert found.envelope("x") == [1e-3, 1e-4, 1e-4, 1e-5, 1e-6, 4e-6, 1e-5]
-    for each in points:  # errors as large as the motion, or hardly worse than the best, are no floor
-        each.scales["x"] = 5e-6
-    assert found.floor("x") is None
-    hardly = [*points[:5], point(steps[5], 1.2e-6, 4e-6 * np.ones(5)), point(steps[6], 1.4e-6, 1e-5 * np.ones(5))]
-    assert dataclasses.replace(found, points=hardly).floor("x") is None
-    double: Any = SimpleNamespace(precision="double", resolution="dt")
-    assert dataclasses.replace(found, facts=double).envelope("x")[4] == 1e-5
 
 
 @pytest.mark.parametrize(

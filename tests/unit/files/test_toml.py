@@ -10,7 +10,6 @@ from proofroll.core.errors import InputError
 from proofroll.files import toml as toml_file
 from proofroll.files.toml import read_toml, study_files, study_of
 from proofroll.studies.stability.claims import file_for
-from proofroll.studies.tradeoff.claims import claims_for
 
 
 @pytest.mark.parametrize("content", [b"a = = 1", b"\xff\xfe"])
@@ -43,6 +42,5 @@ def test_a_broken_neighbour_costs_nobody_else(tmp_path: Path, monkeypatch: pytes
     (tmp_path / "b.toml").write_text('study = "made"\nscene = "cone"')
     monkeypatch.setattr(toml_file, "study_folders", lambda: (tmp_path,))
     assert [(path.name, content["scene"]) for path, content in study_files("made")] == [("b.toml", "cone")]
-    assert claims_for("sphere_in_cylinder") is None
     without = file_for("pendulum")  # its own parameters are the axes
     assert (without.scene, without.claims) == ("pendulum", [])

@@ -163,7 +163,7 @@ def test_a_program_that_does_not_answer_is_asked_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["run", *(pytest.param(name, marks=pytest.mark.drill) for name in ("compare", "tradeoff"))]
+    "command", ["run", *(pytest.param(name, marks=pytest.mark.drill) for name in ("compare", "recommend"))]
 )
 def test_a_program_that_is_waited_for(
     command: str, command_line: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

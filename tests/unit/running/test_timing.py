@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-import pyperf
 import pytest
 
-from proofroll.running.timing import ROUNDS, Timing, interval_text, machine, ratio, time_in_rounds, write_benchmarks
+from proofroll.running.timing import ROUNDS, Timing, interval_text, ratio, time_in_rounds
 
 
 def test_every_task_once_per_round() -> None:
@@ -91,18 +88,3 @@ def test_only_an_interval_of_95_percent_is_called_one() -> None:
         "range of 75 %",
         "interval of 96.9 %",
     ]
-
-
-def test_timings_of_nothing_are_no_file(tmp_path: Path) -> None:
-    """A study whose budget sufficed for no timing writes no suite, and does not fail."""
-    write_benchmarks({}, tmp_path / "timings.json")
-    assert not list(tmp_path.iterdir())
-
-
-def test_pyperf_reads_what_is_written(tmp_path: Path) -> None:
-    """The file is a pyperf suite with the same values, and says on which machine they were taken."""
-    write_benchmarks({"one": Timing((1.0, 2.0, 3.0), (9.0,))}, tmp_path / "timings.json")
-    (benchmark,) = pyperf.BenchmarkSuite.load(str(tmp_path / "timings.json")).get_benchmarks()
-    assert benchmark.get_name() == "one"
-    assert benchmark.median() == 2.0
-    assert benchmark.get_metadata()["cpu_model_name"] == machine()["processor"]

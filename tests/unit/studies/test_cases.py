@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.cli.tradeoff import question_of
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
+from proofroll.studies.answer.by_name import question_named
 from proofroll.studies.cases import single_case
 from proofroll.studies.ladder.ladder import Ladder
 
@@ -22,6 +22,6 @@ def test_a_run_lasts_two_seconds_or_as_long_as_its_scene(scene: str, until: floa
 
 
 def test_studies_last_as_long_as_a_run(tmp_path: Path) -> None:
-    """A trade-off and a ladder of a scene of 0.7 s end there, where nobody gives another time."""
-    assert question_of("sled", None, None, None)[1].until == 0.7
+    """An answer and a ladder of a scene of 0.7 s end there, where nobody gives another time."""
+    assert question_named("sled", {}).until == 0.7
     assert Ladder("sled", {}, Runner(Store(tmp_path)), engines=("projection",)).until == 0.7

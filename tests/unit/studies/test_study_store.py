@@ -8,18 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from invented import boundary_point, invented_study, measured_point, stability_study
+from invented import boundary_point, stability_study
+from invented_answers import HELD, scene_answer
 
 from proofroll.running.environments import STAMP, VARIABLE, Environment
 from proofroll.running.timing import machine
 from proofroll.studies import study_store
+from proofroll.studies.answer.records import SceneAnswer
 from proofroll.studies.stability.axes import Axis
 from proofroll.studies.stability.claims import file_for
 from proofroll.studies.stability.effort import QUICK, Effort
 from proofroll.studies.stability.map import stability_path
 from proofroll.studies.stability.records import MappedValue, StabilityStudy
 from proofroll.studies.study_store import keep_study, valid_study
-from proofroll.studies.tradeoff.records import Corner, TradeoffStudy
 
 
 @dataclasses.dataclass
@@ -56,10 +57,9 @@ def test_a_study_of_this_code_on_this_machine_holds(path: Path) -> None:
 def test_parameters_without_a_bound_come_back(tmp_path: Path) -> None:
     """Friction that nothing exceeds is no number of JSON, and yet a parameter that somebody may set."""
     unbounded = {"mu_static": math.inf}
-    point = measured_point(corners=[Corner(unbounded, {}, {}, "it fell")])
-    study = invented_study(point, parameters=unbounded, over={"mu_static": [0.3, math.inf]})
+    study = dataclasses.replace(scene_answer(HELD), parameters=unbounded, measured=study_store.conditions_now())
     keep_study(study, tmp_path / "study.json")
-    assert valid_study(tmp_path / "study.json", TradeoffStudy) == (study, [])
+    assert valid_study(tmp_path / "study.json", SceneAnswer) == (study, [])
 
 
 def test_an_axis_to_infinity_comes_back(tmp_path: Path) -> None:

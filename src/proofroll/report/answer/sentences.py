@@ -7,10 +7,18 @@ import shlex
 from collections.abc import Iterator
 
 from proofroll.core.number_format import number
+from proofroll.core.plugins import parse_engine
 from proofroll.report.labels import engine_title, engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
 from proofroll.running.case import Status
-from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, StepAnswer, StepTried
+from proofroll.studies.answer.records import (
+    AllowedError,
+    EngineAnswer,
+    SceneAnswer,
+    SettingTried,
+    StepAnswer,
+    StepTried,
+)
 from proofroll.studies.answer.setting_search import State
 
 # State -> sign and short word.
@@ -24,6 +32,7 @@ SIGNS = {
     State.SILENT: ("◐", "not reported"),
     State.NOT_RUN: ("·", "not run"),
 }
+INSTALLED = "as installed"
 _QUANTITIES = {"p_WB": "body positions"}
 _PREFIXES = {-3: "m", -6: "µ", -9: "n"}
 
@@ -62,10 +71,45 @@ def quantity_words(name: str) -> str:
 
 
 def setting_words(item: EngineAnswer) -> str:
-    """Engine, formulation, preset and step of an answer for a reader; ``as installed`` is the preset ``default``."""
-    preset = "as installed" if item.preset == "default" else item.preset
-    words = engine_words(item.engine, item.formulation), preset, step(item.resolution or None, item.step)
-    return ", ".join(filter(None, words))
+    """Engine, formulation, settings in two words and step of an answer for a reader.
+
+    ``as installed`` is the preset ``default``; ``best`` the cheaper of ``matched`` and ``tuned`` that holds. Which
+    options these are, the lines for a model tell.
+    """
+    words = preset_words(item.preset), step(item.resolution or None, item.step)
+    return ", ".join(filter(None, (engine_words(item.engine, item.formulation), *words)))
+
+
+def preset_words(preset: str) -> str:
+    """Settings for a reader: ``as installed`` or ``best``; empty without a preset."""
+    return {"default": INSTALLED, "": ""}.get(preset, "best")
+
+
+def installed_words(item: EngineAnswer) -> str:
+    """Clause on the settings as installed beside the best ones; empty if the answer is of these, or none was tried.
+
+    The search leaves a setting that cannot be cheaper, so that a step of it that holds may not be confirmed.
+    """
+    if not item.holds or item.preset == "default":
+        return ""
+    tried = [setting for setting in item.settings if parse_engine(setting.spec).options.get("preset") == "default"]
+    held = [(setting, run) for setting in tried for run in setting.steps if run.holds and run.seconds_per_second]
+    if held:
+        setting, run = min(held, key=lambda pair: pair[1].seconds_per_second or math.inf)
+        return f"{INSTALLED}: {_at(item, setting, run)}: {speed(run.seconds_per_second)}"
+    failed = [(setting, run) for setting in tried for run in setting.steps if run.of_allowed is not None]
+    if failed:
+        setting, run = min(failed, key=lambda pair: pair[1].of_allowed or math.inf)
+        dearer = "dearer, " if setting.state is State.DEARER else ""
+        return f"{INSTALLED}: {dearer}{number(run.of_allowed)} times too far off at {_at(item, setting, run)}"
+    return f"{INSTALLED}: {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
+
+
+def _at(item: EngineAnswer, setting: SettingTried, run: StepTried) -> str:
+    """Formulation of a setting, unless the answer has the same, and the step of a run."""
+    formulation = str(parse_engine(setting.spec).options.get("formulation", ""))
+    words = "" if formulation == item.formulation else formulation.replace("_", " ")
+    return ", ".join(filter(None, (words, step(setting.resolution or None, run.step))))
 
 
 def brought_words(item: EngineAnswer) -> str:
@@ -82,7 +126,8 @@ def sentence(item: EngineAnswer, until: float) -> str:
     told += f" in {quantity_words(item.bound.quantity)} over {until:g} s"
     told += f"; not confirmed: {item.why}" if item.state is State.UNCONFIRMED else ""
     brought = f" ({brought_words(item)})" if item.brought else ""
-    return f"{setting_words(item)}{brought}: {told}."
+    installed = installed_words(item)
+    return f"{setting_words(item)}{brought}: {told}{f'; {installed}' if installed else ''}."
 
 
 def reason(item: EngineAnswer) -> str:
@@ -174,10 +219,25 @@ def answer_lines(made: SceneAnswer) -> Iterator[str]:
 
 def command_of(made: SceneAnswer, item: EngineAnswer) -> str:
     """Command that asks whether a setting holds the tolerance, with all that the answer was given."""
-    words = ["proofroll", "compare", made.scene, "--engine", item.spec, "--tolerance", made.tolerance]
+    return shlex.join(["proofroll", "compare", made.scene, "--engine", item.spec, *_given(made)])
+
+
+def plot_command(made: SceneAnswer) -> str:
+    """Command that draws error against cost, with all that the answer was given."""
+    return shlex.join(["proofroll", "recommend", made.scene, *_given(made), "--plot", "cost.svg"])
+
+
+def lines_command(made: StepAnswer, engine: str) -> str:
+    """Command that prints the lines of an engine's own model that hold the tolerance of an answer."""
+    return shlex.join(["proofroll", "recommend", made.scene, "--engine", engine, *_given(made), "--lines"])
+
+
+def _given(made: SceneAnswer | StepAnswer) -> list[str]:
+    """Words of a command that ask the question of an answer."""
+    words = ["--tolerance", made.tolerance]
     for name, value in made.parameters.items():
         words += ["--set", f"{name}={value!r}"]
-    return shlex.join([*words, "--until", f"{made.until!r}"])
+    return [*words, "--until", f"{made.until!r}"]
 
 
 def step_sentence(made: StepAnswer) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.comparison import Band, Row
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
 from proofroll.core.number_format import counted
+from proofroll.core.observable import Role
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import MERGED
 from proofroll.report.comparison.spread import Spread
@@ -201,6 +202,10 @@ class ReportedComparison:
     def section(self) -> str:
         """HTML id of its evidence in a page."""
         return section_id("evidence", self.name)
+
+    def is_residual(self, observable: str) -> bool:
+        """True if an observable is a residual, and not all that is judged are."""
+        return not self.laws_alone and self.observables[observable].role == Role.RESIDUAL
 
     def point_id(self, point: str) -> str:
         """HTML id of the evidence at a point."""

@@ -13,7 +13,7 @@ from proofroll.running.process import status_of
 from proofroll.running.timing import Interval, machine, ratio
 from proofroll.studies.ladder.ladder import Ladder, key_of
 from proofroll.studies.ladder.models import LadderModel, Need, Ran, Rung, Switch, need_of_term
-from proofroll.studies.tradeoff.pareto import front
+from proofroll.studies.pareto import front
 
 
 @dataclass(frozen=True)

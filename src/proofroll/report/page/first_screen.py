@@ -8,13 +8,21 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from proofroll.report.answer.sentences import brought_words, error_words, reason, setting_words, speed, tolerance_words
+from proofroll.report.answer.sentences import (
+    brought_words,
+    error_words,
+    installed_words,
+    reason,
+    setting_words,
+    speed,
+    tolerance_words,
+)
 from proofroll.report.kinds import group_words
 from proofroll.report.labels import engine_title, scene_words
 from proofroll.report.parts import Part, PartEntry, part_kinds
 from proofroll.report.pen import Disc, Lettering, Picture, Polyline
 from proofroll.studies.answer.records import EngineAnswer, SceneAnswer
-from proofroll.studies.answer.setting_search import State
+from proofroll.studies.answer.setting_search import BRIEF, State
 
 if TYPE_CHECKING:
     from proofroll.report.page.records import ReportContent
@@ -23,10 +31,10 @@ if TYPE_CHECKING:
 FASTEST = 3000.0
 # Looks of marks that a small picture leaves out: arrows of gravity and of forces.
 _NOT_SMALL = ("force", "force-head", "axis")
-_STATES = ("holds", "finer", "elsewhere", "cannot", "open")
+_STATES = ("holds", "unsure", "finer", "elsewhere", "cannot", "open")
 _LOOKS = {
     State.HOLDS: "holds",
-    State.UNCONFIRMED: "holds",
+    State.UNCONFIRMED: "unsure",
     State.FINER: "finer",
     State.ELSEWHERE: "elsewhere",
     State.REFUSED: "cannot",
@@ -145,10 +153,9 @@ class ReportedAnswer:
 
     @property
     def words(self) -> str:
-        """Scene, or the comparison of it that has another name, for a reader."""
-        return (
-            scene_words(self.answer.scene).lower() if self.study == self.answer.scene else self.study.replace("_", " ")
-        )
+        """Scene, with the comparison of it if that has another name, for a reader."""
+        scene, study = scene_words(self.answer.scene).lower(), self.study.replace("_", " ")
+        return scene if self.study == self.answer.scene else f"{scene} ({study})"
 
 
 def how(item: EngineAnswer) -> str:
@@ -158,14 +165,21 @@ def how(item: EngineAnswer) -> str:
         return f"{setting_words(item)}: {told}" if item.spec and told else told
     error = error_words(item.bound, item.error) if item.bound is not None and item.error is not None else ""
     name = setting_words(item).removeprefix(f"{engine_title(item.engine)} ")
-    return "; ".join(filter(None, (name, error, brought_words(item))))
+    unsure = f"not confirmed: {item.why}" if item.state is State.UNCONFIRMED else ""
+    return "; ".join(filter(None, (name, error, brought_words(item), unsure, installed_words(item))))
+
+
+def caps_words() -> str:
+    """Sentences on what a report's searches are asked, and how to ask for more."""
+    limits = f"at most {BRIEF.run:g} s of processor time a run and {BRIEF.engine:g} s an engine"
+    return f"Searched once for each scene of a kind, {limits}; proofroll recommend SCENE searches longer."
 
 
 def figure_of(item: EngineAnswer) -> str:
-    """Speed of an engine that holds, or its state in a word."""
+    """Speed of an engine that holds, with ○ if that is not confirmed; or its state in a word."""
     if not item.holds:
         return f"· {item.state}" if item.state is not State.FINER else "· finer not run"
-    return f"{speed(item.seconds_per_second)}{' · not confirmed' if item.state is State.UNCONFIRMED else ''}"
+    return f"{'○ ' if item.state is State.UNCONFIRMED else ''}{speed(item.seconds_per_second)}"
 
 
 def bar(item: EngineAnswer) -> int:

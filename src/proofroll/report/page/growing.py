@@ -11,9 +11,8 @@ from proofroll.files.json_data import plain
 from proofroll.report.changes import EarlierReport, against
 from proofroll.report.comparison.plots import PointCurves, point_curves
 from proofroll.report.kinds import kind_of
-from proofroll.report.long_table import LongTable, TableLine
 from proofroll.report.page.first_screen import ReportedAnswer
-from proofroll.report.page.html import page
+from proofroll.report.page.html import page, studies_page
 from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.parts import Part, PartEntry, absent, attempt
 from proofroll.report.replay.records import Replay
@@ -43,23 +42,23 @@ class Report:
     pictures: dict[str, str] = field(default_factory=dict)
     earlier: EarlierReport | None = None
     answers: list[ReportedAnswer] = field(default_factory=list)
-    _made: dict[int, tuple[Part, PartEntry, Sequence[TableLine]]] = field(default_factory=dict)
+    _made: dict[int, tuple[Part, PartEntry]] = field(default_factory=dict)
 
     @cached_property
     def content(self) -> ReportContent:
         """Content of the report, with the further studies that have an entry so far; made anew after each."""
         made = [self._made[id(part)] for part in self.parts if id(part) in self._made]
-        entries = {key: [entry for part, entry, _ in made if part.key == key] for key in self.compared.entries}
+        entries = {key: [entry for part, entry in made if part.key == key] for key in self.compared.entries}
         environment = self.compared.environment
-        for _, entry, _ in made:
+        for _, entry in made:
             if isinstance(entry.study, dict):  # a stored study was made with the present versions
                 environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
-        table = LongTable([*self.compared.table.lines, *(line for *_, lines in made for line in lines)])
         answered = replace(self.compared, answers=[*self.answers])
-        content = replace(answered, entries=entries, environment=environment, table=table).summarised
+        content = replace(answered, entries=entries, environment=environment).summarised
         if self.earlier is None:
             return content
-        return replace(content, against=against(self.earlier, table.lines, environment.machine, environment.versions))
+        lines, machine = content.table.lines, environment.machine
+        return replace(content, against=against(self.earlier, lines, machine, environment.versions))
 
     def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
         """Lists further studies with their stored results under ``out``, which are ignored if ``fresh``.
@@ -94,7 +93,7 @@ class Report:
         self._put(part, absent(part, reason))
 
     def write(self, out: Path) -> None:
-        """Writes ``report.html``, ``report.json`` and ``report.csv``.
+        """Writes ``report.html``, ``report.json`` and ``report.csv``; ``studies.html`` if there are further studies.
 
         Raises:
             ProofrollError: the folder cannot be written.
@@ -108,10 +107,12 @@ class Report:
         text = json.dumps(content_json, indent=1, allow_nan=False).removesuffix("\n}")
         write_text(out / "report.json", f'{text},\n "table": {head}, "data": [{rows}]}}\n}}\n')
         write_text(out / "report.csv", content.table.csv)
-        write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
+        if content.further:
+            write_text(out / "studies.html", studies_page(content, self.pictures))
+        write_text(out / "report.html", page(content, self.curves, self.replay))
 
     def _put(self, part: Part, entry: PartEntry) -> None:
-        self._made[id(part)] = part, entry, () if entry.study is None else part.lines()
+        self._made[id(part)] = part, entry
         self.__dict__.pop("content", None)
         if entry.study is not None:
             alike = [id(rival) for rival in self.parts if rival.key == part.key]

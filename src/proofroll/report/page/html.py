@@ -9,13 +9,12 @@ import shlex
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from proofroll.core import number_format
 from proofroll.files.json_data import plain
 from proofroll.report import labels
-from proofroll.report.answer import sentences
+from proofroll.report.answer import picture, sentences
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
@@ -23,8 +22,7 @@ from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page import first_screen, model_lines, verdict_strips
 from proofroll.report.pages import environment, folded, packed, rendered, slug
 from proofroll.report.parts import Part, part_kinds
-from proofroll.report.styles import OUTLINES, styles
-from proofroll.report.tradeoff.tables import FIRST_TOLERANCE
+from proofroll.report.styles import OUTLINES, engine_colours, styles
 from proofroll.running.case import host_sentences
 
 if TYPE_CHECKING:
@@ -36,13 +34,22 @@ if TYPE_CHECKING:
     from proofroll.report.replay.records import Replay
 
 
-def page(
-    content: ReportContent,
-    curves: Sequence[Sequence[PointCurves]],
-    pictures: Mapping[str, str] = MappingProxyType({}),
-    replay: Replay | None = None,
-) -> str:
-    """HTML page from content, curves of each comparison, markup of further pictures by name, and the replay if any."""
+def studies_page(content: ReportContent, pictures: Mapping[str, str]) -> str:
+    """HTML page of the further studies, from a report's content and markup of their pictures by name."""
+    screen = first_screen.FirstScreen(content)
+    whole = rendered(
+        templates(),
+        "studies_page.html",
+        content=content,
+        pictures=pictures,
+        screen=screen,
+        datatables=_datatables(),
+    )
+    return folded(whole)
+
+
+def page(content: ReportContent, curves: Sequence[Sequence[PointCurves]], replay: Replay | None = None) -> str:
+    """HTML page from content, curves of each comparison, and the replay if any."""
     drawn = {
         "engines": content.engines,
         "titles": {name: labels.engine_title(name) for name in content.engines},
@@ -54,13 +61,11 @@ def page(
         "page.html",
         content=content,
         curves=curves,
-        pictures=pictures,
         screen=first_screen.FirstScreen(content),
         styles=[styles(comparison.rows, content.engines) for comparison in content.comparisons],
         replay=replay,
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
         data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":")).encode()),
-        plotly=_plotly(),
         datatables=_datatables(),
     )
     return folded(whole)
@@ -70,14 +75,6 @@ def _marked(comparison: ReportedComparison, curves: Sequence[PointCurves]) -> Se
     """Curves with the marks of the scene's kind of element."""
     kind = report_kinds().get(comparison.shown_by)
     return curves if kind is None else kind.mark(comparison, curves)
-
-
-@functools.cache
-def _plotly() -> str:
-    """Source of plotly.js, compressed."""
-    import plotly.offline
-
-    return packed(plotly.offline.get_plotlyjs().encode())
 
 
 @functools.cache
@@ -131,9 +128,10 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
         "outlines": OUTLINES,
-        "first_tolerance": FIRST_TOLERANCE,
         "first_screen": first_screen,
         "answer_words": sentences,
+        "answer_picture": picture.svg,
+        "colours_of": engine_colours,
         "model_lines": model_lines,
         "loop_key": slug,
         "scene_words": labels.scene_words,

@@ -90,8 +90,8 @@ class KnownFinding:
 
 
 # Of report.json: 2 has no lines of records in its table; 3 has what a file claims, costs and causes in its own
-# words; 4 has answers from searches.
-FORMAT = 4
+# words; 4 has answers from searches; 5 has no trade-offs.
+FORMAT = 5
 
 
 @dataclass(frozen=True)

@@ -140,7 +140,7 @@ def silent_lines(study: StabilityStudy) -> Iterator[str]:
         if side.largest is not None:
             beyond = f"just beyond {step(point.resolution, side.largest)}"
         elif point.cut:
-            beyond = f"down to {finest}, finer ones have too many steps"
+            beyond = f"down to {finest}, finer ones take too long"
         else:
             beyond = f"at every {'step' if point.resolution == 'dt' else 'tolerance'} down to {finest}"
         place = f"{with_caveat(name_of(point), family_and_caveat(point))} at {point.axis} = {point.value:g}"

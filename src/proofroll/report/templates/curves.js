@@ -1,12 +1,11 @@
-// Data of one figure for plotly. Above: the curves. Below: their distances from the truth on a logarithmic axis, with
+// Data of one figure. Above: the curves. Below: their distances from the truth on a logarithmic axis, with
 // the truth's error bar, the tolerances, and at the left the limits of small steps with their error bars.
 // A figure is described by { rows, time, observable, off, paint }: `off` holds the rows that are switched off, `paint` gives
 // the colour of a name.
 const picture = (() => {
-  // plotly interprets a few HTML tags and %{…} in names; escape them.
   const LIMITS = 0.14;  // part of the width for the limits of small steps
-  const literal = (text) => String(text).replace(/[&<>{}]/g, (sign) => `&#${sign.charCodeAt(0)};`);
-  const unit = ({ observable }) => (observable.unit ? ` ${literal(observable.unit)}` : "");
+  const unit = ({ observable }) => (observable.unit ? ` ${observable.unit}` : "");
+  const digits = (value) => String(Number(value.toPrecision(4)));
   const short = (value) => (value === null ? "∞" : String(Number(value.toPrecision(3))));
   const limited = ({ observable }) => observable.engines.filter(({ limit }) => limit && limit[0] !== null && limit[1] !== null && limit[0] + limit[1] > 0);
 
@@ -15,7 +14,7 @@ const picture = (() => {
 
   function traces(figure) {
     const { rows, time, observable, off, paint } = figure;
-    const label = (name, what) => `<b>${literal(name)}</b><br>t = %{x:.4g} s<br>${what} %{y:.4g}${unit(figure)}<extra></extra>`;
+    const label = (name, what) => (x, y) => [name, `t = ${digits(x)} s`, `${what} ${digits(y)}${unit(figure)}`];
     const above = [], below = [];
     for (const { row, difference, at } of observable.engines) {
       const { name, colour, dash, width, opacity, symbol } = rows[row];
@@ -27,12 +26,12 @@ const picture = (() => {
         line: { color: paint(`--e${colour}`), dash, width }, marker: { symbol, size: 6, maxdisplayed: 9, color: paint(`--e${colour}`) },
       };
       const sum = (i, k) => (difference[k] === null ? null : observable.truth[i] + difference[k]);
-      above.push({ ...shared, mode: apart ? "lines+markers" : "lines", y: where.map(sum), hovertemplate: label(name, literal(observable.symbol) + " =") });
-      below.push({ ...shared, yaxis: "y2", y: difference.map((d) => (d ? Math.abs(d) : null)), hovertemplate: label(name, "distance") });
+      above.push({ ...shared, mode: apart ? "lines+markers" : "lines", y: where.map(sum), told: label(name, `${observable.symbol} =`) });
+      below.push({ ...shared, yaxis: "y2", y: difference.map((d) => (d ? Math.abs(d) : null)), told: label(name, "distance") });
     }
     const truth = {
       type: "scatter", mode: "lines", x: time, y: observable.truth, meta: -1, line: { color: paint("--truth"), width: 6 },
-      hovertemplate: label("truth", literal(observable.symbol) + " ="),
+      told: label("truth", `${observable.symbol} =`),
     };
     const all = [truth, ...above, ...below, ...tolerances(figure), ...limits(figure), ...marks(figure)];
     return all.map((trace) => ({ ...trace, visible: visible(trace.meta, off) }));
@@ -43,8 +42,8 @@ const picture = (() => {
     const { rows, time, observable, paint } = figure;
     return [...shared(observable)].map(([value, having]) => ({
       type: "scatter", mode: "lines", yaxis: "y2", x: [time[0], time[time.length - 1]], y: [value, value], meta: having,
-      line: { color: having.length > 1 ? paint("--ink") : paint(`--e${rows[having[0]].colour}`), width: 1, dash: "6px,3px" },
-      hovertemplate: `<b>tolerance</b> ${short(value)}${unit(figure)}<br>${having.map((row) => literal(rows[row].name)).join("<br>")}<extra></extra>`,
+      line: { color: having.length > 1 ? paint("--ink") : paint(`--e${rows[having[0]].colour}`), width: 1, dash: "dash" },
+      told: () => [`tolerance ${short(value)}${unit(figure)}`, ...having.map((row) => rows[row].name)],
     }));
   }
 
@@ -63,8 +62,7 @@ const picture = (() => {
       return {
         type: "scatter", mode: "markers", xaxis: "x2", yaxis: "y2", x: [place], y: [y], meta: row, opacity, marker: { symbol, size: 6, color },
         error_y: { type: "data", symmetric: false, array: [error + bar - y], arrayminus: [y - Math.max(error - bar, 1e-30)], color, thickness: 1.2, width: 2 },
-        hovertemplate: `<b>${literal(name)}</b><br>limit of small steps: distance ${short(error)} ± ${short(bar)}${unit(figure)}` +
-          `${order === null ? "" : `<br>observed order ${short(order)}`}<extra></extra>`,
+        told: () => [name, `limit of small steps: distance ${short(error)} ± ${short(bar)}${unit(figure)}`, ...(order === null ? [] : [`observed order ${short(order)}`])],
       };
     });
   }
@@ -76,11 +74,11 @@ const picture = (() => {
       marker: row < 0
         ? { symbol: "diamond", size: 12, color: paint("--truth") }
         : { symbol: "circle-open", size: 9, color: paint(`--e${rows[row].colour}`), line: { width: rows[row].width } },
-      hovertemplate: `<b>${literal(row < 0 ? "truth" : rows[row].name)}</b><br>${event} at %{x:.7g} s<extra></extra>`,
+      told: (x) => [row < 0 ? "truth" : rows[row].name, `${event} at ${Number(x.toPrecision(7))} s`],
     }));
   }
 
-  // The frame follows the truth: an engine that flies off must not flatten it. Double-click shows everything.
+  // The frame follows the truth: an engine that flies off must not flatten it.
   function frame({ truth, scale, bounds }) {
     const known = [...truth, ...(bounds ?? []).map(({ value }) => value)].filter((v) => v !== null);
     const low = Math.min(...known), high = Math.max(...known);
@@ -102,16 +100,16 @@ const picture = (() => {
     return [Math.log10(Math.max(least, Math.min(...ends))) - 0.2, Math.log10(Math.max(...ends)) + 0.3];
   }
 
-  // Letters beside lines; on a logarithmic axis plotly wants the logarithm of their height.
+  // Letters beside lines.
   function names(figure) {
     const { observable, paint } = figure, said = [...shared(observable)];
-    const text = { showarrow: false, font: { size: 11 } };
+    const text = { font: { size: 11 } };
     const bounds = (observable.bounds ?? []).map(({ name, value }) => ({
-      ...text, xref: "x domain", x: 1, yref: "y", y: value, xanchor: "right", yanchor: "bottom", text: `${literal(name)} = ${value}`,
+      ...text, xref: "x domain", x: 1, yref: "y", y: value, xanchor: "right", yanchor: "bottom", text: `${name} = ${value}`,
     }));
-    const small = { ...text, xref: "x domain", x: 0, yref: "y2", xanchor: "left", yanchor: "bottom", font: { size: 10, color: paint("--muted") }, bgcolor: paint("--paper"), opacity: 0.85, borderpad: 0 };
-    if (said.length === 1) bounds.push({ ...small, y: Math.log10(said[0][0]), text: `tolerance ${short(said[0][0])}` });
-    if (observable.error_bar) bounds.push({ ...small, y: Math.log10(observable.error_bar), text: `truth ±${short(observable.error_bar)}` });
+    const small = { ...text, xref: "x domain", x: 0, yref: "y2", xanchor: "left", yanchor: "bottom", font: { size: 10, color: paint("--muted") } };
+    if (said.length === 1) bounds.push({ ...small, y: said[0][0], text: `tolerance ${short(said[0][0])}` });
+    if (observable.error_bar) bounds.push({ ...small, y: observable.error_bar, text: `truth ±${short(observable.error_bar)}` });
     return bounds;
   }
 
@@ -127,22 +125,19 @@ const picture = (() => {
 
   function layout(figure, size) {
     const { observable, paint } = figure, log = decades(figure), count = limited(figure).length;
-    const axis = { gridcolor: paint("--rule"), linecolor: paint("--rule"), zeroline: false, ticks: "", automargin: true };
-    const title = (text) => ({ text, standoff: 6 }), inside = observable.unit ? ` [${literal(observable.unit)}]` : "";
+    const axis = { gridcolor: paint("--rule") }, title = (text) => ({ text }), inside = observable.unit ? ` [${observable.unit}]` : "";
     return {
-      ...size, margin: { l: 64, r: figure.room, t: 8, b: 40 }, showlegend: false, hovermode: "closest",
-      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",
+      ...size, margin: { l: 64, r: figure.room, t: 8, b: 40 },
       font: { family: paint("--sans"), size: 12, color: paint("--ink") },
-      hoverlabel: { bgcolor: paint("--paper"), bordercolor: paint("--muted"), font: { color: paint("--ink") }, align: "left" },
-      xaxis: { ...axis, anchor: "y2", domain: [count ? LIMITS + 0.13 : 0, 1], range: span(figure), title: title("time [s]") },
-      yaxis: { ...axis, domain: [0.5, 1], range: frame(observable), title: title(literal(observable.symbol) + inside) },
+      hoverlabel: { bgcolor: paint("--paper"), bordercolor: paint("--muted"), font: { color: paint("--ink") } },
+      xaxis: { ...axis, domain: [count ? LIMITS + 0.13 : 0, 1], range: span(figure), title: title("time [s]") },
+      yaxis: { ...axis, domain: [0.5, 1], range: frame(observable), title: title(observable.symbol + inside) },
       yaxis2: {
-        ...axis, ...(count && { anchor: "x2" }), domain: [0, 0.44], type: "log", range: log, exponentformat: "power", dtick: Math.max(1, Math.ceil((log[1] - log[0]) / 5)),
+        ...axis, domain: [0, 0.44], type: "log", range: log, dtick: Math.max(1, Math.ceil((log[1] - log[0]) / 5)),
         title: title("distance" + inside),
       },
       ...(count && { xaxis2: {
-        anchor: "y2", domain: [0, LIMITS], range: [-0.8, count - 0.2], fixedrange: true, showgrid: false, showticklabels: false, zeroline: false,
-        showline: true, linecolor: paint("--rule"), title: { text: "limit", standoff: 22 },
+        domain: [0, LIMITS], range: [-0.8, count - 0.2], title: title("limit"),
       } }),
       annotations: names(figure), shapes: shapes(figure, log[0]),
     };
@@ -150,5 +145,5 @@ const picture = (() => {
 
   const span = ({ time }) => [time[0], time[time.length - 1]];
 
-  return { traces, layout, visible, span, literal };
+  return { traces, layout, visible, span };
 })();

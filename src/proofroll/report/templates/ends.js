@@ -42,7 +42,7 @@ const ends = (() => {
 
   // Annotations of a figure with a layout and a height [px]; none where there is no room.
   function labels(figure, layout, height) {
-    const { literal } = picture, { paint } = figure, { margin } = layout;
+    const { paint } = figure, { margin } = layout;
     if (margin.r < ROOM) return [];
     return [["yaxis", "y domain", false], ["yaxis2", "y2 domain", true]].flatMap(([name, ref, lower]) => {
       const { range: [low, high], domain } = layout[name], until = layout.xaxis.range[1] * (1 + 1e-9);
@@ -54,9 +54,9 @@ const ends = (() => {
       return apart(items).map(({ items: group, y }) => {
         const first = group.find(({ name: word }) => word === "truth") ?? group[0], more = group.length > 1 ? ` +${group.length - 1}` : "";
         return {
-          xref: "x domain", x: 1, xanchor: "left", xshift: 4, yref: ref, y: 1 - y / length, yanchor: "middle", showarrow: false, align: "left", name: NAME,
-          text: `<span style="color:${paint(first.tone)}">●</span> ${first.beyond}${literal(cut(first.name, LONGEST - more.length - first.beyond.length))}${more}`,
-          font: { size: 10, color: paint("--ink") }, hovertext: group.map(({ whole, name: word }) => literal(whole ?? word)).join("<br>"),
+          xref: "x domain", x: 1, xanchor: "left", xshift: 4, yref: ref, y: 1 - y / length, yanchor: "middle", name: NAME, tone: paint(first.tone),
+          text: `${first.beyond}${cut(first.name, LONGEST - more.length - first.beyond.length)}${more}`,
+          font: { size: 10, color: paint("--ink") }, hovertext: group.map(({ whole, name: word }) => whole ?? word).join("\n"),
         };
       });
     });

@@ -1,6 +1,6 @@
 // Figures: drawn when they come into view, linked within a section, switched by the legend, repainted and printed.
 const plots = (() => {
-  const drawn = new Map();     // figure -> its plotly element
+  const drawn = new Map();     // figure -> its element
   const hidden = new Map();    // comparison -> rows that are switched off
   const cursors = new Map();   // section's figures -> the sample that the keyboard is at
   const PRINTED = { width: 430, height: 380 };  // of half a page; see the style for print
@@ -13,16 +13,8 @@ const plots = (() => {
 
   const paint = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-  async function plotly() {
-    const script = document.createElement("script");
-    script.textContent = await stored("plotly");
-    document.head.append(script);
-    return window.Plotly;
-  }
-
   async function load() {
-    const [text, Plotly] = await Promise.all([stored("curves"), plotly()]);
-    return (parts = { data: JSON.parse(text), Plotly });
+    return (parts = { data: JSON.parse(await stored("curves")) });
   }
 
   function shown(figure) {
@@ -30,32 +22,39 @@ const plots = (() => {
     return { rows: parts.data.rows[c], time: point.time, observable: point.observables[o], off: off(Number(c)), paint, room: paper.contains("paper") ? 8 : ends.room(canvas(figure).clientWidth) };
   }
 
-  const size = (figure) => (paper.contains("paper") ? PRINTED : { height: canvas(figure).clientHeight });
+  const size = (figure) => (paper.contains("paper") ? PRINTED : {});
 
   function place(figure) {
     if (drawn.has(figure)) return;
     const element = canvas(figure), what = shown(figure);
     drawn.set(figure, element);
-    parts.Plotly.newPlot(element, picture.traces(what), named(figure, what, picture.layout(what, size(figure))), { displayModeBar: false, responsive: true, doubleClick: "reset+autosize" });
-    element.on("plotly_relayout", (change) => {
-      linkTime(figure, change);
-      if (Object.keys(change).some((key) => /^(autosize|[xy]axis)/.test(key))) name(figure);
-    });
-    element.on("plotly_hover", (event) => { if (figure.matches(":hover")) linkHover(figure, event.points[0].x); });
-    element.on("plotly_unhover", () => { if (!siblings(figure).some((other) => other.matches(":hover"))) linkHover(figure, null); });
+    put(figure, picture.traces(what), picture.layout(what, size(figure)));
+    element.addEventListener("zoom", ({ detail: range }) => [figure, ...siblings(figure)].forEach((other) => zoomTo(other, range)));
+    element.addEventListener("point", ({ detail: x }) => linkHover(figure, x));
+    element.addEventListener("resized", () => { if (element.clientWidth !== element.places.width && !paper.contains("paper")) name(figure); });
   }
 
   // A layout with names at the ends of the curves, beside the names of lines.
   function named(figure, what, layout) {
     const lines = layout.annotations.filter(({ name }) => name !== ends.NAME);
-    return { ...layout, annotations: [...lines, ...ends.labels(what, layout, layout.height)] };
+    return { ...layout, annotations: [...lines, ...ends.labels(what, layout, layout.height ?? canvas(figure).clientHeight)] };
   }
 
-  // Names as the curves end now, also of other traces. Plotly's `react` tells nobody of a zoom, as `relayout` would.
+  function put(figure, traces, layout) {
+    const what = shown(figure);
+    chart.draw(drawn.get(figure), traces, named(figure, what, layout), picture.span(what));
+  }
+
+  // Names as the curves end now, also of other traces.
   function name(figure, traces = drawn.get(figure).data) {
-    const element = drawn.get(figure), what = shown(figure), layout = { ...element.layout, ...size(figure) };
-    layout.margin = { ...layout.margin, r: what.room };
-    parts.Plotly.react(element, traces, named(figure, what, layout));
+    const { layout } = drawn.get(figure), { width, height, ...rest } = layout;
+    put(figure, traces, { ...rest, ...size(figure), margin: { ...layout.margin, r: shown(figure).room } });
+  }
+
+  function zoomTo(figure, range) {
+    const element = drawn.get(figure);
+    element.layout = { ...element.layout, xaxis: { ...element.layout.xaxis, range: [...range] } };
+    name(figure);
   }
 
   const ready = () => (loading ??= load());
@@ -69,18 +68,7 @@ const plots = (() => {
     for (const [figure, element] of drawn) {
       const what = shown(figure), layout = picture.layout(what, size(figure)), before = element.layout.xaxis;
       layout.xaxis.range = [...before.range];  // a person's zoom stays
-      parts.Plotly.react(element, picture.traces(what), named(figure, what, layout));
-    }
-  }
-
-  // plotly reports changes by this program like those of a reader, and late: pass on only real changes.
-  function linkTime(figure, change) {
-    const range = change["xaxis.range"] ?? (change["xaxis.range[0]"] === undefined ? null : [change["xaxis.range[0]"], change["xaxis.range[1]"]]);
-    if (range === null && !change["xaxis.autorange"]) return;
-    for (const other of siblings(figure)) {
-      const axis = drawn.get(other).layout.xaxis;
-      if (range === null ? axis.autorange === true : !axis.autorange && axis.range.every((end, i) => end === range[i])) continue;
-      parts.Plotly.relayout(drawn.get(other), range === null ? { "xaxis.autorange": true } : { "xaxis.range": [...range], "xaxis.autorange": false });
+      put(figure, picture.traces(what), layout);
     }
   }
 
@@ -93,8 +81,8 @@ const plots = (() => {
   // The truth's value at the same time, in every other figure of the section.
   function linkHover(figure, x) {
     for (const other of siblings(figure)) {
-      if (x === null) parts.Plotly.Fx.unhover(drawn.get(other));
-      else parts.Plotly.Fx.hover(drawn.get(other), [{ curveNumber: 0, pointNumber: nearest(shown(other).time, x) }]);
+      if (x === null) chart.hover(drawn.get(other));
+      else chart.hover(drawn.get(other), 0, nearest(shown(other).time, x));
     }
   }
 
@@ -107,16 +95,16 @@ const plots = (() => {
     if (event.key in JUMPS) {
       const sample = Math.min(Math.max(at + JUMPS[event.key], 0), time.length - 1);
       cursors.set(group, sample);
-      parts.Plotly.Fx.hover(element, [{ curveNumber: 0, pointNumber: sample }]);
+      chart.hover(element, 0, sample);
       linkHover(figure, time[sample]);
       read(figure, sample);
     } else if (event.key === "+" || event.key === "-") {
       const [low, high] = element.layout.xaxis.range, half = (high - low) * (event.key === "+" ? 0.25 : 1);
-      parts.Plotly.relayout(element, { "xaxis.range": [time[at] - half, time[at] + half] });
+      chart.zoom(element, [time[at] - half, time[at] + half]);
     } else if (event.key === "0") {
-      parts.Plotly.relayout(element, { "xaxis.range": picture.span(shown(figure)) });
+      chart.zoom(element, picture.span(shown(figure)));
     } else if (event.key === "Escape") {
-      parts.Plotly.Fx.unhover(element);
+      chart.hover(element);
       linkHover(figure, null);
     } else return;
     event.preventDefault();
@@ -160,7 +148,7 @@ const plots = (() => {
     [...hidden.keys()].forEach(show);
   });
 
-  // After the first figure the library is loaded, so that all others can be drawn before the page is printed.
+  // After the first figure the curves are unpacked, so that all others can be drawn before the page is printed.
   addEventListener("beforeprint", () => {
     paper.add("paper");
     if (!parts) return;

@@ -49,7 +49,7 @@ const address = (() => {
 const folds = (() => {
   const button = document.getElementById("unfold");
   const place = (number) => document.querySelector(`[data-fold="${number}"]`);
-  let texts = null;
+  let texts = null, atFirst = new Set();
   const ready = async () => (texts ??= JSON.parse(await stored("folds")));
 
   function build(empty) {
@@ -57,9 +57,6 @@ const folds = (() => {
     made.innerHTML = texts[empty.dataset.fold];
     empty.replaceWith(made.content);
     fold.dispatchEvent(new Event("built", { bubbles: true }));
-  }
-  function every(which) {
-    for (let empty = document.querySelector(which); empty; empty = document.querySelector(which)) build(empty);
   }
   // The element with an id; builds the folds around it first.
   async function find(id) {
@@ -77,26 +74,46 @@ const folds = (() => {
     await ready();
     if (empty()) build(empty());
   }, true);
-  function open() {
-    every("[data-fold]");
-    document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
+  // Builds and opens every fold, some at a time where a reader waits, so that the page answers meanwhile.
+  function* opening() {
+    for (let folds = [...document.querySelectorAll("details")]; folds.length;) {
+      const made = [];
+      for (const fold of folds) {
+        const empty = fold.querySelector(":scope > [data-fold]");
+        if (empty) {
+          build(empty);
+          made.push(...fold.querySelectorAll("details"));
+        }
+        fold.open = true;
+        yield;
+      }
+      folds = made;
+    }
   }
+  function open() { for (const _ of opening()); }
   const all = () => ready().then(open);
-  // Opens what is in sight, the rest when it is scrolled to or printed: all at once would take a browser seconds.
-  let watch = null;
-  const follow = (part) => part.querySelectorAll("details:not([open])").forEach((fold) => watch.observe(fold));
+  // Opens every fold, or closes those that were closed at first.
+  async function openSlowly() {
+    const steps = opening(), pause = () => new Promise((go) => { setTimeout(go); });
+    for (let begun = performance.now(); !steps.next().done;) {
+      if (performance.now() - begun < 40) continue;
+      await pause();
+      begun = performance.now();
+    }
+  }
   button.addEventListener("click", async () => {
-    await ready();
-    watch ??= new IntersectionObserver((entries) => entries.filter((entry) => entry.isIntersecting).forEach(({ target }) => {
-      watch.unobserve(target);
-      target.open = true;
-    }), { rootMargin: "50%" });
-    follow(document);
-    button.setAttribute("aria-pressed", "true");
+    const isOpening = button.getAttribute("aria-pressed") === "false";
+    button.disabled = true;
+    if (isOpening) {
+      atFirst = new Set(document.querySelectorAll("details[open]"));
+      button.textContent = "Opening all …";
+      await ready();
+      await openSlowly();
+    } else document.querySelectorAll("details").forEach((fold) => { fold.open = atFirst.has(fold); });
+    button.setAttribute("aria-pressed", String(isOpening));
+    button.textContent = isOpening ? "Close all" : "Open all";
+    button.disabled = false;
   });
-  document.addEventListener("built", ({ target }) => { if (watch) follow(target); });
-  // Print shows what is open; all of it after "Open all".
-  addEventListener("beforeprint", () => { if (watch) open(); });
   addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(ready));
   // What a reader opened is in the address: folds of the class "kept".
   const opened = () => [...document.querySelectorAll("details.kept[open]")];

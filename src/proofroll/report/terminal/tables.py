@@ -18,8 +18,17 @@ if TYPE_CHECKING:
 
     from proofroll.report.comparison.records import ReportedComparison
     from proofroll.report.page.records import ReportContent
+    from proofroll.running.profile import ProcessorProfile
 
 _FINE = (Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE)
+
+
+def profile_lines(profile: ProcessorProfile) -> Iterator[str]:
+    """Processor-seconds of a report by phase, and those of its cases by activity, the longest first."""
+    yield f"processor-seconds: {profile.total:.0f}"
+    for title, seconds in (("by phase", profile.phases), ("in cases", profile.activities)):
+        longest = sorted(seconds.items(), key=lambda item: -item[1])
+        yield f"{title}: {', '.join(f'{name} {value:.1f}' for name, value in longest)}"
 
 
 def report_lines(content: ReportContent, out: Path) -> Iterator[str]:

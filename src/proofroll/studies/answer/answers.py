@@ -15,6 +15,7 @@ from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status
 from proofroll.running.engine_questions import resolve_with_truth
 from proofroll.running.process import processor_seconds
+from proofroll.running.profile import TIMING
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import time_in_rounds
@@ -36,16 +37,16 @@ from proofroll.studies.answer.search import (
     searching,
     settings_of,
 )
-from proofroll.studies.answer.setting_search import RUN_CAP, SettingSearch, State
+from proofroll.studies.answer.setting_search import WHOLE, SearchCaps, SettingSearch, State
 from proofroll.studies.judging.asked_tolerance import AskedTolerance, orientations_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.study_store import conditions_now, keep_study, valid_study
-from proofroll.studies.tradeoff.curve import Curve
+from proofroll.studies.swept_settings import Curve
 
 # Speeds of the cheapest and of all within this factor of it are measured again, one at a time.
 _NEAR = 3.0
 # Rounds and length of such a measurement [s]; a slower run is measured once.
-_ROUNDS, _SECONDS, _ONCE = 2, 0.1, 0.3
+_ROUNDS, _SECONDS, _ONCE = 2, 0.05, 0.1
 
 Tell = Callable[[EngineAnswer], None]
 _Answer = TypeVar("_Answer")
@@ -59,6 +60,7 @@ def answer(
     begins: Callable[[Sequence[str]], None] = lambda _: None,
     tell: Tell = lambda _: None,
     ran: Callable[[str], None] = lambda _: None,
+    caps: SearchCaps = WHOLE,
 ) -> list[SceneAnswer]:
     """Answers for several tolerances, one after another: what was run for one is not run again for the next.
 
@@ -70,6 +72,7 @@ def answer(
         begins: called with the names of the engines before the first run.
         tell: called with the answer of an engine as soon as its search has ended.
         ran: called with the name of an engine after each of its runs.
+        caps: processor time of a run, and of the search of an engine [s].
 
     Raises:
         InputError: an unknown engine or setting.
@@ -83,7 +86,7 @@ def answer(
     answers = []
     for tolerance in asked:
         spent = processor_seconds() - begin
-        answers.append(_answered(question, tolerance, curves, absent, abreast, tell, spent))
+        answers.append(_answered(question, tolerance, curves, absent, abreast, tell, spent, caps))
         begin = processor_seconds()
     return answers
 
@@ -96,6 +99,7 @@ def _answered(
     abreast: SearchesAbreast,
     tell: Tell,
     spent: float,
+    caps: SearchCaps,
 ) -> SceneAnswer:
     """Answer for one tolerance; ``spent``: processor time before it that counts as its own [s]."""
     begin = processor_seconds() - spent
@@ -104,7 +108,7 @@ def _answered(
     unanswerable = unanswerable_because(bounds, reference)
     allowed = {bound.quantity: bound.allowed for bound in bounds}
     sizes = {bound.quantity: bound.size or bound.allowed for bound in bounds}
-    searches = [] if unanswerable else settings_of(question, curves, allowed, sizes)
+    searches = [] if unanswerable else settings_of(question, curves, allowed, sizes, caps)
     lacking = [EngineSearch(engine=name, settings=[], cannot=why) for name, why in absent.items()]
     generators = [searching(search, question) for search in searches]
     abreast.run(generators, lambda number: tell(engine_answer(searches[number], bounds)))
@@ -168,9 +172,9 @@ def _speeds(searches: Sequence[EngineSearch], question: AnswerQuestion, runner: 
     least = min(run.cost for _, run in chosen.values())
     near = {spec: pair for spec, pair in chosen.items() if pair[1].cost <= _NEAR * least}
     tasks = {}
-    with Stopwatch(runner.workers) as stopwatch:
+    with Stopwatch(runner.workers) as stopwatch, runner.profile.phase(TIMING):
         for spec, (item, run) in near.items():
-            case = question.case(at_step(item.facts, run.step), question.every, RUN_CAP)
+            case = question.case(at_step(item.facts, run.step), question.every, item.caps.run)
             tasks[spec] = partial(stopwatch, case, _SECONDS)
         timings = time_in_rounds(tasks, _ROUNDS, once_above=_ONCE)
     return {spec: min(*timing.values, near[spec][1].cost) for spec, timing in timings.items()}
@@ -255,7 +259,7 @@ def _of_setting(
 def _setting_tried(item: SettingSearch) -> SettingTried:
     why = "; ".join(filter(None, [item.why, *item.unsafe.values()]))
     steps = [step for divisor in sorted(item.runs) if (step := _step_tried(item, divisor))]
-    return SettingTried(item.spec, item.state, why, steps)
+    return SettingTried(spec=item.spec, state=item.state, why=why, steps=steps, resolution=item.facts.resolution or "")
 
 
 def _step_tried(item: SettingSearch, divisor: int) -> StepTried | None:
@@ -275,10 +279,16 @@ def _step_tried(item: SettingSearch, divisor: int) -> StepTried | None:
     )
 
 
-def answer_path(folder: Path, question: AnswerQuestion, asked: AskedTolerance, engines: Sequence[str] = ()) -> Path:
+def answer_path(
+    folder: Path,
+    question: AnswerQuestion,
+    asked: AskedTolerance,
+    engines: Sequence[str] = (),
+    caps: SearchCaps = WHOLE,
+) -> Path:
     """File of an answer below the folder of results."""
     bounds = {name: [bound.value, bound.relative] for name, bound in asked.bounds.items()}
-    content = [question.loaded.digest, question.until, question.every, bounds, sorted(engines)]
+    content = [question.loaded.digest, question.until, question.every, bounds, sorted(engines), *caps]
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
     return folder / "answers" / f"{question.loaded.name}-{digest}.json"
 

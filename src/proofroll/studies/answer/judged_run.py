@@ -100,7 +100,7 @@ def judged_run(case: Case, result: Result, reference: Reference, store: Store) -
     reached = float(dataset.variables["time"].values[-1])
     cost = result.processor.get("advance", 0.0) / reached if reached > 0 else math.inf
     whole = result.status is Status.DONE
-    errors, growth, curves, true_values = _errors(dataset, reference, whole=whole)
+    errors, growth, curves, true_values = errors_of(dataset, reference, whole=whole)
     times = dataset.variables["time"].values
     longest = max(map(len, growth.values()), default=0)
     return replace(
@@ -115,7 +115,7 @@ def judged_run(case: Case, result: Result, reference: Reference, store: Store) -
     )
 
 
-def _errors(
+def errors_of(
     dataset: Any, reference: Reference, *, whole: bool
 ) -> tuple[dict[str, float], dict[str, FloatArray], dict[str, FloatArray], dict[str, FloatArray]]:
     """Errors, their growth, values and true values of a run by observable; ``whole``: the run reached its end."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from proofroll.core.validation import FloatOrInf
 from proofroll.studies.answer.setting_search import State
 from proofroll.studies.study_store import Measured
 
@@ -50,6 +51,11 @@ class StepTried:
     seconds_per_second: float | None
     message: str = ""
 
+    @property
+    def holds(self) -> bool:
+        """True if the run ended within what is allowed; the step may not be confirmed."""
+        return self.of_allowed is not None and self.of_allowed <= 1
+
 
 @dataclass(frozen=True)
 class SettingTried:
@@ -60,12 +66,14 @@ class SettingTried:
         state: result of the search.
         why: clause with the reason, or empty.
         steps: all runs, coarse first.
+        resolution: ``dt``, ``rtol`` or empty.
     """
 
     spec: str
     state: State
     why: str
     steps: list[StepTried]
+    resolution: str = ""
 
 
 @dataclass(frozen=True)
@@ -140,7 +148,7 @@ class SceneAnswer:
     """
 
     scene: str
-    parameters: dict[str, float]
+    parameters: dict[str, FloatOrInf]
     until: float
     every: float
     tolerance: str
@@ -183,7 +191,7 @@ class StepAnswer:
     """
 
     scene: str
-    parameters: dict[str, float]
+    parameters: dict[str, FloatOrInf]
     until: float
     every: float
     tolerance: str

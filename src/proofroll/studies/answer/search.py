@@ -16,10 +16,9 @@ from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.studies.answer.judged_run import JudgedRun, judged_run
 from proofroll.studies.answer.question import AnswerQuestion
-from proofroll.studies.answer.setting_search import CELL_CAP, LOOSEST, RUN_CAP, SettingSearch, State
+from proofroll.studies.answer.setting_search import LOOSEST, SearchCaps, SettingSearch, State
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.tradeoff.curve import Curve
-from proofroll.studies.tradeoff.sweep import curves_of
+from proofroll.studies.swept_settings import Curve, curves_of
 
 # Wall time of a run over its cap of processor time, and least limit of a run that should be cheap [s].
 _LIMIT, _LEAST_LIMIT = 1.6, 2.0
@@ -54,7 +53,11 @@ class EngineSearch:
 
 
 def settings_of(
-    question: AnswerQuestion, curves: Sequence[Curve], allowed: Mapping[str, float], sizes: Mapping[str, float]
+    question: AnswerQuestion,
+    curves: Sequence[Curve],
+    allowed: Mapping[str, float],
+    sizes: Mapping[str, float],
+    caps: SearchCaps,
 ) -> list[EngineSearch]:
     """Searches of engines, not yet begun, over the settings that can represent the scene.
 
@@ -65,6 +68,7 @@ def settings_of(
         curves: one for each formulation and preset.
         allowed: observable -> largest error.
         sizes: observable -> size.
+        caps: processor time of a run, and of the search of an engine [s].
     """
     scene = question.loaded
     searches: dict[str, EngineSearch] = {}
@@ -88,6 +92,7 @@ def settings_of(
             until=question.until,
             allowed=allowed,
             sizes=sizes,
+            caps=caps,
             given=float(facts.settings[facts.resolution]) if facts.resolution and curve.fixed else None,
         )
         if facts.step is not None and item.given is None:
@@ -135,7 +140,7 @@ def searching(search: EngineSearch, question: AnswerQuestion) -> Asking:
         if least >= best:
             item.decide(State.DEARER, "any step that may hold costs more than this engine's choice")
             continue
-        divisor = item.next_divisor(CELL_CAP - search.spent)
+        divisor = item.next_divisor(item.caps.engine - search.spent)
         if divisor is None:
             if item.state is State.HOLDS and item.chosen is not None:
                 best = min(best, item.chosen.cost)
@@ -149,7 +154,7 @@ def searching(search: EngineSearch, question: AnswerQuestion) -> Asking:
 def _run(item: SettingSearch, divisor: int, question: AnswerQuestion) -> Generator[Case, JudgedRun, JudgedRun]:
     """Run of a setting with a step; of a scheme that adapts its steps with the larger error of few samples, too."""
     facts = at_step(item.facts, item.step(divisor))
-    limit = _LIMIT * RUN_CAP
+    limit = _LIMIT * item.caps.run
     least = min((run.cost for run in item.runs.values() if run.status is Status.DONE), default=math.inf)
     if all(divisor < finer for finer in item.runs) and math.isfinite(least):
         limit = min(limit, max(_LEAST_LIMIT, _DEARER * least * question.until))

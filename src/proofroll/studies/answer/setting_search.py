@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import NamedTuple
 
 from proofroll.core.number_format import number
 from proofroll.running.case import EngineFacts, Status
@@ -27,8 +28,16 @@ class State(StrEnum):
     OPEN = "open"  # of a setting only: the search goes on
 
 
-# Processor time of one run, and of the search of one engine in one scene [s].
-RUN_CAP, CELL_CAP = 8.0, 30.0
+class SearchCaps(NamedTuple):
+    """Processor time of one run, and of the search of one engine in one scene [s]."""
+
+    run: float = 8.0
+    engine: float = 30.0
+
+
+WHOLE = SearchCaps()
+# Of the many searches of a report; for the longest `recommend` is there.
+BRIEF = SearchCaps(4.0, 12.0)
 # Loosest relative tolerance of a scheme that adapts its steps; number of tighter ones, and the factor between two.
 LOOSEST, _TIGHTEST, _DECADE = 1e-3, 10, 10
 # Most halvings of the sampling interval.
@@ -70,6 +79,7 @@ class SettingSearch:
         state, why: result of the search, and a clause with its reason.
         level: halvings of the advised step, or of the one that holds and is not confirmed.
         needs: step that the tolerance needs at best, and the processor time of its run [s].
+        caps: of the search.
     """
 
     spec: str
@@ -80,7 +90,7 @@ class SettingSearch:
     sizes: Mapping[str, float]
     start: int = 0
     given: float | None = None
-    run_cap: float = RUN_CAP
+    caps: SearchCaps = WHOLE
     runs: dict[int, JudgedRun] = field(default_factory=dict)
     unsafe: dict[int, str] = field(default_factory=dict)
     state: State = State.OPEN
@@ -287,7 +297,7 @@ class SettingSearch:
         finest = max(ended)
         seconds = ended[finest].cost * self.until * self._growth ** max(0, level - finest)
         # a scheme that fails may take longer than at a finer step
-        return seconds if ended[finest].status is Status.DONE else min(seconds, self.run_cap)
+        return seconds if ended[finest].status is Status.DONE else min(seconds, self.caps.run)
 
     def _affordable(self, level: int, left: float, held: int | None = None) -> int | None:
         """Divisor of a level if its run is affordable; None: the setting is decided.
@@ -298,17 +308,17 @@ class SettingSearch:
         if held is None and self._rate(finest) is not None:
             halvings = self._fewest(finest)
             needed = self.levels[finest].cost * self.until * 2.0**halvings
-            if needed > 2 * self.run_cap:
+            if needed > 2 * self.caps.run:
                 self.needs = self.step(self.divisor(finest)) / 2.0**halvings, needed
-                self.decide(State.FINER, f"a run of more than {self.run_cap:g} s of processor time")
+                self.decide(State.FINER, f"a run of more than {self.caps.run:g} s of processor time")
                 return None
         spent = self.levels[finest].status is Status.TIMEOUT
-        if seconds <= self.run_cap and left > 0 and not (spent and held is not None):
+        if seconds <= self.caps.run and left > 0 and not (spent and held is not None):
             return self.divisor(level)
         reason = (
-            f"the next step takes {seconds:.0f} s of processor time, and a run may take {self.run_cap:g}"
-            if seconds > self.run_cap
-            else f"the search of this engine has used its {CELL_CAP:g} s of processor time"
+            f"the next step takes {seconds:.0f} s of processor time, and a run may take {self.caps.run:g}"
+            if seconds > self.caps.run
+            else f"the search of this engine has used its {self.caps.engine:g} s of processor time"
         )
         self.level = held
         self.decide(State.FINER if held is None else State.UNCONFIRMED, reason)

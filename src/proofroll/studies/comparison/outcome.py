@@ -15,8 +15,8 @@ from proofroll.files.scene_file import SceneFile
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.studies.comparison.planning import point_name
-from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging.reference import Reference
+from proofroll.studies.result_table import gauge, html_table, text_table
 
 # Verdict on runs that were not made for a good reason, or cannot be judged; all others that are not done failed.
 _UNJUDGED = {
@@ -26,6 +26,7 @@ _UNJUDGED = {
     Status.LEFT_OUT: Verdict.NOT_JUDGED,
 }
 
+_COLUMNS = ("", "verdict", "furthest", "off by", "allowed", "s/s", "why")
 _BROKEN = frozenset({Status.MISSING, Status.CRASHED, Status.TIMEOUT})
 
 
@@ -120,7 +121,7 @@ class Run:
         return worst(self.judgements, self.missing)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Outcome:
     """Outcome of a comparison.
 
@@ -197,20 +198,34 @@ class Outcome:
         free = all(set(run.row.expected(run.parameters)) == set(Verdict) for run in self.runs)
         return self.runs if free and all(run.verdict in set(_UNJUDGED.values()) for run in self.runs) else []
 
-    def _repr_html_(self) -> str:
-        """HTML table for a notebook: a row for each run, with the observable that is furthest beyond its tolerance."""
-        rows, gauges = [], []
+    @property
+    def _cells(self) -> list[tuple[str, ...]]:
+        """Cells of each run: its name, verdict, the observable furthest beyond its tolerance, errors, cost, reason."""
+        rows = []
         for run in self.runs:
             worst_of = max(run.judgements, key=lambda item: item.of_allowed, default=None)
             cells = ["", "", "", run.result.message]
             if worst_of is not None:
                 off = [number(value) + spaced(worst_of.unit) for value in (worst_of.error, worst_of.tolerance)]
                 cells = [worst_of.observable, *off, worst_of.reason]
-            gauges.append("" if worst_of is None else gauge(worst_of.error, worst_of.tolerance))
             name = " ".join([run.row.engine, *(f"{key}={value:g}" for key, value in run.parameters.items())])
             cost = run.result.seconds_per_second
             rows.append((name, str(run.verdict), *cells[:3], "" if cost is None else number(cost), cells[3]))
-        columns = ("", "verdict", "furthest", "off by", "allowed", "s/s", "why")
+        return rows
+
+    @property
+    def _notes(self) -> list[str]:
         left = f"Left out for lack of time: {', '.join(self.beyond_budget)}"
-        notes = [*self.contradictions, *([left] if self.beyond_budget else [])]
-        return html_table(self.comparison.title, columns, rows, notes, gauges=gauges)
+        return [*self.contradictions, *([left] if self.beyond_budget else [])]
+
+    def __repr__(self) -> str:
+        """Table for a terminal, with the rows of that for a notebook."""
+        return "\n".join([self.comparison.title, *text_table(_COLUMNS, self._cells), *self._notes])
+
+    def _repr_html_(self) -> str:
+        """HTML table for a notebook: a row for each run, with the observable that is furthest beyond its tolerance."""
+        gauges = []
+        for run in self.runs:
+            worst_of = max(run.judgements, key=lambda item: item.of_allowed, default=None)
+            gauges.append("" if worst_of is None else gauge(worst_of.error, worst_of.tolerance))
+        return html_table(self.comparison.title, _COLUMNS, self._cells, self._notes, gauges=gauges)

@@ -23,12 +23,12 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import Allowance, Judgement, RunCurve, TrueCurve, Verdict, judge_curve
 from proofroll.core.whole_turns import samples_between
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.causes import GivenVariable, begun_later, causes_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.judging.run_values import turned_alike
 from proofroll.studies.judging.user_trajectory import GivenRun, RunInput, read_run
+from proofroll.studies.result_table import gauge, html_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,7 +80,7 @@ class Compared:
         return "; ".join([difference, bar, *remarks, *judgement.remarks])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Judged:
     """A trajectory compared with the truth of a scene.
 
@@ -121,6 +121,8 @@ class Judged:
             lines.append(f"  not judged: what lies behind, for {self.ended}")
         lines += [f"  {sentence}" for sentence in (self.quiet, self.step_bound) if sentence]
         return "\n".join([head, *lines])
+
+    __repr__ = __str__
 
     def _repr_html_(self) -> str:
         """HTML table with gauges for a notebook, with the content of the text."""

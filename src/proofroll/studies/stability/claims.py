@@ -72,7 +72,7 @@ class Claim:
         cut = [side.largest is None and point.cut for point, side in sides]
         tried = max(point.runs for point in about)
         if all(cut) and not self.failure and not (self.never and tried >= _TRIED):
-            return "its searches were cut: finer runs have too many steps for this map"
+            return "its searches were cut: finer runs take too long for this map"
         return ""
 
     def contradictions(self, points: Sequence[BoundaryPoint]) -> list[str]:

@@ -22,12 +22,12 @@ from proofroll.studies.stability.axis_values import AxisValue, axis_values, case
 from proofroll.studies.stability.bisection import SearchResult, search
 from proofroll.studies.stability.effort import Effort
 from proofroll.studies.stability.records import MappedValue
-from proofroll.studies.tradeoff.curve import Curve
-from proofroll.studies.tradeoff.sweep import curves_of
+from proofroll.studies.swept_settings import Curve, curves_of
 
 _TOLERANCES = [10.0**-power for power in range(1, 14)]
 # Rungs skipped on the way down: a factor of four in the step, three decades of tolerance.
 _STRIDE = {"dt": 4, "rtol": 3}
+_WITNESS = "only cross-checks the truth; --engine maps it"
 # A search stops after this many runs that met the time limit, as each finer one would meet it, too.
 _TIMEOUTS = 2
 
@@ -57,13 +57,24 @@ class MapPoint:
         return dataclasses.replace(facts, settings={**facts.settings, str(facts.resolution): self.ladder[rung]})
 
     def too_long(self, rung: int, effort: Effort) -> bool:
-        """True if a run is not made: it has too many steps, or several coarser runs met the time limit.
+        """True if a run is not made: it takes too long, or several coarser runs met the time limit.
 
         The coarsest run is always made, even if it has more steps than allowed.
         """
         if self.timeouts >= _TIMEOUTS:
             return True
-        return rung > 0 and self.curve.fixed_step and self.at.until / self.ladder[rung] > effort.steps * (1 + 1e-9)
+        if not rung or not self.curve.fixed_step:
+            return False
+        return self.at.until / self.ladder[rung] > effort.steps * (1 + 1e-9) or self._predicted(rung) > effort.seconds
+
+    def _predicted(self, rung: int) -> float:
+        """Processor time of a run as the coarsest that reached its end foretells [s]; 0: none did."""
+        done = [number for number, result in self.results.items() if result.status == Status.DONE]
+        if not done:
+            return 0.0
+        coarsest = min(done)
+        seconds = self.results[coarsest].processor.get("advance", 0.0)
+        return seconds * self.ladder[coarsest] / self.ladder[rung]
 
     @property
     def timeouts(self) -> int:
@@ -117,7 +128,7 @@ def stability(
         scene: name or path; parameters that an axis does not change keep their defaults.
         axes: of the map.
         runner: runs the cases.
-        engines: names or ``name[key=value,…]``; all that are installed if empty.
+        engines: names or ``name[key=value,…]``; if empty all that are installed, without those that check the truth.
         effort: limits on the cost.
         progress: called with a text and the number of points finished since the last call.
 
@@ -134,6 +145,9 @@ def stability(
     for curve in (curve for curve in curves if curve.fixed):
         advice = f"a map looks for the largest {curve.facts.resolution} itself; leave it out"
         raise InputError("engine", curve.engine, advice)
+    if not engines:
+        absent |= {curve.engine: _WITNESS for curve in curves if curve.facts.witness}
+        curves = [curve for curve in curves if not curve.facts.witness]
     curves = _matched(curves) if effort.matched else curves
     asked = axis_values(scene, axes, effort)
     values = [axis_value for axis_value in asked if isinstance(axis_value, AxisValue)]

@@ -10,7 +10,7 @@ from proofroll.studies.stability.axes import Axis
 from proofroll.studies.stability.effort import Effort
 from proofroll.studies.stability.step_numbers import Explanation
 from proofroll.studies.study_store import Measured
-from proofroll.studies.tradeoff.records import SweptSetting
+from proofroll.studies.swept_settings import SweptSetting
 
 BOUNDARIES = ("stable", "accurate")
 # Boundaries within this factor count as equal: two rungs of a ladder of steps (True), one of tolerances (False).

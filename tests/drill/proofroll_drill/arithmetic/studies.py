@@ -1,4 +1,4 @@
-"""Decisions of studies: regions of maps, regimes, steps that hold a tolerance, terms that are needed."""
+"""Decisions of studies: regions of maps, regimes, terms that are needed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError, require_known
 from proofroll.files.toml import named_file, study_files, study_of
 from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_maps
@@ -22,11 +21,6 @@ from proofroll.studies.stability.effort import QUICK
 from proofroll.studies.stability.map import stability
 from proofroll.studies.stability.records import BOUNDARIES
 from proofroll.studies.stability.study import stability_study
-from proofroll.studies.tradeoff.claims import Converges, Holds, load_claims
-from proofroll.studies.tradeoff.curve import Question
-from proofroll.studies.tradeoff.requirements import Requirements, holding
-from proofroll.studies.tradeoff.study import tradeoff_study
-from proofroll.studies.tradeoff.tradeoff import Extent, tradeoff
 
 # A ladder of models has no file: it is asked for by this word and a scene.
 LADDER = "ladder:"
@@ -93,25 +87,6 @@ def _stability(path: Path, runner: Runner, found: Decided) -> None:
     found.put("claims", {"contradicted": len(asked.contradictions(study))}, late=bool(found.late))
 
 
-def _tradeoff(path: Path, runner: Runner, found: Decided) -> None:
-    """Ends of runs, the coarsest step of each curve that holds a tolerance, and claims without cost."""
-    claims = load_claims(path)
-    question = Question(claims.scene, claims.parameters, claims.until, claims.quantity)
-    claimed: list[Holds | Converges] = [*claims.holds, *claims.converges]
-    study = tradeoff_study(tradeoff(question, runner, Extent(brief=True, claimed=[item.engine for item in claimed])))
-    for point in study.points:
-        place, late = f"{point.curve} {point.resolution} = {point.step}", point.status == Status.TIMEOUT
-        found.put(place, {"ends": point.status}, late=late, missing=point.status == Status.MISSING)
-    for part in _HELD:
-        held = holding(study, Requirements(study.quantity, Tolerance(part, True)), here=True)
-        coarsest: dict[str, float] = {}
-        for point in held:
-            coarsest[point.curve] = max(point.step or 0.0, coarsest.get(point.curve, 0.0))
-        found.put(f"{part:g} of {study.quantity}", {"held up to": coarsest})
-    for number, item in enumerate(claimed):
-        found.put(f"claim {number} on {item.engine}", {"holds": item.judgement(study, study.quantity).holds})
-
-
 def _regimes(path: Path, _: Runner, found: Decided) -> None:
     """Regime and number of slips at each place of each map."""
     for chart in regime_maps(load_regimes(str(path)).briefly(), 1):
@@ -138,6 +113,5 @@ def _ladder(scene: str, runner: Runner, found: Decided) -> None:
 
 _KINDS: dict[str, Callable[[Path, Runner, Decided], None]] = {
     "stability": _stability,
-    "tradeoff": _tradeoff,
     "regimes": _regimes,
 }

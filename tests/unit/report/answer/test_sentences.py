@@ -7,8 +7,16 @@ from dataclasses import replace
 import pytest
 from invented_answers import BOUND, COARSER, FINER, HELD, THROUGH, scene_answer
 
-from proofroll.report.answer.sentences import answer_lines, command_of, measure, sentence, step_sentence, taken_sentence
-from proofroll.studies.answer.records import AllowedError, StepAnswer
+from proofroll.report.answer.sentences import (
+    answer_lines,
+    command_of,
+    installed_words,
+    measure,
+    sentence,
+    step_sentence,
+    taken_sentence,
+)
+from proofroll.studies.answer.records import AllowedError, SettingTried, StepAnswer, StepTried
 from proofroll.studies.answer.setting_search import State
 
 METRES = AllowedError("positions", "m", 1e-3, 2.0, 1e-12, relative=False)
@@ -21,10 +29,26 @@ OWN = StepAnswer(
 
 def test_what_holds_is_told_with_speed_error_and_time() -> None:
     """Setting, step, speed, error of what is allowed, quantity and time; a part of proofroll is named."""
-    assert sentence(HELD, 2.0) == "alpha fine, matched, dt 1e-3 s: 50× real time, 2.5e-5 of 1e-4 in z over 2 s."
+    assert sentence(HELD, 2.0) == "alpha fine, best, dt 1e-3 s: 50× real time, 2.5e-5 of 1e-4 in z over 2 s."
     assert "(through proofroll's integrator): 100× real time" in sentence(THROUGH, 2.0)
     unsure = replace(HELD, state=State.UNCONFIRMED, why="the next step takes 9 s")
     assert sentence(unsure, 2.0).endswith("; not confirmed: the next step takes 9 s.")
+
+
+def test_settings_are_told_in_two_words() -> None:
+    """Beside the best settings stand those as installed: their cheapest step that holds, or how far off they are."""
+    runs = [StepTried(2e-3, "done", 4.0, 2.0, 0.5, 1e-2), StepTried(5e-4, "done", 0.8, 2.0, 2.0, 4e-2)]
+    tried = SettingTried("alpha[formulation=rough,preset=default]", State.DEARER, "", runs, "dt")
+    assert installed_words(replace(HELD, settings=[tried])) == "as installed: rough, dt 5e-4 s: 25×"
+    assert sentence(replace(HELD, settings=[tried]), 2.0).endswith("; as installed: rough, dt 5e-4 s: 25×.")
+    off = replace(tried, steps=runs[:1])
+    assert installed_words(replace(HELD, settings=[off])) == (
+        "as installed: dearer, 4 times too far off at rough, dt 2e-3 s"
+    )
+    refused = replace(tried, state=State.REFUSED, why="it cannot", steps=[])
+    assert installed_words(replace(HELD, settings=[refused])) == "as installed: it cannot"
+    assert installed_words(replace(HELD, preset="default", settings=[tried])) == ""
+    assert installed_words(replace(FINER, settings=[tried])) == ""
 
 
 def test_what_was_not_run_is_no_verdict() -> None:
@@ -39,7 +63,7 @@ def test_an_answer_begins_with_what_to_take() -> None:
     """Then what does without a part of proofroll, the others, twice the step, and what was judged."""
     lines = list(answer_lines(scene_answer(THROUGH, HELD, FINER)))
     assert lines[0].startswith("Take beta only, as installed, dt 1e-3 s (through proofroll's integrator): 100× real")
-    assert lines[1].startswith("Without a part of proofroll: alpha fine, matched, dt 1e-3 s: 50×")
+    assert lines[1].startswith("Without a part of proofroll: alpha fine, best, dt 1e-3 s: 50×")
     assert [line[0] for line in lines[2:]] == ["·", "N", "J"]
     assert lines[3] == "Not good enough: twice the step is off by 4e-4."
     assert lines[4] == "Judged: z, every 0.02 s over 2 s. Not judged: attitude."

@@ -19,6 +19,10 @@ def test_a_notebook_shows_a_comparison(tmp_path: Path, monkeypatch: pytest.Monke
     found = proofroll.compare("pendulum", out=tmp_path, jobs=1, length=2.0)
     assert [run.parameters for run in found.runs] == [{"length": 2.0}] * len(found.runs)
     assert found.comparison.title.endswith(" (the first 0.1 s of 10)")
+    lines = repr(found).splitlines()
+    assert (lines[0], len(lines)) == (found.comparison.title, 2 + len(found.runs) + len(found.contradictions))
+    assert max(map(len, lines[1:])) < 300
+    assert all(run.row.engine[:30] in line for run, line in zip(found.runs, lines[2:], strict=False))
     shown = found._repr_html_()
     assert shown.count("<tr>") == 1 + len(found.runs)
     assert shown.count("</svg>") == len(found.runs)

@@ -18,11 +18,10 @@ from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.reduced import Reduced
 from proofroll.papers.blajer_2006.truth.rolling import reduced
-from proofroll.running.case import Result, Status
 from proofroll.running.identity import resolve
+from proofroll.studies.answer.judged_run import errors_of
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference, _true_curves
-from proofroll.studies.tradeoff.curve import CurvePoint, with_errors
 
 
 def reference(**curves: list[float]) -> Reference:
@@ -98,15 +97,15 @@ def test_events_of_a_scene_without_any_are_too_many() -> None:
     scene = load_scene("sphere_in_cylinder")
     true = truth(scene, np.linspace(0, 0.1, 11))
     told = with_events(true, [Event("lift_off", 0.05, 0.05, 0.05)])
-    point = with_errors(CurvePoint(None, Result(Status.DONE, "")), Reference.of(scene, true), told)  # type: ignore[arg-type]  # what it ran is a dataset here
-    assert point.errors["event_times"] == np.inf
-    assert point.errors["event_order"] == 1
-    assert point.errors["z"] == 0
+    errors, *_ = errors_of(told, Reference.of(scene, true), whole=True)
+    assert errors["event_times"] == np.inf
+    assert errors["event_order"] == 1
+    assert errors["z"] == 0
 
 
 @pytest.mark.drill
 def test_a_velocity_at_an_impact_may_be_that_of_either_side() -> None:
-    """A trade-off counts no error where a sample lies on an impact and has the velocity before or after it."""
+    """An answer counts no error where a sample lies on an impact and has the velocity before or after it."""
     scene = load_scene("two_spheres")
     (hit,) = (event.time for event in events_of(truth(scene, np.linspace(0, 0.12, 13))))
     true = truth(scene, np.linspace(0, 2 * hit, 11))
@@ -114,8 +113,8 @@ def test_a_velocity_at_an_impact_may_be_that_of_either_side() -> None:
         velocity = true["v_WB"].copy()
         velocity[5] = velocity[side]
         run = true.assign(v_WB=velocity)
-        point = with_errors(CurvePoint(None, Result(Status.DONE, "")), Reference.of(scene, true), run)  # type: ignore[arg-type]  # what it ran is a dataset here
-        assert point.errors["v_WB"] < 1e-9
+        errors, *_ = errors_of(run, Reference.of(scene, true), whole=True)
+        assert errors["v_WB"] < 1e-9
 
 
 def test_reactions_at_the_last_sample_of_an_early_end_are_the_truths() -> None:
@@ -160,14 +159,14 @@ def test_events_of_another_part_are_wrong(own: list[tuple[str, str]], wrong: int
     assert run_values.event_order(told(own), told([("impact", "a"), ("impact", "b")])) == wrong
 
 
-def test_a_trade_off_leaves_out_what_the_truth_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_leaves_out_what_the_truth_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that tells forces beyond the truth's has errors of the rest alone."""
     places = xr.Dataset({"positions": ("time", np.zeros(2), {"error_bar": 0.0})}, {"time": [0.0, 1.0]})
     held = Reference(load_scene("falling_rod"), places, {"positions": np.zeros(2)}, {})
     given = {"positions": np.full(2, 0.5), "contact_forces": np.ones(2)}
     monkeypatch.setattr(run_values, "observables_of", lambda *_: given)
-    point = CurvePoint(None, Result(Status.DONE, ""))  # type: ignore[arg-type]
-    assert with_errors(point, held, places).errors == {"positions": 0.5}
+    errors, *_ = errors_of(places, held, whole=True)
+    assert errors == {"positions": 0.5}
 
 
 def against(formulation: str, **parameters: float) -> str:

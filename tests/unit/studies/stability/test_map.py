@@ -98,6 +98,27 @@ def test_a_search_hangs_on_no_clock(small: Any) -> None:
     assert SHORT.steps / 2 < max(longest) <= SHORT.steps
 
 
+def test_a_quick_map_does_not_make_runs_that_are_foretold_to_be_long(small: Any) -> None:
+    """The coarsest run that reached its end foretells the time of finer ones by their number of steps."""
+    point = small.points[0]
+    coarsest = min(rung for rung, item in point.results.items() if item.status == "done")
+    known = {coarsest: dataclasses.replace(point.results[coarsest], processor={"advance": 0.1})}
+    known_point = dataclasses.replace(point, results=known)
+    effort = dataclasses.replace(SHORT, steps=10**9, seconds=0.8)
+    made = [rung for rung in range(len(point.ladder)) if not known_point.too_long(rung, effort)]
+    assert point.ladder[coarsest] / point.ladder[max(made)] <= 8 < point.ladder[coarsest] / point.ladder[max(made) + 1]
+
+
+@pytest.mark.drill
+def test_what_checks_the_truth_is_mapped_on_request(tmp_path: Path) -> None:
+    """Without names its formulations are absent with a sentence; by its name it is on the map."""
+    axis = dataclasses.replace(SPEED, values=[2.0])
+    usual, asked = (mapped(tmp_path, engines, [axis]) for engines in ([], [ENGINE]))
+    assert usual.absent[ENGINE] == "only cross-checks the truth; --engine maps it"
+    assert not any(point.curve.facts.witness for point in usual.points)
+    assert {point.curve.engine for point in asked.points} == {ENGINE}
+
+
 def test_a_run_that_met_the_limit_of_time_contradicts_nothing() -> None:
     """What a faster machine would have shown is left open: the claim is not tested there."""
     claim = Claim(ENGINE, "stable", "it is", number="turn", between=[0.4, 0.6])
@@ -176,7 +197,7 @@ def test_what_is_beyond_counts_its_own_silent_failures() -> None:
     ("more", "said"),
     [
         ({}, "good only, tuned at V0 = 200: sank in at every step down to dt 1.25e-4 s, off by 150 % of the range"),
-        ({"too_slow": 1e-5}, "sank in down to dt 1.25e-4 s, finer ones have too many steps"),
+        ({"too_slow": 1e-5}, "sank in down to dt 1.25e-4 s, finer ones take too long"),
         ({"resolution": "rtol", "finest": 1e-9}, "sank in at every tolerance down to rtol 1e-9"),
         ({"sides": {"stable": Boundary(1e-3, True, {}, 2e-3, "", True, None, None, None)}}, "just beyond dt 1e-3 s"),
         (
@@ -383,7 +404,7 @@ BROKEN = [
     ('number = "spin"', 'number = "spine"', "choose one of"),
     ("between = [0, 1]", "between = [1, 0]", r"\[low, high\]"),
     ("values = [1, 2]", "values = []", "needs its values"),
-    ('study = "stability"', 'study = "tradeoff"', "can be used here"),
+    ('study = "stability"', 'study = "regimes"', "can be used here"),
     ("parameters.speed = {}", "parameters.spee = {}", "no such parameter"),
     ("values = [1, 2]", "values = [1, nan]", "give a number"),
     ("values = [1, 2]", "values = [1, -inf]", "give a number"),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def start_not_taken(evidence: Evidence) -> Iterator[Cause]:
     if not above_round_off(distance, longest(expected)):
         return
     for says, other_model in _other_starts(evidence.element.mechanism):
-        moved = _moved(other_model, times)
+        moved = _moved(other_model, tuple(times.tolist()))
         if moved is None:
             continue
         remainder = largest_difference(poses[1:_FIRST], moved[1:])
@@ -129,14 +130,16 @@ def _away(joint: Joint) -> bool:
     return tuple(joint.q0) != _home(joint)
 
 
-def _moved(mechanism: Mechanism, times: FloatArray) -> FloatArray | None:
+# Cached: every run of a comparison that differs asks for the same few motions.
+@lru_cache(maxsize=32)
+def _moved(mechanism: Mechanism, times: tuple[float, ...]) -> FloatArray | None:
     """Poses of the true motion of a mechanism at the first times; None: it cannot start so, or has no truth."""
     from proofroll.core.scene import Scene
     from proofroll.core.truth import truth
 
     try:
         check_contacts(mechanism)
-        true = truth(Scene("start", "", (MechanismElement(mechanism),)), times)
+        true = truth(Scene("start", "", (MechanismElement(mechanism),)), np.array(times))
     except ProofrollError:
         return None
     return _poses(true["p_WB"].to_numpy(), quaternions(true))

@@ -316,7 +316,7 @@ class MechanismElement:
         )
         if of_forces:
             meaning = "determinate components of the forces on children"
-            told: dict[str, Any] = {"floor": force, "headline": True, "column": True, "vectors": of_forces}
+            told: dict[str, Any] = {"floor": force, "headline": True, "vectors": of_forces}
             table.append(Observable("forces", "N", meaning, Role.REACTION, **told))
         if of_torques:
             meaning = "determinate components of the moments on children at their joints"
@@ -325,14 +325,14 @@ class MechanismElement:
         table += contact_observables(self.mechanism, self.sizes, _LEAST)
         table += event_observables(self.mechanism)
         for item in named_forces(self.mechanism):
-            told = {"floor": least[str(item.unit)], "column": item.field == "coupling"}
+            told = {"floor": least[str(item.unit)]}
             told["watched"] = item.field != "stop"  # what softened stops give in an impact is their own
             told["at_impacts"] = item.field != "friction"
             table.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, **told))
         table += link_observables(self.mechanism, least)
         if self.conservative:
             fields: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy", "floor": least["J"]}
-            fields |= {"symbol": "ΔE", "column": True, "role": Role.RESIDUAL}
+            fields |= {"symbol": "ΔE", "role": Role.RESIDUAL}
             table.append(Observable("energy_error", "J", "energy now minus energy at the start", **fields))
         fields = {"hangs_on_events": False, "difference_of": "p_WB", "floor": a, "asked_for": False}
         table.append(Observable("drift", "m", "how far joints and loops are open", Role.RESIDUAL, **fields))

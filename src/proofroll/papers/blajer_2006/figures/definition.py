@@ -19,11 +19,13 @@ class PlannedRun:
         label: text in a legend; mathematics between dollar signs.
         parameters: parameters of the scene.
         engine: engine of this run, for what the file's engine does not follow; empty: the file's.
+        every: sampling interval of this run [s]; None: the file's.
     """
 
     label: str
     parameters: dict[str, float] = field(default_factory=dict)
     engine: str = ""
+    every: float | None = None
 
 
 @dataclass(frozen=True)

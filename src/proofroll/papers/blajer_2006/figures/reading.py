@@ -35,6 +35,7 @@ def _check(location: str, figures: Figures) -> None:
     """Raises InputError if times, names or parameters in a file are invalid."""
     time_grid(figures.until, figures.every)
     for name, planned in figures.runs.items():
+        time_grid(figures.until, planned.every or figures.every)
         try:
             scene = load_scene(figures.scene, **planned.parameters)
         except InputError as error:

@@ -14,7 +14,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.figures.definition import Figures
+from proofroll.papers.blajer_2006.figures.definition import Figures, PlannedRun
 from proofroll.papers.blajer_2006.figures.quantities import TIME, known, quantity
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.engine_questions import describe, resolve
@@ -124,8 +124,8 @@ def run_figures(
     cases, truths = dict[str, Case](), dict[str, Case]()
     for name, planned in figures.runs.items():
         run_engine = planned.engine if planned.engine and spec.name != TRUTH else chosen
-        cases[name] = _case(figures, planned.parameters, known_facts[run_engine], asks if run_engine == chosen else ())
-        truths[name] = _case(figures, planned.parameters, known_facts[TRUTH], ())
+        cases[name] = _case(figures, planned, known_facts[run_engine], asks if run_engine == chosen else ())
+        truths[name] = _case(figures, planned, known_facts[TRUTH], ())
     results = runner.run([*cases.values(), *truths.values()], progress)
 
     def made(asked: dict[str, Case]) -> dict[str, FigureRun]:
@@ -142,10 +142,11 @@ def run_figures(
     )
 
 
-def _case(figures: Figures, parameters: dict[str, float], facts: EngineFacts, asks: tuple[str, ...]) -> Case:
+def _case(figures: Figures, planned: PlannedRun, facts: EngineFacts, asks: tuple[str, ...]) -> Case:
+    parameters, every = planned.parameters, planned.every
     scene = load_scene(figures.scene, asks=asks, **parameters)
     limit = figures.time_limit
-    return case_of(figures.scene, scene, parameters, facts, figures.until, figures.every, time_limit=limit)
+    return case_of(figures.scene, scene, parameters, facts, figures.until, every or figures.every, time_limit=limit)
 
 
 def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> FigureRun:

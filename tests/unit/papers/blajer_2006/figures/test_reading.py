@@ -54,7 +54,7 @@ def written(tmp_path: Path, text: str) -> str:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('study = "figures"', 'study = "tradeoff"', 'only a file with study = "figures"'),
+        ('study = "figures"', 'study = "regimes"', 'only a file with study = "figures"'),
         ('title = "Some figures"', "title = Some figures", "the file is broken"),
         ('scene = "sphere_in_cylinder"', 'scene = "nowhere"', "there is no such scene"),
         ("speed = 4", "haste = 4", "runs.free.haste"),

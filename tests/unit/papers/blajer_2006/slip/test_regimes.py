@@ -52,7 +52,7 @@ def test_ours_is_found_by_its_name_and_by_its_scene(name: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('"regimes"', '"tradeoff"', 'only a file with study = "regimes"'),
+        ('"regimes"', '"stability"', 'only a file with study = "regimes"'),
         ("until = 0.2", "until = -4", "until = -4.*above 0"),
         ("until = 0.2", "until = nan", "until = nan.*finite"),
         ("[0.0, 5e-4]", "[]", "rolling_resistance.*at least one"),

@@ -146,9 +146,9 @@ def table(body: BodyOnWall, weight: float, lengths: Sequence[float]) -> tuple[Ob
             asked_for=False,
             asked_as="orientation",
         ),
-        Observable("N", "N", "normal force", Role.REACTION, floor=force, headline=True, column=True, of_contacts=True),
+        Observable("N", "N", "normal force", Role.REACTION, floor=force, headline=True, of_contacts=True),
         Observable("F2", "N", "friction on the ball along e2", Role.REACTION, floor=force, headline=True),
-        Observable("F3", "N", "friction on the ball along e3", Role.REACTION, floor=force, headline=True, column=True),
+        Observable("F3", "N", "friction on the ball along e3", Role.REACTION, floor=force, headline=True),
         Observable(
             name="needed_friction",
             unit="1",
@@ -157,7 +157,7 @@ def table(body: BodyOnWall, weight: float, lengths: Sequence[float]) -> tuple[Ob
             symbol="|F|/N",
             floor=_LEAST,
         ),
-        residual("energy_balance", "J", "energy that is not accounted for", energy, symbol="ΔE", column=not bounded),
+        residual("energy_balance", "J", "energy that is not accounted for", energy, symbol="ΔE"),
         residual("force_audit", "N", "reported minus recomputed contact force", force, asked_for=False, audit=True),
         residual("rate_audit", "m/s", "velocities minus the rates of position and attitude", speed, asked_for=False),
         # A ball that flies is followed in its distance, too, which decides.
@@ -179,7 +179,6 @@ def table(body: BodyOnWall, weight: float, lengths: Sequence[float]) -> tuple[Ob
             "s",
             "time of the first slip",
             Role.EVENT,
-            column=True,
             absent=reason,
             watched=bool(bounded),
             always=always,

@@ -144,7 +144,7 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
     yield Observable("gaps", "m", "distances between what may touch", Role.MOTION, floor=length, apart=True)
     yield Observable("slips", "m/s", "slip speeds of the contacts", Role.MOTION, floor=speed, asked_for=False)
     meaning = "normal forces between what may touch"
-    yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True)
+    yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True)
     meaning = "contact forces, where they are determinate"
     told: dict[str, Any] = {"asked_for": False, "at_impacts": False, "of_contacts": True, "watched": True}
     yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, always=_WRONG, **told)

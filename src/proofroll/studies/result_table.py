@@ -1,4 +1,4 @@
-"""Table of results for a notebook, with a small drawing in each row."""
+"""Tables of results: for a notebook, with a small drawing in each row, and for a terminal."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -47,3 +47,11 @@ def html_table(
     )
     rest = "".join(f"<p>{escape(note)}</p>" for note in notes)
     return f"<p><b>{escape(head)}</b></p><table><tr>{header}</tr>{body}</table>{rest}"
+
+
+def text_table(columns: Sequence[str], rows: Sequence[Sequence[str]], most: int = 40) -> list[str]:
+    """Lines of a table for a terminal; a text of more than ``most`` characters is cut, but the last of a row."""
+    cut = [[*(text if len(text) <= most else f"{text[: most - 1]}…" for text in row[:-1]), row[-1]] for row in rows]
+    lines = [list(columns), *cut]
+    widths = [max(len(line[place]) for line in lines) for place in range(len(columns))]
+    return ["  ".join(text.ljust(width) for text, width in zip(line, widths, strict=True)).rstrip() for line in lines]

@@ -1,4 +1,4 @@
-"""Tables of results in a notebook."""
+"""Tables of results in a notebook, and on a terminal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from proofroll.studies.html_table import gauge, html_table
+from proofroll.studies.result_table import gauge, html_table, text_table
 
 
 @pytest.mark.parametrize(
@@ -29,3 +29,11 @@ def test_a_table_without_gauges_has_no_column_for_them() -> None:
     """The column of drawings is there where rows have some."""
     assert html_table("h", ("", "a"), [("x", "1")]).count("<th>") == 3
     assert "<svg" in html_table("h", ("", "a"), [("x", "1")], gauges=[gauge(1, 2)])
+
+
+def test_a_table_for_a_terminal_has_aligned_columns() -> None:
+    """Each column is as wide as its longest text; long ones are cut, but the last, which is the reason."""
+    lines = text_table(("", "verdict", "why"), [("x" * 50, "agrees", "y" * 60), ("z", "differs", "")])
+    assert lines[0] == f"{'':40}  verdict  why"
+    assert lines[1] == f"{'x' * 39}…  agrees   {'y' * 60}"
+    assert lines[2] == f"{'z':40}  differs"

@@ -1,1 +1,0 @@
-"""Trade-off between speed and accuracy in a report and on the terminal."""

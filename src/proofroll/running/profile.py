@@ -1,0 +1,60 @@
+"""Processor time of a command by what it was spent on, its workers included."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from proofroll.running.case import Result
+from proofroll.running.process import processor_seconds
+
+# Phases to which parts of cases belong, wherever these were run.
+START, TRUTHS, TIMING = "start", "truths", "timing rounds"
+_OF_CASES = {"process start": START, "loading": START, "truth": TRUTHS, "clean runs": TIMING}
+
+
+class ProcessorProfile:
+    """Processor time by phase.
+
+    Attributes:
+        phases: phase -> processor time without that of phases within it [s].
+        activities: activity of the workers in cases -> processor time [s].
+    """
+
+    def __init__(self) -> None:
+        self.phases: dict[str, float] = defaultdict(float)
+        self.activities: dict[str, float] = defaultdict(float)
+        self._open = [START]
+        self._since = 0.0
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Context manager of a phase; within another its time is taken off that one."""
+        self._book()
+        self._open.append(name)
+        try:
+            yield
+        finally:
+            self._book()
+            self._open.pop()
+
+    def add(self, result: Result) -> None:
+        """Books the parts of a case that was run just now: its truth, clean runs and start are phases of their own."""
+        for activity, seconds in result.processor.items():
+            self.activities[activity] += seconds
+            if (phase := _OF_CASES.get(activity)) is not None:
+                self.phases[phase] += seconds
+                self.phases[self._open[-1]] -= seconds
+
+    @property
+    def total(self) -> float:
+        """Processor time so far [s]."""
+        self._book()
+        return sum(self.phases.values())
+
+    def _book(self) -> None:
+        """Books the time since the last call on the innermost open phase."""
+        now = processor_seconds()
+        self.phases[self._open[-1]] += now - self._since
+        self._since = now

@@ -1,1 +1,0 @@
-"""Speed against accuracy: curves of error against cost, error budgets, Pareto fronts and recommendations."""

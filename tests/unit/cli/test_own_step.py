@@ -1,0 +1,70 @@
+"""A person's own model: whether its step is good enough, and which line to change."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.files.scene_sources import ReadsOptions, source_of
+
+Proofroll = Callable[..., tuple[int, str, str]]
+MODEL = "<mujoco><option {}/><worldbody><body><joint/><geom size='.1'/></body></worldbody></mujoco>"
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Callable[[str], Path]:
+    """Writer of a model with options."""
+
+    def write(options: str) -> Path:
+        path = tmp_path / "mine.xml"
+        path.write_text(MODEL.format(options), encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_options_of_a_model_are_settings(model: Callable[[str], Path]) -> None:
+    """Integrator, step and cone are read, MuJoCo's own where the file has none; other options are named."""
+    source = source_of(str(model("timestep='0.004' integrator='RK4' solver='CG' iterations='7'")))
+    assert source is not None
+    reader, path = source
+    assert isinstance(reader, ReadsOptions)
+    own = reader.own_options(path)
+    assert (own.engine, own.settings) == ("mujoco", {"integrator": "RK4", "dt": "0.004"})
+    assert own.of_contacts == {"cone": "pyramidal"}
+    assert (own.words, own.others) == ("RK4, dt 4e-3 s", ["solver CG", "7 iterations"])
+    assert reader.own_options(model("")).settings == {"integrator": "Euler", "dt": "0.002"}
+    with pytest.raises(InputError, match="integrator is none that can be compared; choose Euler, RK4, implicitfast"):
+        reader.own_options(model("integrator='implicit'"))
+
+
+def test_another_file_is_no_model(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A file without options of an engine is refused in one line."""
+    (tmp_path / "mine.txt").write_text("dt = 2e-3")
+    code, out, err = proofroll("compare", "pendulum", "--like", str(tmp_path / "mine.txt"), "--out", str(tmp_path))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "give the path of your own MuJoCo model, *.xml" in err
+
+
+@pytest.mark.drill
+def test_the_line_to_change_is_named(proofroll: Proofroll, model: Callable[[str], Path], tmp_path: Path) -> None:
+    """A step that is too coarse gets the line of one that would do, with which the same question is answered by yes."""
+    asked = ["--until", "0.5", "--tolerance", "1e-3", "--out", str(tmp_path)]
+    code, out, _ = proofroll("compare", "pendulum", "--like", str(model("timestep='0.01' solver='PGS'")), *asked)
+    assert code == 1
+    assert out.startswith("yours (Euler, dt 0.01 s): No: ")
+    assert "Not compared, as the adapter has its own: solver PGS." in out
+    (line,) = (text.removeprefix("Change this line: ") for text in out.splitlines() if text.startswith("Change"))
+    options = shlex.split(line.strip("</>"))[1:]
+    code, out, _ = proofroll(
+        "compare",
+        "pendulum",
+        "--like",
+        str(model(" ".join(f'{x.split("=")[0]}="{x.split("=")[1]}"' for x in options))),
+        *asked,
+    )
+    assert (code, out.partition(": ")[2][:4]) == (0, "Yes:")
