@@ -10,8 +10,9 @@ from functools import partial
 
 import numpy as np
 
+from proofroll.core.bounces import Bounce, Course, exact_bounces, with_bars
 from proofroll.core.errors import Refused
-from proofroll.core.events import JUMPS, EventKind
+from proofroll.core.events import IMPACTS, JUMPS, Event, EventKind
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.modes import REST, Acting, ContactMode
@@ -21,17 +22,18 @@ from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.record import record_of
+from proofroll.elements.mechanism.run.contacts.bounces import bouncing_bodies, course_of
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts, moments_along
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import contact_sums
 from proofroll.elements.mechanism.scene.signal import breaks
+from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, tiles_of, work_along
-from proofroll.truth.contact_bounces import contact_bounces
 from proofroll.truth.early_end import cut_at
-from proofroll.truth.error_bars import TwoRouteMotion, check_start, on_same_turns
+from proofroll.truth.error_bars import ROUND_OFF, TwoRouteMotion, check_start, on_same_turns
 from proofroll.truth.followed_paths import (
     CLOSE,
     TOLERANCES,
@@ -304,3 +306,55 @@ def _size(dynamics: ContactDynamics) -> float:
     """Largest distance of a contact from the origin at the start, at least the natural length, which is 1."""
     touching = dynamics.at(*dynamics.mechanism.start()).touching
     return max([1.0, *(float(np.abs(touch.place).max()) for touch in touching)])
+
+
+def contact_bounces(
+    mechanism: Mechanism,
+    routes: Sequence[tuple[ContactTree | ContactBodies, HybridPath[Stretch[ContactMode]]]],
+    events: Sequence[Event],
+    units: Units,
+    end: float,
+) -> tuple[Bounce, ...]:
+    """Bounces with error bars, one for each impact in ``events``, in SI units.
+
+    Args:
+        mechanism: in natural units.
+        routes: both routes, with their paths.
+        events: of the motion, in SI units.
+        units: natural units.
+        end: last time that both paths know, in natural units.
+    """
+    if not any(event.kind in IMPACTS for event in events):
+        return ()
+    bodies, by_route = bouncing_bodies(mechanism), []
+    for route, path in routes:
+        happened = path.happenings[: len(events)]
+        moments = [
+            Event(kind=event.kind, time=event.time, time_low=event.time, time_high=event.time, name=event.name)
+            for event in happened
+        ]
+
+        def sampled(
+            times: Array,
+            route: ContactTree | ContactBodies = route,
+            path: HybridPath[Stretch[ContactMode]] = path,
+        ) -> Course:
+            states = states_of(route, path, times, path.stretch_at(times))
+            p, v, q, w = map(np.array, zip(*map(route.bodies, states), strict=True))
+            return course_of(Placed(mechanism=mechanism, time=times, p_WB=p, v_WB=v, w_WB=w, q_WB=q))
+
+        by_route.append(exact_bounces(sampled, moments, bodies, end))
+    by_tree, by_bodies = by_route
+    joule, impacts = units.force * units.length, [event for event in events if event.kind in IMPACTS]
+    return tuple(
+        Bounce(
+            time=event.time,
+            name=event.name,
+            energy_before=item.energy_before * joule,
+            energy_after=item.energy_after * joule,
+            height=item.height * units.length,
+            energy_bar=None if item.energy_bar is None else item.energy_bar * joule,
+            height_bar=None if item.height_bar is None else item.height_bar * units.length,
+        )
+        for event, item in zip(impacts, with_bars(by_tree, by_bodies, SAFETY, 4 * ROUND_OFF), strict=False)
+    )

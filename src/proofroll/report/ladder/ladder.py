@@ -1,8 +1,9 @@
 """Content of ``proofroll ladder`` as records and as sentences."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from proofroll.core.arrays import largest_difference
 from proofroll.core.errors import ProofrollError
@@ -13,7 +14,6 @@ from proofroll.running.process import status_of
 from proofroll.running.timing import Interval, machine, ratio
 from proofroll.studies.ladder.ladder import Ladder, key_of
 from proofroll.studies.ladder.models import LadderModel, Need, Ran, Rung, Switch, need_of_term
-from proofroll.studies.pareto import front
 
 
 @dataclass(frozen=True)
@@ -261,3 +261,17 @@ def _of_terms(content: LadderContent) -> Iterator[str]:
                 yield f"{term}: it cannot be left out of {labels}."
             case Need.NO_ANSWER:
                 yield f"{term}: {label(rows[0])} {rows[0].reason.removeprefix('with it: ')}."
+
+
+_Item = TypeVar("_Item")
+
+
+def front(entries: Iterable[tuple[_Item, float, float]]) -> list[_Item]:
+    """Items of ``(item, cost, error)`` that no other item matches or beats in both, cheapest first."""
+    kept: list[_Item] = []
+    best = float("inf")
+    for item, _, error in sorted(entries, key=lambda entry: (entry[1], entry[2])):
+        if error < best:
+            kept.append(item)
+            best = error
+    return kept

@@ -1,13 +1,14 @@
 """Three sentences on the whole report, from its data: agreement, silent disagreement, and advice."""
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from proofroll.core.number_format import counted
+from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.conclusions import standings
-from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.scores import furthest_off
+from proofroll.report.comparison.records import ReportedComparison, ReportedRun
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.labels import off_by, with_caveat
 from proofroll.report.page.first_screen import ReportedAnswer, answers_sentence
@@ -116,3 +117,11 @@ def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
         text = row.reason if comparison.laws_alone else text
         wrong.append((relative, with_caveat(name, row.caveat), text))
     return wrong
+
+
+def furthest_off(content: ReportedComparison, runs: Sequence[ReportedRun]) -> Judgement | None:
+    """Judgement of the coordinate with the largest finite relative error, ill-posed ones left out."""
+    motion = content.headlines("motion")
+    judged = (judgement for run in runs for judgement in run.judgements if judgement.observable in motion)
+    finite = [item for item in judged if item.verdict != "ill-posed" and math.isfinite(item.error)]
+    return max(finite, key=lambda item: item.error / item.scale, default=None)

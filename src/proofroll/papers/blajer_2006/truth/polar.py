@@ -6,6 +6,8 @@ friction F. In polar form u = |u| (cos φ e2 + sin φ e3), F = -μk N (cos φ, s
     d|u|/dt = b · (cos φ, sin φ) - A μk N,      |u| (φ̇ + ė2 · e3) = b · (-sin φ, cos φ).
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -15,11 +17,11 @@ from typing_extensions import override
 
 from proofroll.core import heyoka_library as library
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dop853 import TIGHTEST, controlled_step, solver_from
 from proofroll.core.event_location import locate_rise
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.motion import BallMotion, world_motion
 from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates, start
-from proofroll.papers.blajer_2006.truth.explicit import ExplicitRun, Rates
 from proofroll.papers.blajer_2006.truth.sliding import End, Sliding
 from proofroll.papers.blajer_2006.truth.taylor import SlidingTaylor
 
@@ -188,3 +190,46 @@ def _first(solver: Any, stops: Sequence[_Stop]) -> tuple[float, FloatArray, End]
     """First of some stops within the last step: time or τ, state and reason; None: there is none."""
     rise = locate_rise(solver, lambda y: np.array([g(y) for _, g in stops])) if stops else None
     return (rise.time, rise.state, stops[rise.guard][0]) if rise else None
+
+
+Rates = Callable[[FloatArray], FloatArray]
+
+
+class ExplicitRun:
+    """Integration from ``start`` to its end; implements :class:`.IntegratedRun`.
+
+    After each step ``ended`` gets the solver and returns time [s], state and reason of an end within that step; None:
+    the run goes on.
+    """
+
+    def __init__(
+        self,
+        rates: Rates,
+        start: float,
+        state: FloatArray,
+        until: float,
+        *,
+        atol: FloatArray,
+        ended: Callable[[Any], tuple[float, FloatArray, End] | None],
+    ) -> None:
+        self.end, self.last, self.why = until, state, End.TIME
+        self._between: list[Callable[[float], FloatArray]] = []
+        starts = [start]
+        # rates may not be finite for a run of zero length
+        solver = solver_from(lambda _, y: rates(y), start, state, TIGHTEST, atol) if until > start else None
+        while solver is not None and solver.t < until:
+            controlled_step(solver, None, until, math.inf)
+            self._between.append(solver.dense_output())
+            starts.append(solver.t)
+            self.last = solver.y
+            if stopped := ended(solver):
+                self.end, self.last, self.why = stopped
+                break
+        self._starts = np.array(starts[:-1])
+
+    def at(self, places: FloatArray) -> FloatArray:
+        """See :class:`proofroll.papers.blajer_2006.truth.sliding.IntegratedRun`."""
+        if not self._between or not len(places):
+            return np.broadcast_to(self.last, (len(places), len(self.last))).copy()
+        index = np.searchsorted(self._starts, places, side="right") - 1
+        return np.array([self._between[i](x) for i, x in zip(index, places, strict=True)])
