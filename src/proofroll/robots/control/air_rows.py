@@ -246,15 +246,15 @@ class AirTable:
             rate = free @ np.linalg.solve(free.T @ armed @ free, acting)
             return np.concatenate([robot.equations.tree.rate(place, velocity), rate])
 
-        after = classical_step(rates, np.concatenate([q, v]), self.step)[len(q) :]
-        return np.asarray((self.at[row + 1][1] - after) / self.step)
+        new_v = classical_step(rates, np.concatenate([q, v]), self.step)[len(q) :]
+        return np.asarray((self.at[row + 1][1] - new_v) / self.step)
 
     def _slope(self, row: int, rate: Array) -> Array:
         """Change of the forces of inertia at a row with velocities that change by ``rate``; they are quadratic."""
         q, v = self.at[row]
         size = (np.abs(v).max() or 1.0) / (np.abs(rate).max() or 1.0)
-        after, before = (self.robot.forces(q, v + change * rate)[1] for change in (size, -size))
-        return np.asarray((after - before) / (2 * size))
+        forces_after, forces_before = (self.robot.forces(q, v + change * rate)[1] for change in (size, -size))
+        return np.asarray((forces_after - forces_before) / (2 * size))
 
     def rows(self, rows: Array, moving: MovingRates, scheme: StepScheme, *, central: bool) -> AirRows:
         """Forces at some rows.
@@ -307,12 +307,12 @@ class AirTable:
             columns["gravity"].append(into @ weight)
             columns["effort"].append(into @ robot.load(effort))
             columns["armature"].append(-into @ (robot.load(added) * rate))
-            after = v[driven] + (h * rate[driven] if scheme.damped or scheme.whole else 0.0)
-            columns["damping"].append(-into @ robot.load(after))
+            damped_v = v[driven] + (h * rate[driven] if scheme.damped or scheme.whole else 0.0)
+            columns["damping"].append(-into @ robot.load(damped_v))
             columns["friction"].append(-into @ robot.load(np.sign(v[driven])))
             columns["drag"].append(-into @ drag)
             columns["implicit"].append(-into @ (robot.load(h * law.kd) * rate))
-            of_joints = {"damping": -after, "friction": -np.sign(v[driven]), "torque": np.ones(len(driven))}
+            of_joints = {"damping": -damped_v, "friction": -np.sign(v[driven]), "torque": np.ones(len(driven))}
             of_joints |= {"stiffness": -q[robot.driven[:, 0]], "armature": -rate[driven]}
             for name, values in of_joints.items():
                 singles[name].append(into[:, driven] * values)

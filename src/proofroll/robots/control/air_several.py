@@ -85,7 +85,7 @@ class _Screen:
         scaled = columns / np.where(sizes > 0, sizes, 1.0)
         self._products, self._along, self._left = scaled.T @ scaled, scaled.T @ left, left
         ends = np.cumsum([0, *(group.columns.shape[1] for group in groups)])
-        self._places = [np.arange(first, last) for first, last in itertools.pairwise(ends.tolist())]
+        self._places = [np.arange(begin, end) for begin, end in itertools.pairwise(ends.tolist())]
 
     def left(self, numbers: Sequence[int]) -> float:
         """Root mean square of what some groups leave."""
@@ -116,10 +116,10 @@ def _told(
     """A cause for each kind of number beyond its error."""
     bars, remainder = _errors(rows, columns) + ROUND_OFF, rms(rows.left - columns @ values)
     proof = f"forces off by {short(rows.off / rows.size)} of their size, by {short(remainder / rows.size, 1)} with all"
-    first = 0
+    begin = 0
     for group in groups:
-        place = slice(first, first + len(group.where))
-        first = place.stop
+        place = slice(begin, begin + len(group.where))
+        begin = place.stop
         words = _words(group, values[place], bars[place], right)
         if words:
             yield LayerCause(group.kind, f"{words} ({proof})", None, remainder / rows.size)

@@ -167,9 +167,9 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     steady, ranges = held_rows(record, law), evidence.in_air.ranges
     fit, off_stops, remark = standing_fit(record, law, evidence.in_air.held, efforts, steady, ranges)
     if evidence.in_air.stepped is not None and not isinstance(fit, str) and fit.off > fit.bar:
-        other = standing_fit(evidence.record, law, evidence.in_air.stepped, efforts, steady, ranges)
-        if not isinstance(other.fit, str) and other.fit.off < fit.off:
-            fit, off_stops, remark = other
+        rival = standing_fit(evidence.record, law, evidence.in_air.stepped, efforts, steady, ranges)
+        if not isinstance(rival.fit, str) and rival.fit.off < fit.off:
+            fit, off_stops, remark = rival
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
     if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
