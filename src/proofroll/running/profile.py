@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,8 @@ from proofroll.running.process import processor_seconds
 
 # Phases to which parts of cases belong, wherever these were run.
 START, TRUTHS, TIMING = "start", "truths", "timing rounds"
+# Phases of this process alone, during which its workers go on with the phase around them.
+_HERE = ("judging", "page")
 _OF_CASES = {"process start": START, "loading": START, "truth": TRUTHS, "clean runs": TIMING}
 
 
@@ -26,7 +29,7 @@ class ProcessorProfile:
         self.phases: dict[str, float] = defaultdict(float)
         self.activities: dict[str, float] = defaultdict(float)
         self._open = [START]
-        self._since = 0.0
+        self._since = 0.0, 0.0
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
@@ -54,7 +57,10 @@ class ProcessorProfile:
         return sum(self.phases.values())
 
     def _book(self) -> None:
-        """Books the time since the last call on the innermost open phase."""
-        now = processor_seconds()
-        self.phases[self._open[-1]] += now - self._since
-        self._since = now
+        """Books the time since the last call on the innermost open phase; that of workers on the one that has them."""
+        here = time.process_time()
+        workers = processor_seconds() - here
+        self.phases[self._open[-1]] += here - self._since[0]
+        working = next(name for name in reversed(self._open) if name not in _HERE)
+        self.phases[working] += workers - self._since[1]
+        self._since = here, workers

@@ -41,3 +41,15 @@ def test_parts_of_a_case_belong_to_phases_of_their_own() -> None:
     assert profile.phases[START] - before == pytest.approx(1.0, abs=0.5)
     assert profile.phases["search"] == pytest.approx(-7.0, abs=0.5)
     assert profile.activities["advance"] == 8.0
+
+
+def test_workers_go_on_while_this_process_judges(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What workers use meanwhile belongs to the phase around, in which they were asked."""
+    used = [0.0]
+    monkeypatch.setattr("proofroll.running.profile.processor_seconds", lambda: time.process_time() + used[0])
+    profile = ProcessorProfile()
+    with profile.phase("comparisons"), profile.phase("judging"):
+        used[0] = 100.0
+    assert profile.total > 0
+    assert profile.phases["comparisons"] == pytest.approx(100.0, abs=1.0)
+    assert profile.phases["judging"] < 1.0
