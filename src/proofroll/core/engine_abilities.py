@@ -20,6 +20,14 @@ class LocatesEvents(Protocol):
 
 
 @runtime_checkable
+class WatchesEvents(Protocol):
+    """Ability of an engine whose search for events costs time, so that only runs that want events make it."""
+
+    def watch_events(self) -> None:
+        """Looks for events in all steps from now on; called before the first ``advance``, or never."""
+
+
+@runtime_checkable
 class TakesTargets(Protocol):
     """Ability of an engine whose held signals are set from outside, see :mod:`proofroll.core.controlled_engine`."""
 

@@ -11,7 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.controlled_engine import CommandedEngine, commanded
 from proofroll.core.element import Element
 from proofroll.core.engine import Sample, fixed_step
-from proofroll.core.engine_abilities import LocatesEvents, TellsRemarks, require_provided
+from proofroll.core.engine_abilities import LocatesEvents, TellsRemarks, WatchesEvents, require_provided
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.core.plugins import resolve_settings
@@ -109,9 +109,20 @@ def build(kind: Any, scene: Scene, settings: Any) -> Any:
 
 def asking(engine: Any) -> tuple[float, float]:
     """Wall and processor time that an engine's controllers took so far [s]; not the engine's own."""
-    parts = engine.parts.values() if isinstance(engine, IndependentElements) else [engine]
-    spent = [part.asking for part in parts if isinstance(part, CommandedEngine)]
+    spent = [part.asking for part in _parts(engine) if isinstance(part, CommandedEngine)]
     return sum(wall for wall, _ in spent), sum(processor for _, processor in spent)
+
+
+def watch_events(engine: Any) -> None:
+    """Lets an engine look for events in its steps (:class:`proofroll.core.engine_abilities.WatchesEvents`)."""
+    for part in _parts(engine):
+        model = part.engine if isinstance(part, CommandedEngine) else part
+        if isinstance(model, WatchesEvents):
+            model.watch_events()
+
+
+def _parts(engine: Any) -> Collection[Any]:
+    return engine.parts.values() if isinstance(engine, IndependentElements) else [engine]
 
 
 def step_of(engine: Any, settings: Any) -> float | None:

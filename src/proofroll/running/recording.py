@@ -19,7 +19,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
 from proofroll.core.events import Event, wrong_bracket
-from proofroll.core.multi_element import AnySample, arrays, asking, copied, events_of_engine, sample_of
+from proofroll.core.multi_element import AnySample, arrays, asking, copied, events_of_engine, sample_of, watch_events
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -80,6 +80,7 @@ def record(
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0
+    watch_events(engine)
     samples = [_finite(engine.sample(), 0.0, scene)]
     failure: str | None = None
     wall = 0.0

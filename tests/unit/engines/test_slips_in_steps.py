@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 import proofroll
 from proofroll.core.events import events_of
+from proofroll.core.multi_element import watch_events
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build
 
 STEP = 1e-3
 ENGINES = [
@@ -99,3 +102,17 @@ def test_unbounded_friction_never_slips(engine: str) -> None:
     """A ball that rolls in the cylinder creeps in steps of first order, and has no event."""
     scene = load_scene("sphere_in_cylinder", speed=4, rolling_resistance=0)
     assert events_of(proofroll.simulate(scene, engine, until=0.1, every=0.02)) == []
+
+
+@pytest.mark.parametrize("engine", ["mujoco[formulation=geoms]", "exudyn[formulation=spheres]"])
+def test_steps_are_the_same_whether_events_are_looked_for(engine: str) -> None:
+    """A run that only advances has no events, and ends in the same state, to the bit, as one that looks for them."""
+    plain, watched = (build(growing_push()[0], engine) for _ in range(2))
+    watch_events(watched)
+    for t in (0.04, 0.08):
+        plain.advance(t)
+        watched.advance(t)
+    assert plain.events() is None
+    assert watched.events()
+    for name in ("p_WB", "q_WB", "v_WB", "w_WB"):
+        np.testing.assert_array_equal(getattr(plain.sample(), name), getattr(watched.sample(), name))

@@ -96,7 +96,7 @@ class Spheres(Redundant):
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
         """Adds contacts at the depth of their load at the start, with spheres enlarged by that depth."""
         self._contacts: list[_Made] = []
-        self._events = StepEvents(mechanism.contacts, settings.dt)
+        self._events, self._watched = StepEvents(mechanism.contacts, settings.dt), False
         self._following: list[HollowSphere | MovingPlane] = []
         self._resisting: list[TurningFriction] = []
         self._softness, self._larger, self._builds_up = 0.0, 0.0, False
@@ -125,8 +125,6 @@ class Spheres(Redundant):
         moments = start.force[len(start.force) - len(dynamics.turning) :]
         for friction, moment in zip(dynamics.turning, moments, strict=True):
             missing.append(self._add_turning(friction, moment, start.state.touching[friction.pressed_by], settings))
-        if self._events:
-            self.system.SetPostStepUserFunction(self._observe)
         if self._following:
             self.system.SetPreNewtonResidualUserFunction(self._follow)
         self._builds_up = sum(missing) > _LITTLE * load
@@ -280,6 +278,12 @@ class Spheres(Redundant):
         for wall in self._following:
             wall.follow(system)
 
+    def watch_events(self) -> None:
+        """See :class:`proofroll.core.engine_abilities.WatchesEvents`."""
+        self._watched = bool(self._events)
+        if self._watched:
+            self.system.SetPostStepUserFunction(self._observe)
+
     def _observe(self, system: Any, t: float) -> bool:
         """Takes the contacts' states after a step; Exudyn calls it once at the start, too. True goes on."""
         if t > 0.0:
@@ -292,7 +296,7 @@ class Spheres(Redundant):
 
     def events(self) -> Sequence[Event] | None:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`; what slips faster than its zone has left it."""
-        return self._events.events()
+        return self._events.events() if self._watched else None
 
     def _moved(self, *bodies: str) -> float:
         """Reduced mass of two bodies [kg]; the world counts as infinite."""

@@ -78,6 +78,7 @@ class MujocoGeoms(MujocoMechanism):
         super().__init__(mechanism, settings)
         self._contacts = Contacts(self._model, mechanism, settings)
         self._states = ContactStates(self._contacts, mechanism, settings)
+        self._watched = False
         self._resistance = RollingResistance(self._model, mechanism, settings, self._contacts)
         self._walls = Walls(self._model, mechanism)
         velocities = self._data.qvel.copy()
@@ -111,7 +112,8 @@ class MujocoGeoms(MujocoMechanism):
         return super().spec()
 
     def _run(self, steps: int) -> None:
-        edits, observes = self._settings.cone_correction or self._settings.curvature, bool(self._states.events)
+        edits = self._settings.cone_correction or self._settings.curvature
+        observes = bool(self._states.events) and (self._watched or bool(self._resistance))
         if not (edits or observes or self._resistance or self._walls):
             super()._run(steps)
             return
@@ -140,9 +142,13 @@ class MujocoGeoms(MujocoMechanism):
         self._edit(self._data, remember=True)
         mujoco.mj_step2(self._model, self._data)
 
+    def watch_events(self) -> None:
+        """See :class:`proofroll.core.engine_abilities.WatchesEvents`; resistance looks at its contacts anyway."""
+        self._watched = True
+
     def events(self) -> Sequence[Event] | None:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return self._states.events.events()
+        return self._states.events.events() if self._watched else None
 
     @property
     @override
