@@ -16,6 +16,8 @@ from proofroll.running.timing import Interval, Timing, ratio, time_in_rounds
 SCENE = "sphere_in_cylinder"
 # A tree of one joint, where an adapter's own cost shows most, and one with loops that depend on each other.
 MECHANISMS = ("pendulum", "four_bar")
+# Bodies that touch: a corner that lands, feet that slip, spheres that meet, a disc that rolls.
+CONTACTS = ("falling_rod", "sled", "two_spheres", "rolling_coin")
 # The study's usual sampling interval, and the longest run [s].
 EVERY, UNTIL = 0.02, 2.0
 # A measurement is repeated within a round until it has lasted this long [s], so that a ratio means something.
@@ -38,12 +40,15 @@ class AdapterRow:
     Attributes:
         engine, formulation, preset, variant: names of the run; the variant is a ball's, or the scene of a mechanism.
         ratio: adapter over bare loop, with its interval; None if there is none.
-        message: why there is none, else how far apart the two ended.
+        message: why there is none, else how far apart the two ended, or the share of the part that the engine lacks.
+        refused: True if the engine refuses the scene, so that there is nothing to measure.
+        lacks: part of the adapter that the engine has not and the bare loop leaves out, as ``wall``; empty: none.
         adapter, bare: median seconds of the process per simulated second, if measured.
         distance: between the ball's centres, or the bodies' origins, at the end [m].
         tolerance, because: allowed difference [m], and the reason why it is not zero.
         until: simulated seconds of one run [s].
         within_goal: True if the ratio is at most :data:`GOAL`.
+        failed: True if the row should have been measured, and was not.
     """
 
     engine: str
@@ -58,11 +63,18 @@ class AdapterRow:
     tolerance: float | None = None
     because: str | None = None
     until: float | None = None
+    refused: bool = False
+    lacks: str = ""
 
     @property
     def within_goal(self) -> bool | None:
-        """True if the ratio is at most the goal; None if there is none."""
-        return None if self.ratio is None else self.ratio.value <= GOAL
+        """True if the ratio is at most the goal; None if there is none, or if it tells the share of a part."""
+        return None if self.ratio is None or self.lacks else self.ratio.value <= GOAL
+
+    @property
+    def failed(self) -> bool:
+        """True if there is no ratio, and the engine represents the scene."""
+        return self.ratio is None and not self.refused
 
 
 def measure_adapter(
@@ -104,6 +116,10 @@ def measure_adapter(
         centre = prepared.run(times)
         return clock() - start, (centre, prepared)
 
+    try:
+        kind.build(scene, settings)
+    except Refused as error:
+        return {"refused": str(error)}
     # As long as the two together take several times the least, but no longer than the usual study.
     first = _grid(10 * EVERY)
     probe = (adapter(first)[0] + bare(first)[0]) / first[-1]
@@ -123,8 +139,9 @@ def measure_adapter(
         "tolerance": prepared.tolerance,
         "because": prepared.because,
         "until": float(times[-1]),
+        "lacks": prepared.lacks,
     }
-    if not distance <= prepared.tolerance:
+    if not (prepared.lacks or distance <= prepared.tolerance):
         return answer
     timings = time_in_rounds({"adapter": lambda: repeated(adapter), "bare": lambda: repeated(bare)}, rounds)
     return answer | {name: list(timing.values) for name, timing in timings.items()}
@@ -147,7 +164,7 @@ def bench_adapters(
     from proofroll_benchmarks.bare import bare_loop
 
     rows: list[AdapterRow] = []
-    asked = {name: load_scene(name).requires for name in (SCENE, *MECHANISMS)}
+    asked = {name: load_scene(name).requires for name in (SCENE, *MECHANISMS, *CONTACTS)}
     for engine in engines:
         worker = Worker()
         try:
@@ -200,16 +217,20 @@ def bench_adapters(
 def _row(answer: dict[str, Any]) -> dict[str, Any]:
     if "message" in answer:
         return {"ratio": None, "message": answer["message"]}
-    facts = {key: answer[key] for key in ("distance", "tolerance", "because", "until")}
+    if "refused" in answer:
+        return {"ratio": None, "message": f"refused: {answer['refused']}", "refused": True}
+    facts = {key: answer[key] for key in ("distance", "tolerance", "because", "until", "lacks")}
     if "adapter" not in answer:
         apart = (
             f"the two end {answer['distance']:.2g} m apart, more than {answer['tolerance']:.2g} m: not the same model"
         )
         return facts | {"ratio": None, "message": apart}
     adapter, bare = (Timing(tuple(answer[name])) for name in ("adapter", "bare"))
+    cost = ratio(adapter, bare)
+    share = f"about {1 - 1 / cost.value:.0%} of its steps' time is proofroll's own {answer['lacks']}"
     return facts | {
-        "ratio": ratio(adapter, bare),
-        "message": f"same place to {answer['distance']:.1g} m",
+        "ratio": cost,
+        "message": share if answer["lacks"] else f"same place to {answer['distance']:.1g} m",
         "adapter": adapter.interval.value,
         "bare": bare.interval.value,
     }
@@ -222,19 +243,19 @@ def content(rows: Sequence[AdapterRow]) -> dict[str, Any]:
     engines: dict[str, Any] = {}
     for name in dict.fromkeys(row.engine for row in rows):
         own = [row for row in rows if row.engine == name]
-        measured = [row for row in own if row.ratio is not None]
+        measured = [row for row in own if row.within_goal is not None]
         worst = max(measured, key=lambda row: row.ratio.value if row.ratio else 0.0, default=None)
         engines[name] = {
             "ratio": dataclasses.asdict(worst.ratio) if worst and worst.ratio else None,
             "worst": f"{worst.formulation}, {worst.variant}" if worst else None,
             "within_goal": all(row.within_goal for row in measured) if measured else None,
             "message": None if measured else own[0].message,
-            "rows": [dataclasses.asdict(row) | {"within_goal": row.within_goal} for row in own],
+            "rows": [dataclasses.asdict(row) | {"within_goal": row.within_goal, "failed": row.failed} for row in own],
         }
     return {
         "goal": GOAL,
         "scene": SCENE,
-        "mechanisms": list(MECHANISMS),
+        "mechanisms": [*MECHANISMS, *CONTACTS],
         "every": EVERY,
         "machine": machine(),
         "engines": engines,

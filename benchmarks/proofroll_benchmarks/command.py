@@ -25,10 +25,15 @@ def adapters(
     out: Annotated[Path | None, typer.Option(help="Write what --json prints to this file too.")] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Compare each adapter with the bare loop that a careful user of its engine would write."""
+    """Compare each adapter with the bare loop that a careful user of its engine would write.
+
+    A row that cannot be measured is a failure, exit code 1. Without --engine: all engines that announce a bare loop.
+    """
+    from proofroll.core.entry_points import announced
     from proofroll.core.plugins import engine_names, require_engine
     from proofroll.running.store import write_text
     from proofroll_benchmarks.adapters import bench_adapters, content
+    from proofroll_benchmarks.bare import GROUP
     from proofroll_benchmarks.tables import adapter_table
 
     for name in engine or ():
@@ -36,13 +41,16 @@ def adapters(
     if out is not None:
         options.require_writable(out)
     with options.progress_bar("adapters") as advance:
-        table = content(bench_adapters(engine or engine_names(), preset, rounds, seconds, progress=advance))
+        names = engine or [name for name in engine_names() if name in {point.name for point in announced(GROUP)}]
+        table = content(bench_adapters(names, preset, rounds, seconds, progress=advance))
     if out is not None:
         write_text(out, options.json_text(table))
     options.show(table, as_json, lambda: [adapter_table(table), f"goal: at most {table['goal']:g}"])
     measured = [item for item in table["engines"].values() if item["ratio"] is not None]
     if engine and not measured:
         raise typer.Exit(options.ENGINE)
+    if any(row["failed"] for item in table["engines"].values() for row in item["rows"]):
+        raise typer.Exit(1)
 
 
 @bench.command()

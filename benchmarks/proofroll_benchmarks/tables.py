@@ -19,6 +19,9 @@ _MEANING = {
 }
 
 
+_STYLES = {True: "", False: "yellow", None: ""}
+
+
 def reference_tables(content: dict[str, Any]) -> Iterator[Table]:
     """Tables of the runs, their speed-ups, and the goals."""
     slip = content["first_slip"]["seconds"]
@@ -94,9 +97,9 @@ def adapter_table(found: dict[str, Any]) -> Table:
             table.add_row(
                 Text(f"{name} {row['formulation']} {row['preset']}"),
                 Text(row["variant"]),
-                Text("–" if ratio is None else f"{ratio['value']:.3f}", style="" if row["within_goal"] else "yellow"),
+                Text("–" if ratio is None else f"{ratio['value']:.3f}", style=_STYLES[row["within_goal"]]),
                 Text(interval),
-                Text(row["message"]),
+                Text(f"✗ not measured: {row['message']}" if row["failed"] else row["message"]),
             )
     return table
 

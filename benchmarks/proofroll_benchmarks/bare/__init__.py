@@ -1,5 +1,8 @@
 """Bare loops: what a careful user of one engine would write for a scene without proofroll, to measure adapters by.
 
+Where equations or steps are proofroll's own (the projection method, closed loops and impulses on Pinocchio's terms),
+the loop has these in place of a user's, and the ratio is what the adapter adds to them.
+
 A bare loop is announced as an entry point of the group ``proofroll.bare_loops``, under the name of its engine. It is a
 function of a scene and of the engine's settings that prepares a run, untimed, and gives a :class:`Bare`. It may know
 the scene (these here know the vertical cylinder and revolute joints), steps with the same method and step as the
@@ -34,11 +37,14 @@ class Bare:
             [m], shape (3,), or the origins of a mechanism's bodies, shape (bodies, 3). Called once, and timed.
         tolerance: largest distance [m] from the adapter's centre that the two loops explain.
         because: why it is not zero.
+        lacks: part of the adapter that the engine has not, as ``wall``. The loop then has the engine's own steps alone
+            and ends elsewhere: the ratio is no cost of an adapter, and tells that part's share.
     """
 
     run: Callable[[FloatArray], FloatArray]
     tolerance: float
     because: str
+    lacks: str = ""
 
 
 def load_bare_loop(engine: str) -> Any:

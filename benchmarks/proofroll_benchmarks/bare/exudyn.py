@@ -1,4 +1,6 @@
-"""Exudyn without the adapter: one call of its solver over the whole horizon, with sensors that keep the samples.
+"""Exudyn without the adapter: of a ball one call of its solver over all times, with sensors that keep the samples.
+
+Of a mechanism its solver goes from sample to sample.
 
 The items and their consistent start come from the adapter's builders, since a user would add the same ones; all user
 functions that run while Exudyn integrates are written here, for the vertical cylinder.
@@ -6,6 +8,7 @@ functions that run while Exudyn integrates are written here, for the vertical cy
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -13,16 +16,20 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Diverged
+from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.contact.rolling_and_spin import turning_frictions
 from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
 from proofroll.engines.exudyn.integration import simulation_settings
 from proofroll.engines.exudyn.native import Output, exu, items
-from proofroll.engines.exudyn.smooth.redundant import Redundant
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.exudyn.carrier import Carrier
 from proofroll.papers.blajer_2006.exudyn.rolling_disc import RollingDisc
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
+
+Exudyn = load_engine("exudyn")
 
 Start = tuple[FloatArray, FloatArray]
 
@@ -32,7 +39,7 @@ def prepare(scene: Scene, settings: Any) -> Bare:
     restarted = "Newton's method is restarted at every sample, and ends within its tolerance"
     loops = {"carrier": _carrier, "rolling_disc": _rolling_disc}
     if settings.formulation not in loops:
-        return Bare(_mechanism(scene, settings), 1e-7, restarted)
+        return _mechanism(scene, settings)
     return Bare(loops[settings.formulation](in_vertical_cylinder(scene), settings), 1e-9, restarted)
 
 
@@ -40,26 +47,22 @@ def _solve(
     system: Any,
     settings: Any,
     times: FloatArray,
-    start: Start | None = None,
-    *,
-    dependent: bool = False,
+    start: Start,
 ) -> None:
     """Exudyn's solver over the whole time, without its stopwatches."""
-    options = simulation_settings(settings, dependent=dependent)
+    options = simulation_settings(settings)
     time = options.timeIntegration
     time.numberOfSteps, time.endTime = round(float(times[-1]) / settings.dt), float(times[-1])
     options.solution.sensors.active = True
     options.solution.sensors.writePeriod = float(times[1])
-    time.generalizedAlpha.computeInitialAccelerations = start is None
+    time.generalizedAlpha.computeInitialAccelerations = False
     solver = exu.MainSolverImplicitSecondOrder()
-    if start is not None:
-        system.systemData.SetODE2Coordinates_tt(start[0], exu.ConfigurationType.Initial)
+    system.systemData.SetODE2Coordinates_tt(start[0], exu.ConfigurationType.Initial)
     solver.InitializeSolver(system, options)
     timer = solver.timer
     timer.useTimer = False
     solver.timer = timer
-    if start is not None:
-        system.systemData.SetAECoordinates(start[1], exu.ConfigurationType.Current)
+    system.systemData.SetAECoordinates(start[1], exu.ConfigurationType.Current)
     if not solver.SolveSteps(system, options):
         raise Diverged("Exudyn's solver failed")
 
@@ -76,23 +79,32 @@ def _sensors(system: Any, node: Any, forces: Sequence[tuple[Any, Any]], state: S
         )
 
 
-def _mechanism(scene: Scene, settings: Any) -> Callable[[FloatArray], FloatArray]:
-    if settings.formulation != "redundant":
-        raise Refused("there is a bare loop of mechanisms only for redundant coordinates")
-    built = Redundant(scene, settings)
-    system, dependent = built.system, built.integration.options.linearSolver.ignoreSingularJacobian
-    origins = [(built.bodies[body.name], [-float(x) for x in body.com]) for body in mechanism_of(scene).bodies]
-    for number, place in origins:
-        for variable in (Output.Position, Output.Velocity, Output.AngularVelocity, Output.RotationMatrix):
-            kept = {"storeInternal": True, "writeToFile": False, "outputVariableType": variable}
-            system.AddSensor(items.SensorBody(bodyNumber=number, localPosition=place, **kept))
-    system.Assemble()
+def _mechanism(scene: Scene, settings: Any) -> Bare:
+    """Items of the adapter; without the walls that follow a ball, and torques against turning, which Exudyn has not."""
+    built = Exudyn.build(scene, settings)
+    system, solver, options = built.system, built.integration.solver, built.integration.options
+    contacts = mechanism_of(scene).contacts
+    parts = {
+        "wall": any(isinstance(shape, CurvedWall) for item in contacts for shape in (item.shape_a, item.shape_b)),
+        "rolling resistance": bool(turning_frictions(contacts)),
+    }
+    lacks = " and ".join(part for part, present in parts.items() if present)
+    if lacks:
+        system.SetPreNewtonResidualUserFunction(0)
+        for number in range(system.systemData.NumberOfLoads()):
+            if "loadVectorUserFunction" in system.GetLoad(number):
+                system.SetLoadParameter(number, "loadVectorUserFunction", 0)
 
     def run(times: FloatArray) -> FloatArray:
-        _solve(system, settings, times, dependent=dependent)
-        return np.array([system.GetObjectOutputBody(number, Output.Position, place) for number, place in origins])
+        time = solver.it
+        for begin, end in itertools.pairwise(times.tolist()):
+            time.startTime = time.currentTime = begin
+            time.endTime, time.numberOfSteps = end, round((end - begin) / settings.dt)
+            if not solver.SolveSteps(system, options):
+                raise Diverged("Exudyn's solver failed")
+        return np.array(built.sample().p_WB)
 
-    return run
+    return Bare(run, 1e-12, "the steps are the same", lacks)
 
 
 def _rigid(

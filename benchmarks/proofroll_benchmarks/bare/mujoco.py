@@ -17,7 +17,10 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.rolling_and_spin import turning_frictions
 from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.engines.mujoco.contact.walls import curved_end
 from proofroll.engines.mujoco.reproducer import stepped
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
@@ -30,11 +33,22 @@ _FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mu
 def prepare(scene: Scene, settings: Any) -> Bare:
     """See :mod:`proofroll_benchmarks.bare`."""
     if settings.formulation != "chart":
-        return Bare(_mechanism(scene, settings), 1e-12, "the same steps; sums are in another order")
+        lacks = _lacking(mechanism_of(scene), settings) if settings.formulation == "geoms" else ""
+        return Bare(_mechanism(scene, settings), 1e-12, "the same steps; sums are in another order", lacks)
     body = in_vertical_cylinder(scene)
     model, data = Mujoco.build(scene, settings).native
     run = _chart(model, data, body, settings)
     return Bare(run, 1e-9, "the geometry is rounded otherwise, which a stiff contact magnifies")
+
+
+def _lacking(mechanism: Mechanism, settings: Any) -> str:
+    """Parts of the steps of bodies that touch which MuJoCo has not."""
+    parts = {
+        "wall": any(curved_end(contact) is not None for contact in mechanism.contacts),
+        "rolling resistance": any(not friction.spins for friction in turning_frictions(mechanism.contacts)),
+        "correction": settings.cone_correction or settings.curvature,
+    }
+    return " and ".join(name for name, present in parts.items() if present and mechanism.contacts)
 
 
 def _counted(times: FloatArray, dt: float) -> list[int]:

@@ -1,7 +1,7 @@
 """Pinocchio without the adapter: its kinematics, dynamics and contact solver, with the cylinder's directions by hand.
 
 The model with rows of rolling is built here, and runs under scipy's DOP853, as the adapter's preset ``matched`` does.
-The loop of mechanisms is :mod:`mechanism_loop`.
+Of mechanisms, loops and impulses are proofroll's on Pinocchio's terms, and so they are here.
 """
 
 from __future__ import annotations
@@ -15,17 +15,18 @@ import pinocchio as pin
 from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.elements.mechanism.scene.joint_kinds import FACTS
+from proofroll.engines.pinocchio.contact.impulses import ImpulseSteps
 from proofroll.engines.pinocchio.smooth.constraint_dynamics import ConstraintDynamics
-from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
+from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
+from proofroll.engines.pinocchio.smooth.null_space import LoopRows, NullSpace
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
-from proofroll_benchmarks.bare.mechanism_loop import MechanismLoop
-from proofroll_benchmarks.bare.steps import dop853
+from proofroll_benchmarks.bare.steps import dop853, rk4
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
@@ -45,46 +46,67 @@ def prepare(scene: Scene, settings: Any) -> Bare:
 
 
 def _mechanism(scene: Scene, settings: Any) -> Bare:
+    """Proofroll's equations on Pinocchio's terms in a plain loop; of contacts, its steps."""
+    mechanism = mechanism_of(scene)
     if settings.formulation == "impulses":
-        raise Refused("there is no bare loop of contacts between bodies")
-    mechanism_run = MechanismRun(mechanism_of(scene), settings)
-    loop, frames = _loop_of(mechanism_run, settings), mechanism_run.tree.body
+        return _impulses(mechanism, settings)
+    tree = JointTree(mechanism)
+    if tree.varies:
+        raise Refused("there is no bare loop with signals that change in time")
+    model, data, rows, nq = tree.model, tree.model.createData(), LoopRows(tree), tree.model.nq
+    mu, turns, start = settings.proximal, nq != tree.model.nv, np.concatenate([tree.q0, tree.v0])
+    dynamics = NullSpace(tree, rows) if mu is None else ConstraintDynamics(tree, mu)
+
+    def rates(y: FloatArray) -> FloatArray:
+        q, v = y[:nq], y[nq:]
+        if not turns:
+            return np.concatenate([v, dynamics.acceleration(data, q, v)])
+        q = pin.normalize(model, q)
+        return np.concatenate([pin.tangentMap(model, q) @ v, dynamics.acceleration(data, q, v)])
+
+    def after(y: FloatArray) -> FloatArray:
+        q, v = pin.normalize(model, y[:nq]) if turns else y[:nq], y[nq:]
+        if settings.projection and rows.rank:
+            q, v = rows.eliminated(data, q, v)
+        return np.concatenate([q, v])
+
+    def accepted(solver: DOP853, _: float) -> None:
+        solver.y = after(solver.y)
+        solver.f = rates(solver.y)
+
+    def last(times: FloatArray) -> FloatArray:
+        if settings.integrator != "dop853":
+            return rk4(rates, start, times, settings.dt, after)
+        solver = DOP853(lambda _, y: rates(y), 0.0, start, np.inf, rtol=settings.rtol, atol=settings.rtol)
+        dop853(solver, times, accepted)
+        return np.asarray(solver.y)
 
     def run(times: FloatArray) -> FloatArray:
-        last = loop.last(times)
-        loop.place(last[: loop.model.nq], last[loop.model.nq :])
-        return np.array([loop.data.oMf[frame].translation for frame in frames])
+        return _origins(tree, last(times)[:nq])
 
     return Bare(run, 1e-11, "the same steps; sums are in another order")
 
 
-def _loop_of(run: MechanismRun, settings: Any) -> MechanismLoop:
-    """The loop without the adapter, on the model of a run at time 0.
+def _impulses(mechanism: Mechanism, settings: Any) -> Bare:
+    tree = JointTree(mechanism, apart=True)
+    steps = ImpulseSteps(tree, settings)
 
-    Raises:
-        Refused: the mechanism has actuators, couplings, or drives in time.
-    """
-    if run.tree.mechanism.actuators or run.tree.mechanism.couplings or run.tree.varies:
-        raise Refused("there is no bare loop with actuators, couplings or drives in time")
-    tree, constraints = run.tree, run.dynamics if isinstance(run.dynamics, ConstraintDynamics) else None
-    adaptive = settings.integrator == "dop853"
-    return MechanismLoop(
-        tree.model,
-        np.concatenate([tree.q0, tree.v0]),
-        [
-            (a, b, FACTS[loop.kind].translations, FACTS[loop.kind].rotations)
-            for loop, (a, b) in zip(tree.mechanism.loops, tree.loops, strict=True)
-        ],
-        [(a, b, spring.stiffness, spring.damping, spring.length) for spring, a, b in tree.springs],
-        [(stiffness, rest, q.start, v.start) for stiffness, rest, q, v in tree.sprung],
-        tree.drive,
-        tree.damping,
-        run.rank,
-        bool(settings.projection and run.rank),
-        0.0 if adaptive else settings.dt or 0.0,
-        settings.rtol or 0.0 if adaptive else 0.0,
-        (constraints.constraints, pin.ProximalSettings(*constraints.proximal)) if constraints and tree.loops else None,
-    )
+    def run(times: FloatArray) -> FloatArray:
+        for number in range(round(float(times[-1]) / settings.dt)):
+            steps.t = number * settings.dt
+            steps.step()
+            if not np.isfinite(steps.v.sum()):
+                raise Diverged("the state is not finite")
+        return _origins(tree, steps.q)
+
+    return Bare(run, 1e-9, "times are rounded otherwise")
+
+
+def _origins(tree: JointTree, q: FloatArray) -> FloatArray:
+    """Origins of all bodies [m]."""
+    data = tree.model.createData()
+    pin.framesForwardKinematics(tree.model, data, q)
+    return np.array([data.oMf[frame].translation for frame in tree.body])
 
 
 def _ball(body: RollingBall) -> Any:

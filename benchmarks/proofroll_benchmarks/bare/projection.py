@@ -6,7 +6,7 @@ adapter adds to the equations: the choice of steps, and the checks after each of
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,12 @@ from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
+from proofroll.core.integrators import INTEGRATORS
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.dynamics.switches import switched_joints
 from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.elements.mechanism.scene.signal import varies
+from proofroll.engines.projection.contact.contact_modes import ContactMotion
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.projection.geometry import Uniform
@@ -58,14 +62,36 @@ def _ball(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray
 
 
 def _bodies(scene: Scene, settings: Any) -> Bare:
-    """Runge and Kutta's method on the bodies of a mechanism, cut apart."""
-    if settings.integrator != "rk4":
-        raise Refused("there is a bare loop of mechanisms only with rk4")
-    equations = DependentCoordinates(mechanism_of(scene))
+    """The bodies of a mechanism, cut apart, by the integrators that the engine has, or its modes of contacts.
+
+    Raises:
+        Refused: the mechanism has joints that switch, or signals that change in time.
+    """
+    mechanism = mechanism_of(scene)
+    equations = DependentCoordinates(mechanism)
+    if switched_joints(mechanism) or any(map(varies, mechanism.signals)):
+        raise Refused("there is no bare loop with joints that switch or signals that change in time")
+    resolution = float(getattr(settings, settings.resolution))
+    stepper = INTEGRATORS[settings.integrator](resolution)
+
+    def accepted(t: float, x: FloatArray, held: Sequence[int] = ()) -> FloatArray:
+        equations.applied.now = t
+        if settings.eliminates:
+            x = equations.eliminated(x, held) if held else equations.eliminated(x)
+        equations.accept(x)
+        return x
+
+    motion: Any = stepper
+    if mechanism.contacts:
+        step, tolerance = (resolution, 0.0) if settings.resolution == "dt" else (0.0, resolution)
+        motion = ContactMotion(equations, mechanism, stepper, accepted, step, tolerance)
+    else:
+        stepper.begin(0.0, equations.start, equations.rates, accepted, np.ones(len(equations.start)))
 
     def run(times: FloatArray) -> FloatArray:
-        after = equations.eliminated if settings.eliminates else None
-        x = rk4(equations.rates, equations.start, times, settings.dt, after)
+        for t in times[1:].tolist():
+            motion.advance(t)
+        x = motion.x
         bodies = equations.bodies(x)
         return np.asarray(equations.parts(x)[0] - np.einsum("nij,nj->ni", bodies.rotation, equations.com))
 

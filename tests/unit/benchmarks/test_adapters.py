@@ -86,3 +86,19 @@ def test_the_worst_row_speaks_for_an_engine() -> None:
     assert found["engines"]["e"]["within_goal"] is False
     assert found["engines"]["good"]["within_goal"] is True
     assert [row["within_goal"] for row in found["engines"]["e"]["rows"]] == [True, False, None]
+    assert [row["failed"] for row in found["engines"]["e"]["rows"]] == [False, False, True]
+
+
+def test_a_share_of_a_part_is_no_cost_of_an_adapter() -> None:
+    """A row whose loop lacks a part is measured, and speaks neither for the engine's ratio nor against the goal."""
+    share = Interval(4.0, 3.9, 4.1, 0.97)
+    plain = AdapterRow("e", "one", "matched", "sled", Interval(1.05, 1.0, 1.1, 0.97), "")
+    row = AdapterRow("e", "one", "matched", "f = 0", share, "", lacks="wall")
+    assert (row.within_goal, row.failed) == (None, False)
+    assert content([plain, row])["engines"]["e"]["ratio"]["value"] == 1.05
+
+
+def test_a_row_that_the_engine_refuses_does_not_fail() -> None:
+    """There is nothing to measure where an engine does not represent the scene; elsewhere a missing ratio fails."""
+    refused = AdapterRow("e", "one", "matched", "sled", None, "refused: no spheres", refused=True)
+    assert (refused.failed, AdapterRow("e", "one", "matched", "sled", None, "5.8 m apart").failed) == (False, True)

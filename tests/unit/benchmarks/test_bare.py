@@ -13,7 +13,7 @@ from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.files.scene_file import load_scene
-from proofroll_benchmarks.adapters import MECHANISMS, VARIANTS
+from proofroll_benchmarks.adapters import CONTACTS, MECHANISMS, VARIANTS
 from proofroll_benchmarks.bare import load_bare_loop
 
 FORMULATIONS = [
@@ -77,8 +77,11 @@ def test_another_start_is_refused(engine: str, formulation: str) -> None:
     [
         ("mujoco", "joints", "matched"),
         ("exudyn", "redundant", "matched"),
+        ("exudyn", "spheres", "matched"),
         ("pinocchio", "null_space", "matched"),
+        ("pinocchio", "constraint_dynamics", "tuned"),
         ("projection", "dependent", "default"),
+        ("projection", "dependent", "matched"),
     ],
 )
 def test_bare_mechanisms_end_where_the_adapters_do(engine: str, formulation: str, preset: str, scene: str) -> None:
@@ -94,8 +97,33 @@ def test_bare_mechanisms_end_where_the_adapters_do(engine: str, formulation: str
     assert np.linalg.norm(bare.run(np.array([0.0, 0.02, 0.04])) - after.p_WB) <= bare.tolerance
 
 
-def test_a_formulation_without_a_bare_loop_is_refused() -> None:
-    """Steps of contacts between bodies have none, and say so."""
-    settings = resolve_settings(load_engine("pinocchio"), {"formulation": "impulses"})
-    with pytest.raises(Refused, match="no bare loop of contacts"):
-        load_bare_loop("pinocchio")(load_scene("pendulum"), settings)
+@pytest.mark.parametrize("scene", CONTACTS)
+def test_bare_loops_of_bodies_that_touch(scene: str) -> None:
+    """Every formulation that represents a scene with contacts has a bare loop, which ends where the adapter does."""
+    measured = []
+    for engine in ("mujoco", "exudyn", "pinocchio", "projection"):
+        kind, loaded = load_engine(engine), load_scene(scene)
+        for formulation in (name for name in kind.presets if loaded.requires <= set(kind.provides[name])):
+            settings = resolve_settings(kind, {"formulation": formulation})
+            try:
+                built = kind.build(loaded, settings)
+            except Refused:
+                continue
+            bare = load_bare_loop(engine)(load_scene(scene), settings)
+            built.advance(0.02)
+            built.advance(0.04)
+            assert not bare.lacks
+            assert np.linalg.norm(bare.run(np.array([0.0, 0.02, 0.04])) - built.sample().p_WB) <= bare.tolerance
+            measured.append(formulation)
+    assert {"geoms", "impulses", "dependent"} <= set(measured)
+
+
+@pytest.mark.parametrize(("engine", "formulation"), [("mujoco", "geoms"), ("exudyn", "spheres")])
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_loop_that_lacks_a_part_names_it(engine: str, formulation: str, variant: str) -> None:
+    """Neither MuJoCo nor Exudyn has a curved wall or rolling resistance: their own steps go elsewhere."""
+    settings = resolve_settings(load_engine(engine), {"formulation": formulation})
+    bare = load_bare_loop(engine)(
+        load_scene("sphere_in_cylinder", **{"rolling_resistance": 0, **VARIANTS[variant]}), settings
+    )
+    assert bare.lacks == ("wall and rolling resistance" if VARIANTS[variant] else "wall")
