@@ -8,12 +8,18 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt
 
-from proofroll.core.engine import whole_steps
-from proofroll.core.scene import Scene
-from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.papers.blajer_2006.ball.mechanics import newton_euler
-from proofroll.papers.blajer_2006.ball.model import ROLLS, RollingBall
-from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
+from proofroll.adapter import (
+    ROLLS,
+    BallBuilt,
+    BallSample,
+    RollingBall,
+    RunOnBody,
+    Scene,
+    newton_euler,
+    on_body,
+    rolling_ball,
+    whole_steps,
+)
 
 
 @dataclass(frozen=True)

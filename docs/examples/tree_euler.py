@@ -9,12 +9,19 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from annotated_types import Gt
 
-from proofroll.core.engine import whole_steps
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism import Mechanism, Tree
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.elements.mechanism.scene.rotations import Array, skew, to_quaternion
+from proofroll.adapter import (
+    Array,
+    Mechanism,
+    MechanismBuilt,
+    MechanismCapability,
+    MechanismSample,
+    Scene,
+    Tree,
+    mechanism_of,
+    skew,
+    to_quaternion,
+    whole_steps,
+)
 
 JOINTS = frozenset({MechanismCapability.FIXED, MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC})
 

@@ -5,8 +5,7 @@ import pytest
 from proofroll_dart import Dart
 
 import proofroll
-from proofroll.core.engine_abilities import require_provided
-from proofroll.core.errors import Refused
+from proofroll.adapter import Refused, require_provided
 
 
 @pytest.mark.parametrize(

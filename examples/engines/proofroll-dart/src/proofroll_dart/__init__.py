@@ -13,13 +13,21 @@ from annotated_types import Gt, Le
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.engine import Scheme, whole_steps
-from proofroll.core.errors import Diverged, InputError
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism import WORLD, Joint, Mechanism
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.elements.mechanism.scene.signal import value_at
+from proofroll.adapter import (
+    WORLD,
+    Diverged,
+    InputError,
+    Joint,
+    Mechanism,
+    MechanismBuilt,
+    MechanismCapability,
+    MechanismSample,
+    Scene,
+    Scheme,
+    mechanism_of,
+    value_at,
+    whole_steps,
+)
 
 _KINDS = {"fixed": "Weld", "revolute": "Revolute", "prismatic": "Prismatic", "universal": "Universal"}
 _DRIVES = {MechanismCapability[name] for name in ("JOINT_SPRINGS", "ACTUATORS", "SATURATION", "SIGNALS")}

@@ -14,13 +14,20 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable, RotationalInertia, SpatialInertia
 from scipy.integrate import solve_ivp
 
-from proofroll.core.errors import Diverged
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.papers.blajer_2006.ball.mechanics import resistance_moment
-from proofroll.papers.blajer_2006.ball.model import ROLLS, RollingBall
-from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
+from proofroll.adapter import (
+    ROLLS,
+    BallBuilt,
+    BallSample,
+    Diverged,
+    MechanismCapability,
+    RollingBall,
+    RunOnBody,
+    Scene,
+    on_body,
+    resistance_moment,
+    rolling_ball,
+    terms_held,
+)
 from proofroll_drake.settings import DrakeSettings
 
 PROVIDES: frozenset[str] = ROLLS | {MechanismCapability.ORIENTATION}

@@ -19,11 +19,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import CoulombFriction, DiscreteContactApproximation
 
-from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
-from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
-from proofroll.elements.mechanism.run.sampling import MechanismBuilt
+from proofroll.adapter import ContactDynamics, Family, Mechanism, MechanismBuilt, Refused, of_contact
 from proofroll_drake.settings import DrakeSettings
 
 APPROXIMATIONS: Mapping[str, DiscreteContactApproximation] = {

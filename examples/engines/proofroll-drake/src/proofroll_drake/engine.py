@@ -6,8 +6,7 @@ import importlib.metadata
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.adapter import MechanismCapability, Scene
 from proofroll_drake import ball, contact, mechanism
 from proofroll_drake.ball import DrakeBall
 from proofroll_drake.mechanism import DrakeMechanism

@@ -19,7 +19,7 @@ from pydrake.multibody.tree import (
     WeldJoint,
 )
 
-from proofroll.elements.mechanism import Joint
+from proofroll.adapter import Joint
 
 _Z = [0.0, 0.0, 1.0]
 # Drake's universal joint turns about x of its frame on the parent, then about y of that on the child; ours about z, x.

@@ -18,21 +18,34 @@ from pydrake.multibody.tree import (
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from proofroll.core.engine import Regularised, whole_steps
-from proofroll.core.errors import Diverged, Refused
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism import WORLD, Joint, Mechanism
-from proofroll.elements.mechanism.dynamics.loop_points import held_points
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, FORCES, MechanismCapability
-from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.elements.mechanism.scene.joint_kinds import WITH_AXIS
-from proofroll.elements.mechanism.scene.signal import value_at
+from proofroll.adapter import (
+    WITH_AXIS,
+    WORLD,
+    Diverged,
+    Joint,
+    Mechanism,
+    MechanismBuilt,
+    MechanismCapability,
+    MechanismSample,
+    Refused,
+    Regularised,
+    Scene,
+    held_points,
+    mechanism_of,
+    value_at,
+    whole_steps,
+)
 from proofroll_drake.contact import DrakeContacts
 from proofroll_drake.joints import connect, start
 from proofroll_drake.settings import DrakeSettings
 
 _CAPABILITY = MechanismCapability
-CONTINUOUS: frozenset[str] = ALL_JOINTS | FORCES | {_CAPABILITY.ARMATURE}
+CONTINUOUS: frozenset[str] = frozenset(
+    {
+        _CAPABILITY.FIXED, _CAPABILITY.REVOLUTE, _CAPABILITY.PRISMATIC, _CAPABILITY.UNIVERSAL, _CAPABILITY.SPHERICAL,
+        _CAPABILITY.PLANAR, _CAPABILITY.FREE, _CAPABILITY.SPRINGS, _CAPABILITY.JOINT_SPRINGS, _CAPABILITY.ARMATURE,
+    }
+)  # fmt: skip
 DISCRETE: frozenset[str] = CONTINUOUS | {
     _CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT,
     _CAPABILITY.COUPLINGS, _CAPABILITY.STOPS, _CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS,

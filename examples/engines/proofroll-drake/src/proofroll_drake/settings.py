@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Gt, Le
 
-from proofroll.core.engine import Scheme
-from proofroll.core.errors import InputError
+from proofroll.adapter import InputError, Scheme
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,22 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Regularised, whole_steps
-from proofroll.core.errors import Diverged
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
-from proofroll.papers.blajer_2006.ball.mechanics import natural_acceleration
-from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL, RollingBall
-from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
+from proofroll.adapter import (
+    ALL_OF_A_BALL,
+    BallBuilt,
+    BallSample,
+    Diverged,
+    MechanismCapability,
+    Regularised,
+    RollingBall,
+    RunOnBody,
+    Scene,
+    natural_acceleration,
+    on_body,
+    rolling_ball,
+    terms_held,
+    whole_steps,
+)
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 

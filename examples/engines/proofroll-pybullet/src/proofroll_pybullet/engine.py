@@ -6,9 +6,7 @@ import importlib.metadata
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.adapter import Family, MechanismCapability, Scene, of_contact
 from proofroll_pybullet import ball, mechanism, spheres
 from proofroll_pybullet.ball import PybulletBall
 from proofroll_pybullet.mechanism import PybulletMechanism

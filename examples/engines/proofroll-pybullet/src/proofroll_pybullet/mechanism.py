@@ -14,15 +14,26 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Regularised, whole_steps
-from proofroll.core.errors import Diverged, Refused
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism, Tree
-from proofroll.elements.mechanism.dynamics.loop_points import held_points
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_quaternion
-from proofroll.elements.mechanism.scene.signal import value_at
+from proofroll.adapter import (
+    WORLD,
+    Body,
+    Diverged,
+    Joint,
+    Mechanism,
+    MechanismBuilt,
+    MechanismCapability,
+    MechanismSample,
+    Refused,
+    Regularised,
+    Scene,
+    Tree,
+    from_quaternion,
+    held_points,
+    mechanism_of,
+    to_quaternion,
+    value_at,
+    whole_steps,
+)
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 

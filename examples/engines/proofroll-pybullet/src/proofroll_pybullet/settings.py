@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt
 
-from proofroll.core.engine import Scheme
+from proofroll.adapter import Scheme
 
 
 @dataclass(frozen=True)

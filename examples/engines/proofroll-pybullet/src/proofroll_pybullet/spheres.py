@@ -8,13 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Regularised, whole_steps
-from proofroll.core.errors import Diverged, Refused
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_quaternion
+from proofroll.adapter import (
+    WORLD,
+    Diverged,
+    Mechanism,
+    MechanismBuilt,
+    MechanismCapability,
+    MechanismSample,
+    Refused,
+    Regularised,
+    Scene,
+    from_quaternion,
+    mechanism_of,
+    to_quaternion,
+    whole_steps,
+)
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 

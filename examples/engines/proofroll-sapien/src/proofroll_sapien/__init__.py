@@ -11,15 +11,29 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from annotated_types import Gt, Le
 
-from proofroll.core.engine import Regularised, Scheme, whole_steps
-from proofroll.core.errors import Diverged, Refused
-from proofroll.core.scene import Scene
-from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
-from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
-from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.elements.mechanism.scene.rotations import frame_of_axis, from_quaternion, to_quaternion
-from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
+from proofroll.adapter import (
+    WORLD,
+    Body,
+    Diverged,
+    Family,
+    HalfSpace,
+    Joint,
+    Mechanism,
+    MechanismBuilt,
+    MechanismCapability,
+    MechanismSample,
+    Refused,
+    Regularised,
+    Scene,
+    Scheme,
+    SphereShape,
+    frame_of_axis,
+    from_quaternion,
+    mechanism_of,
+    of_contact,
+    to_quaternion,
+    whole_steps,
+)
 
 with warnings.catch_warnings():  # SAPIEN says which library of Vulkan it takes; nothing is drawn here
     warnings.simplefilter("ignore")
