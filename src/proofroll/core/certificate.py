@@ -158,8 +158,6 @@ def first_difference(lines: list[Line]) -> str | None:
     for line in lines:
         if line.standing is not Standing.DIFFERS:
             continue
-        if all(np.isnan(line.found)):
-            return f"the engine's model does not say its {line.quantity}, which the scene requires"
         built, expected = distinct_texts(*worst_numbers(line))
         note = f" (the one of {len(line.found)} numbers that is furthest off)" if len(line.found) > _SHOWN else ""
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
@@ -183,7 +181,8 @@ def worst_numbers(line: Line, most: int = _SHOWN) -> tuple[tuple[float, ...], tu
     if len(line.found) <= most or len(line.found) != len(line.expected):
         return line.found, line.expected
     apart = np.abs(np.array(line.found) - np.array(line.expected))
-    worst = int(np.argmax(np.where(np.isnan(apart), 0.0, apart)))
+    unknown = np.inf if line.difference == np.inf else 0.0  # NaN may be the number that is wrong
+    worst = int(np.argmax(np.where(np.isnan(apart), unknown, apart)))
     return (line.found[worst],), (line.expected[worst],)
 
 
@@ -198,7 +197,7 @@ def distinct_texts(numbers: tuple[float, ...], expected: tuple[float, ...]) -> t
 
 def _scale(line: Line) -> str:
     """Clause with the scale of the difference if it is not the size of the shown numbers; otherwise empty."""
-    if len(line.found) != len(line.expected) or not line.difference:
+    if len(line.found) != len(line.expected) or not line.difference or line.difference == np.inf:
         return ""
     expected = np.array(line.expected)
     scale = float(np.nanmax(np.abs(np.array(line.found) - expected))) / line.difference

@@ -32,3 +32,10 @@ def test_a_softening_beyond_what_is_accepted_is_told() -> None:
     tolerance, because = tolerated(soft, cap, 1e-9, "")
     said = first_difference([Line("forces", "N", (265.0,), (12.0,), 0.95, tolerance, because)])
     assert str(said).endswith("(relative difference 0.95, allowed 0.5); loops are soft")
+
+
+def test_a_number_that_is_none_is_shown() -> None:
+    """NaN among many numbers is the one that is furthest off, and the sentence has it beside the scene's."""
+    found = (1.0,) * 10 + (float("nan"), 2.0)
+    said = first_difference([Line("inertia", "kg m^2", (1.0,) * 12, found, float("inf"), 1e-9)])
+    assert "inertia is nan instead of 1 kg m^2 (the one of 12 numbers that is furthest off)" in str(said)

@@ -44,6 +44,7 @@ CAPS: Mapping[str, Regularised] = {
 }
 # Quantities with a tolerance of their own, and why.
 _ROUGH = {"inverse friction": (0.02, "no engine's cone is unbounded; a coefficient of 50 or more stands for it")}
+_KNOWN = ("mass", "centre of mass", "inertia", "gravity")  # None says that they are not known; NaN is a wrong number
 # Accepted shapes: -1 is any number, for bodies or joints may be missing; of one body the index may be left out.
 _SHAPES = {
     "mass": ((-1,), ()),
@@ -76,7 +77,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         want = np.asarray(expected, dtype=np.float64)
         if want.size and np.all(np.isnan(want)):
             return  # nothing is known: a line would pass without any comparison
-        if reported is None or np.all(np.isnan(reported)):
+        if reported is None or (quantity not in _KNOWN and np.all(np.isnan(reported))):
             lines.append(
                 Line(
                     quantity=quantity,
@@ -92,7 +93,8 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         if len(mechanism.bodies) == 1 and got.size == want.size:
             got = got.reshape(want.shape)  # of one body the index may be left out
         finite = ~np.isnan(want) & ~np.isnan(got) if got.shape == want.shape else np.zeros(0, dtype=bool)
-        difference = float(np.max(np.abs(got - want)[finite], initial=0.0)) / scale if finite.size else float("inf")
+        comparable = finite.all() if quantity in _KNOWN else finite.size
+        difference = float(np.max(np.abs(got - want)[finite], initial=0.0)) / scale if comparable else float("inf")
         soft = built.regularised.get(quantity.replace(" ", "_"))
         if soft is None and quantity in _FORCES:  # as soft as what they accelerate
             soft = max(built.regularised.values(), key=lambda softness: softness.tolerance, default=None)
