@@ -3,62 +3,36 @@
 The table in docs/write_an_engine.md says what each name is. A name stays, or leaves with an entry in ``changes/``.
 """
 
-from proofroll.core.engine import Engine as Engine
-from proofroll.core.engine import Regularised as Regularised
-from proofroll.core.engine import Sample as Sample
-from proofroll.core.engine import Scheme as Scheme
-from proofroll.core.engine import Settings as Settings
-from proofroll.core.engine import whole_steps as whole_steps
-from proofroll.core.engine_abilities import Level as Level
-from proofroll.core.engine_abilities import Term as Term
-from proofroll.core.engine_abilities import require_provided as require_provided
-from proofroll.core.errors import Diverged as Diverged
-from proofroll.core.errors import InputError as InputError
-from proofroll.core.errors import Refused as Refused
-from proofroll.core.events import Event as Event
-from proofroll.core.formulations import Formulation as Formulation
-from proofroll.core.scene import Scene as Scene
-from proofroll.elements.mechanism import WORLD as WORLD
-from proofroll.elements.mechanism import Body as Body
-from proofroll.elements.mechanism import BodyMotion as BodyMotion
-from proofroll.elements.mechanism import Force as Force
-from proofroll.elements.mechanism import Joint as Joint
-from proofroll.elements.mechanism import Loop as Loop
-from proofroll.elements.mechanism import Mechanism as Mechanism
-from proofroll.elements.mechanism import Point as Point
-from proofroll.elements.mechanism import Spring as Spring
-from proofroll.elements.mechanism import Tree as Tree
-from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics as ContactDynamics
-from proofroll.elements.mechanism.dynamics.held_signals import drive as drive
-from proofroll.elements.mechanism.dynamics.loop_points import held_points as held_points
-from proofroll.elements.mechanism.dynamics.outside_loads import loads_at as loads_at
-from proofroll.elements.mechanism.dynamics.outside_loads import targets_at as targets_at
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability as MechanismCapability
-from proofroll.elements.mechanism.run.contacts.family import Family as Family
-from proofroll.elements.mechanism.run.contacts.family import of_contact as of_contact
-from proofroll.elements.mechanism.run.sampling import MechanismBuilt as MechanismBuilt
-from proofroll.elements.mechanism.run.sampling import MechanismSample as MechanismSample
-from proofroll.elements.mechanism.run.sampling import mechanism_of as mechanism_of
-from proofroll.elements.mechanism.run.sampling import unsaid as unsaid
-from proofroll.elements.mechanism.scene.joint_kinds import WITH_AXIS as WITH_AXIS
-from proofroll.elements.mechanism.scene.joint_kinds import JointKind as JointKind
-from proofroll.elements.mechanism.scene.rotations import Array as Array
-from proofroll.elements.mechanism.scene.rotations import frame_of_axis as frame_of_axis
-from proofroll.elements.mechanism.scene.rotations import from_quaternion as from_quaternion
-from proofroll.elements.mechanism.scene.rotations import skew as skew
-from proofroll.elements.mechanism.scene.rotations import to_quaternion as to_quaternion
-from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace as HalfSpace
-from proofroll.elements.mechanism.scene.shapes.shapes import SphereShape as SphereShape
-from proofroll.elements.mechanism.scene.signal import value_at as value_at
-from proofroll.papers.blajer_2006.ball.as_body import RunOnBody as RunOnBody
-from proofroll.papers.blajer_2006.ball.as_body import on_body as on_body
-from proofroll.papers.blajer_2006.ball.as_body import rolling_ball as rolling_ball
-from proofroll.papers.blajer_2006.ball.mechanics import natural_acceleration as natural_acceleration
-from proofroll.papers.blajer_2006.ball.mechanics import newton_euler as newton_euler
-from proofroll.papers.blajer_2006.ball.mechanics import resistance_moment as resistance_moment
-from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL as ALL_OF_A_BALL
-from proofroll.papers.blajer_2006.ball.model import ROLLS as ROLLS
-from proofroll.papers.blajer_2006.ball.model import RollingBall as RollingBall
-from proofroll.papers.blajer_2006.ball.sampling import BallBuilt as BallBuilt
-from proofroll.papers.blajer_2006.ball.sampling import BallSample as BallSample
-from proofroll.papers.blajer_2006.ball.sampling import terms_held as terms_held
+from proofroll.core.engine import Engine, Regularised, Sample, Scheme, Settings, whole_steps
+from proofroll.core.engine_abilities import Level, Term, require_provided
+from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.events import Event
+from proofroll.core.formulations import Formulation
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import WORLD, Body, BodyMotion, Force, Joint, Loop, Mechanism, Point, Spring, Tree
+from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
+from proofroll.elements.mechanism.dynamics.held_signals import drive
+from proofroll.elements.mechanism.dynamics.loop_points import held_points
+from proofroll.elements.mechanism.dynamics.point_loads import loads_at, targets_at
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of, unsaid
+from proofroll.elements.mechanism.scene.joint_kinds import WITH_AXIS, JointKind
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_quaternion, skew, to_quaternion
+from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
+from proofroll.elements.mechanism.scene.signal import value_at
+from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.papers.blajer_2006.ball.mechanics import natural_acceleration, newton_euler, resistance_moment
+from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL, ROLLS, RollingBall
+from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
+
+__all__ = [
+    "ALL_OF_A_BALL", "ROLLS", "WITH_AXIS", "WORLD", "Array", "BallBuilt", "BallSample", "Body", "BodyMotion",
+    "ContactDynamics", "Diverged", "Engine", "Event", "Family", "Force", "Formulation", "HalfSpace", "InputError",
+    "Joint", "JointKind", "Level", "Loop", "Mechanism", "MechanismBuilt", "MechanismCapability", "MechanismSample",
+    "Point", "Refused", "Regularised", "RollingBall", "RunOnBody", "Sample", "Scene", "Scheme", "Settings",
+    "SphereShape", "Spring", "Term", "Tree", "drive", "frame_of_axis", "from_quaternion", "held_points", "loads_at",
+    "mechanism_of", "natural_acceleration", "newton_euler", "of_contact", "on_body", "require_provided",
+    "resistance_moment", "rolling_ball", "skew", "targets_at", "terms_held", "to_quaternion", "unsaid", "value_at",
+    "whole_steps",
+]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Loads of springs between points, bushings and applied forces on the bodies of a mechanism, at one state."""
+"""Loads of springs, bushings, applied forces and drives on the bodies of a mechanism, and targets, at one state."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -9,6 +9,7 @@ from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion
 from proofroll.elements.mechanism.scene.bushing import LARGEST
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.kinks import Functions, Sides
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.parts import Force, Spring
@@ -86,6 +87,46 @@ def applied_loads(
     arm = motion.R_WB[acting] @ applied.position
     yield PointLoad(acting, arm, force, moment)
     yield PointLoad(reacting, motion.p_WB[acting] + arm - motion.p_WB[reacting], -force, -moment)
+
+
+def loads_at(mechanism: Mechanism, t: float, p_WB: Array, R_WB: Array) -> tuple[Array, Array]:
+    """Force [N] and moment about the body's origin [N m] on each body, world axes, (bodies, 3) each.
+
+    They are those of the joints' drives and of applied forces, with their reactions on other bodies, for adapters that
+    set them from outside.
+
+    Args:
+        mechanism: with the drives and forces.
+        t: time [s].
+        p_WB: origins of the bodies [m], (bodies, 3).
+        R_WB: rotations of the bodies, (bodies, 3, 3).
+    """
+    p, R = np.vstack([p_WB, np.zeros(3)]), np.concatenate([R_WB, np.eye(3)[None]])
+    other_arrays = dict.fromkeys(("v_WB", "w_WB", "J", "bias", "p_joint", "R_parent", "q"), np.zeros(0))
+    motion = BodyMotion(p_WB=p, R_WB=R, **other_arrays)  # no load here depends on these
+    force, moment = np.zeros((2, *p.shape))  # the last row: of the world
+    for load in _outside_loads(mechanism, motion, t):
+        force[load.body] += load.force
+        moment[load.body] += load.moment + cross(load.arm, load.force)
+    return force[:-1], moment[:-1]
+
+
+def _outside_loads(mechanism: Mechanism, motion: BodyMotion, t: float) -> Iterator[PointLoad]:
+    for applied in mechanism.forces:
+        yield from applied_loads(mechanism, applied, motion, t)
+    p, R, none = motion.p_WB, motion.R_WB, np.zeros(3)
+    for joint in mechanism.joints:
+        parent, child = mechanism.body_index[joint.parent], mechanism.body_index[joint.child]
+        effort = value_at(joint.torque, t) * R[child] @ joint.child_frame[:, 2]
+        force, moment = (effort, none) if joint.kind == JointKind.PRISMATIC else (none, effort)
+        arm = R[child] @ joint.child_position
+        yield PointLoad(child, arm, force, moment)
+        yield PointLoad(parent, p[child] + arm - p[parent], -force, -moment)
+
+
+def targets_at(mechanism: Mechanism, t: float) -> Array:
+    """Targets of all actuators at a time [s], in the scene's order, (actuators,); in the unit of each."""
+    return np.array([float(value_at(item.target, t)) for item in mechanism.actuators])
 
 
 def kink_arguments(mechanism: Mechanism, motion: BodyMotion, time: float) -> Array:

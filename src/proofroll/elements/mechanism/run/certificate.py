@@ -92,9 +92,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         got = np.asarray(reported, dtype=np.float64)
         if len(mechanism.bodies) == 1 and got.size == want.size:
             got = got.reshape(want.shape)  # of one body the index may be left out
-        finite = ~np.isnan(want) & ~np.isnan(got) if got.shape == want.shape else np.zeros(0, dtype=bool)
-        comparable = finite.all() if quantity in _KNOWN else finite.size
-        difference = float(np.max(np.abs(got - want)[finite], initial=0.0)) / scale if comparable else float("inf")
+        difference = _apart(want, got, partly=quantity not in _KNOWN) / scale
         soft = built.regularised.get(quantity.replace(" ", "_"))
         if soft is None and quantity in _FORCES:  # as soft as what they accelerate
             soft = max(built.regularised.values(), key=lambda softness: softness.tolerance, default=None)
@@ -146,6 +144,13 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     compare("angular acceleration", "rad/s^2", *rates, turning)
     _compare_reactions(element, built, sample, compare)
     return lines
+
+
+def _apart(want: FloatArray, got: FloatArray, *, partly: bool) -> float:
+    """Largest difference; infinite for another shape, and for NaN unless values may be ``partly`` known."""
+    if got.shape != want.shape or not got.size or not (partly or np.isfinite(got).all()):
+        return float("inf")
+    return float(np.nanmax(np.abs(got - want), initial=0.0))
 
 
 def _compare_matrices(element: MechanismElement, built: MechanismBuilt, compare: _Compare) -> None:

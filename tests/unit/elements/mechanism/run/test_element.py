@@ -114,7 +114,7 @@ def test_the_right_model_passes(name: str) -> None:
         (lambda built: {"joint_position": built.joint_position + 1e-3}, "joint positions"),
         (lambda built: {"mobility": built.mobility + 1}, "mobility"),
         (lambda built: {"gravity": -built.gravity}, "gravity"),
-        (lambda built: {"gravity": np.full(3, np.nan)}, "gravity"),
+        (lambda _: {"gravity": np.full(3, np.nan)}, "gravity"),
         (lambda built: {"mass": np.where(np.arange(len(built.mass)) == 1, np.nan, built.mass)}, "mass"),
         (lambda built: {"inertia": np.full(built.inertia.shape, np.nan)}, "inertia"),
         (lambda _: {"mass_matrix_error": 1e-3}, "error of the mass matrix"),
