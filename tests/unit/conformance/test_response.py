@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,6 +13,8 @@ from proofroll.conformance import response
 from proofroll.conformance.subject import Subject, UnlikeSceneError, contrasts
 from proofroll.core.events import Event, with_events
 from proofroll.core.plugins import load_engine
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.files.scene_file import load_scene
 
 STEP, APART = 1e-3, 2e-8
@@ -39,19 +44,34 @@ def test_jumps_that_follow_at_once_count_together(
         assert found["p_WB"] == pytest.approx(3 * STEP)
 
 
-@pytest.mark.parametrize(
-    ("law", "formulation"),
-    [("limit_of_efforts", "joints"), ("held_targets", "joints"), ("restitution", "geoms")],
-)
-def test_a_law_that_an_engine_drops_is_found(law: str, formulation: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An honest engine is nearer to the truth with a law; one that runs the scene without it fails, however soft."""
-    pytest.importorskip("mujoco")
-    engine, (scene, without) = load_engine("mujoco"), contrasts()[law]
-    settings = engine.presets[formulation]["matched"]
+MUJOCO, PINOCCHIO = ("mujoco", "joints"), ("pinocchio", "impulses")
+# Law -> an engine that has it with its formulation, and what a weaker or stronger law changes of a part of the scene.
+PLANTED: dict[str, tuple[tuple[str, str], Callable[[Mechanism], Mapping[str, object]]]] = {
+    "limit_of_efforts": (MUJOCO, lambda m: {"actuators": (replace(m.actuators[0], limit=1.3 * 5.0),)}),
+    "stiffness_of_servos": (MUJOCO, lambda m: {"actuators": (replace(m.actuators[0], kp=1.1 * m.actuators[0].kp),)}),
+    "held_targets": (MUJOCO, lambda m: {"control": replace(m.control, delay=1)}),  # type: ignore[type-var]  # it has one
+    "damping": (MUJOCO, lambda m: {"joints": tuple(replace(joint, damping=0.5 * joint.damping) for joint in m.joints)}),
+    "stops": (MUJOCO, lambda m: {"joints": tuple(replace(joint, limits=None) for joint in m.joints)}),
+    "restitution": (PINOCCHIO, lambda m: {"pairs": (replace(m.pairs[0], restitution=0.8 * m.pairs[0].restitution),)}),
+    "friction_of_contacts": (
+        PINOCCHIO,
+        lambda m: {"pairs": tuple(replace(pair, friction=0.8 * pair.friction) for pair in m.pairs)},
+    ),
+}
+
+
+@pytest.mark.parametrize("law", [*contrasts()])
+@pytest.mark.parametrize("dropped", [True, False])
+def test_a_law_of_another_strength_is_found(law: str, dropped: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An honest engine passes; one that drops a law, or has it with another strength, fails by the part it has."""
+    (name, formulation), fault = PLANTED[law]
+    pytest.importorskip(name)
+    engine, (scene, without) = load_engine(name), contrasts()[law]
+    settings, moved = engine.presets[formulation]["matched"], response._moved
     response.law_acts(Subject(engine, settings, scene), without)
-    moved = response._moved
-    monkeypatch.setattr(
-        response, "_moved", lambda _, times, true: moved(Subject(engine, settings, without), times, true)
-    )
-    with pytest.raises(UnlikeSceneError, match="the engine does not follow it"):
+    element = the_mechanism(scene)
+    changed = replace(element, mechanism=replace(element.mechanism, **fault(element.mechanism)))
+    planted = without if dropped else replace(scene, elements=(changed,))
+    monkeypatch.setattr(response, "_moved", lambda run, times, true: moved(replace(run, scene=planted), times, true))
+    with pytest.raises(UnlikeSceneError, match=r"the law has -?\d.* of its strength"):
         response.law_acts(Subject(engine, settings, scene), without)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 _PLAIN = "double_pendulum"
 _LAWS: Mapping[str, float] = {"damping": 2.0, "torque": 3.0, "armature": 0.3, "friction": 0.7}
 _SPEED = 1.0  # rad/s, at which a damper acts
+_TO_STOP = 0.03  # rad, of a joint at that speed to its stop
 
 
 def _changed(scene: Scene, name: str, **parts: Any) -> Scene:
@@ -152,10 +153,18 @@ class MechanismKind:
         (servo,) = the_mechanism(held).mechanism.actuators
         resting = _changed(held, f"{held.name}-still", actuators=(replace(servo, target=1.0),))
         spheres = [_sooner(load_scene("two_spheres", friction=0.0, restitution=e), _SOONER) for e in (0.8, 0.0)]
+        driven, free = _with_drive(plain, "servo"), _with_law(plain, "damping", 0.0)
+        weak = _changed(driven, f"{driven.name}-weak", actuators=(replace(servo, target=1.0, kp=servo.kp / 2),))
+        first, last = the_mechanism(free).mechanism.joints
+        stopped = replace(last, limits=(last.q0[0] - 1.0, last.q0[0] + _TO_STOP))
         return {
-            "limit_of_efforts": (_with_drive(plain, "limit"), _with_drive(plain, "servo")),
+            "limit_of_efforts": (_with_drive(plain, "limit"), driven),
             "held_targets": (_changed(held, f"{held.name}-held", control=Control(_RATE, (servo.name,))), resting),
             "restitution": (spheres[0], spheres[1]),
+            "stiffness_of_servos": (driven, weak),
+            "damping": (_with_law(plain, "damping", _LAWS["damping"]), free),
+            "stops": (_changed(free, f"{_PLAIN}-stopped", joints=(first, stopped)), free),
+            "friction_of_contacts": (load_scene("sled"), load_scene("sled", friction=0.0)),
         }
 
     @staticmethod
