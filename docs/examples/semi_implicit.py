@@ -8,18 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt
 
-from proofroll.adapter import (
-    ROLLS,
-    BallBuilt,
-    BallSample,
-    RollingBall,
-    RunOnBody,
-    Scene,
-    newton_euler,
-    on_body,
-    rolling_ball,
-    whole_steps,
-)
+from proofroll import adapter
 
 
 @dataclass(frozen=True)
@@ -35,7 +24,7 @@ class SemiImplicit:
     """Semi-implicit Euler on the unreduced equations."""
 
     name: ClassVar[str] = "semi_implicit"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = {"newton_euler": ROLLS}
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"newton_euler": adapter.ROLLS}
     settings: ClassVar[type[Settings]] = Settings
     presets: ClassVar[Mapping[str, Mapping[str, Settings]]] = {"newton_euler": {"default": Settings()}}
 
@@ -44,23 +33,25 @@ class SemiImplicit:
         return "1.0"
 
     @classmethod
-    def build(cls, scene: Scene, settings: Settings) -> RunOnBody:
-        return on_body(cls(rolling_ball(scene), settings.dt), scene)
+    def build(cls, scene: adapter.Scene, settings: Settings) -> adapter.RunOnBody:
+        return adapter.on_body(cls(adapter.rolling_ball(scene), settings.dt), scene)
 
-    def __init__(self, body: RollingBall, dt: float) -> None:
+    def __init__(self, body: adapter.RollingBall, dt: float) -> None:
         self.body, self.dt, self.t = body, dt, 0.0
         self.p, self.v, self.w = body.p0.copy(), body.v0.copy(), body.w0.copy()
 
     def advance(self, t: float) -> None:
-        for _ in range(whole_steps(self.t, t, self.dt)):
-            acceleration, spin_rate, _ = newton_euler(self.body, self.p, self.v, self.w)
+        for _ in range(adapter.whole_steps(self.t, t, self.dt)):
+            acceleration, spin_rate, _ = adapter.newton_euler(self.body, self.p, self.v, self.w)
             self.v, self.w = self.v + self.dt * acceleration, self.w + self.dt * spin_rate
             self.p = self.p + self.dt * self.v
         self.t = t
 
-    def sample(self) -> BallSample:
-        return BallSample(self.p, self.v, self.w, force=newton_euler(self.body, self.p, self.v, self.w)[2])
+    def sample(self) -> adapter.BallSample:
+        return adapter.BallSample(
+            self.p, self.v, self.w, force=adapter.newton_euler(self.body, self.p, self.v, self.w)[2]
+        )
 
-    def built(self) -> BallBuilt:
-        acceleration, *_ = newton_euler(self.body, self.p, self.v, self.w)
-        return BallBuilt(rolling_resistance=self.body.contact.rolling_resistance, acceleration=acceleration)
+    def built(self) -> adapter.BallBuilt:
+        acceleration, *_ = adapter.newton_euler(self.body, self.p, self.v, self.w)
+        return adapter.BallBuilt(rolling_resistance=self.body.contact.rolling_resistance, acceleration=acceleration)

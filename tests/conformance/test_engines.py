@@ -23,6 +23,7 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
         "second-order one of the resistance torque",
         "moves_as_the_truth[chart-default-fast]": "with MuJoCo's default solimp a tenth of the load is missing, "
         "and the contact gives way",
+        "moves_as_the_truth[chart-default-slow]": "as the fast one, by a hundredth of its force",
         "first_steps_fit_the_scene[joints-tuned-slider_crank]": "at a time constant of two steps a loop's force is off "
         "by a thousandth at every step, at ten steps by a hundred-thousandth",
         "moves_as_the_truth[joints-tuned-slider_crank]": "as its first steps",

@@ -80,7 +80,7 @@ def test_contacts_that_are_left_out_are_noticed(engine: type[Any], where: str) -
 def test_formulations_are_checked_on_what_they_are_made_for() -> None:
     """A formulation for contact is checked where bodies touch, and on no other scene; another one where they do not."""
     scenes = {check.name.rpartition("-")[2] for check in checks(Untouched) if "[rk4-matched-" in check.name}
-    assert scenes == {"sled]", "two_spheres]", "restitution]"}
+    assert scenes == {"sled]", "two_spheres]", "restitution]", "friction_of_contacts]"}
     assert not any("sled" in check.name for check in checks(Single))
 
 

@@ -34,6 +34,7 @@ _PARTS = (2**0.5 - 1, (5**0.5 - 1) / 2, np.pi / 4, 1.0)
 _STEP = 2e-3
 # Largest tolerance, relative to the change of a variable by accelerations as at the start.
 _MOST = 0.1
+_SOFT = 0.01  # of it, what a softening explains that is declared for first accelerations; all of it would hide faults
 # Tolerance in changes by halving the step: an error of first order is twice that, and as much again is for other terms.
 _MARGIN = 4.0
 _ROUND_OFF = 1e-8
@@ -67,7 +68,7 @@ def moves_as_the_truth(subject: Subject) -> None:
     true = _trajectory(subject.scene.digest, tuple(times.tolist()))
     moved = _moved(subject, times, true)
     finer = _moved(subject.finer(0.5), times, true) if step is not None else moved
-    soft = softness(subject.build(), subject.scene)
+    soft = min(softness(subject.build(), subject.scene), _SOFT)
     sizes = _sizes(subject.scene, times[-1], true)
     beside = _beside_events(subject.scene, step or 0.0, true)
     for name, values in moved.items():

@@ -90,10 +90,9 @@ def applied_loads(
 
 
 def loads_at(mechanism: Mechanism, t: float, p_WB: Array, R_WB: Array) -> tuple[Array, Array]:
-    """Force [N] and moment about the body's origin [N m] on each body, world axes, (bodies, 3) each.
+    """Force [N] and moment about its origin [N m] of drives and applied forces on each body, world axes, (bodies, 3).
 
-    They are those of the joints' drives and of applied forces, with their reactions on other bodies, for adapters that
-    set them from outside.
+    Reactions on other bodies are among them. For adapters that set loads from outside.
 
     Args:
         mechanism: with the drives and forces.
