@@ -32,11 +32,8 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
         "moves_as_the_truth[geoms-default-sled]": "the pyramid brakes more along its edges than across, at every step",
         "moves_as_the_truth[geoms-default-two_spheres]": "an impact takes the part of the speed that MuJoCo's default "
         "impedance leaves it",
-        "law_acts[geoms-default-friction_of_contacts]": "the pyramid brakes otherwise, and its friction builds up over "
-        "0.02 s at every step",
         "law_acts[geoms-default-restitution]": "an impact takes the part of the speed that MuJoCo's default impedance "
         "leaves it",
-        "law_acts[geoms-matched-friction_of_contacts]": "MuJoCo's cone is convex: what slides hops, at every step",
         "moves_as_the_truth[geoms-matched-sled]": "MuJoCo's cone is convex: what slides hops, at every step",
         "order_is_as_declared[geoms-matched]": "as moves_as_the_truth: a hop has no order",
     },

@@ -119,11 +119,8 @@ def law_acts(subject: Subject, without: Scene) -> None:
     if left > _MOST_LEFT:
         raise SkipTest("the law changes less than the engine's steps do within this run")
     if not abs(found - 1) <= _STRENGTH + left:
-        raise UnlikeSceneError(
-            subject,
-            f"the law has {found:.2f} of its strength, by its change of velocities in a run of {times[-1]:.2g} s; "
-            f"allowed 1 ± {_STRENGTH + left:.2g}: the engine does not follow it",
-        )
+        part = f"the law has {found:.2f} of its strength in a run of {times[-1]:.2g} s"
+        raise UnlikeSceneError(subject, f"{part}, allowed 1 ± {_STRENGTH + left:.2g}: the engine does not follow it")
 
 
 def _times(step: float | None) -> FloatArray:

@@ -181,8 +181,7 @@ def worst_numbers(line: Line, most: int = _SHOWN) -> tuple[tuple[float, ...], tu
     if len(line.found) <= most or len(line.found) != len(line.expected):
         return line.found, line.expected
     apart = np.abs(np.array(line.found) - np.array(line.expected))
-    unknown = np.inf if line.difference == np.inf else 0.0  # NaN may be the number that is wrong
-    worst = int(np.argmax(np.where(np.isnan(apart), unknown, apart)))
+    worst = int(np.argmax(np.where(np.isnan(apart), np.inf if line.difference == np.inf else 0.0, apart)))
     return (line.found[worst],), (line.expected[worst],)
 
 

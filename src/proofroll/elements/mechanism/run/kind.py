@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 _PLAIN = "double_pendulum"
 _LAWS: Mapping[str, float] = {"damping": 2.0, "torque": 3.0, "armature": 0.3, "friction": 0.7}
 _SPEED = 1.0  # rad/s, at which a damper acts
-_TO_STOP = 0.03  # rad, of a joint at that speed to its stop
 
 
 def _changed(scene: Scene, name: str, **parts: Any) -> Scene:
@@ -153,10 +152,11 @@ class MechanismKind:
         (servo,) = the_mechanism(held).mechanism.actuators
         resting = _changed(held, f"{held.name}-still", actuators=(replace(servo, target=1.0),))
         spheres = [_sooner(load_scene("two_spheres", friction=0.0, restitution=e), _SOONER) for e in (0.8, 0.0)]
+        sleds = [load_scene("sled", friction=mu, spin=0.0, cross_speed=0.0) for mu in (0.3, 0.0)]  # straight on
         driven, free = _with_drive(plain, "servo"), _with_law(plain, "damping", 0.0)
         weak = _changed(driven, f"{driven.name}-weak", actuators=(replace(servo, target=1.0, kp=servo.kp / 2),))
         first, last = the_mechanism(free).mechanism.joints
-        stopped = replace(last, limits=(last.q0[0] - 1.0, last.q0[0] + _TO_STOP))
+        stopped = replace(last, limits=(last.q0[0] - 1.0, last.q0[0] + 0.03))  # reached within the run
         return {
             "limit_of_efforts": (_with_drive(plain, "limit"), driven),
             "held_targets": (_changed(held, f"{held.name}-held", control=Control(_RATE, (servo.name,))), resting),
@@ -164,7 +164,7 @@ class MechanismKind:
             "stiffness_of_servos": (driven, weak),
             "damping": (_with_law(plain, "damping", _LAWS["damping"]), free),
             "stops": (_changed(free, f"{_PLAIN}-stopped", joints=(first, stopped)), free),
-            "friction_of_contacts": (load_scene("sled"), load_scene("sled", friction=0.0)),
+            "friction_of_contacts": (sleds[0], sleds[1]),
         }
 
     @staticmethod
