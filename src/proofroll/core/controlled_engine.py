@@ -76,6 +76,14 @@ class CommandedEngine:
         return getattr(self.engine, name)
 
 
+def bare(engine: Any) -> Any:
+    """The engine that a controller commands, or the engine itself: what it is able to do is asked of it alone.
+
+    From Python 3.12 on checks of protocols do not look at what ``__getattr__`` hands on.
+    """
+    return engine.engine if isinstance(engine, CommandedEngine) else engine
+
+
 def commanded(engine: Any, element: Element, step: float | None) -> Any:
     """Engine of an element under its controller; the engine itself if there is none.
 

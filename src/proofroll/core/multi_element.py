@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.controlled_engine import CommandedEngine, commanded
+from proofroll.core.controlled_engine import CommandedEngine, bare, commanded
 from proofroll.core.element import Element
 from proofroll.core.engine import Sample, fixed_step
 from proofroll.core.engine_abilities import LocatesEvents, TellsRemarks, WatchesEvents, require_provided
@@ -55,7 +55,7 @@ class IndependentElements:
 
     def remarks(self) -> Sequence[str]:
         """Remarks of all parts, and the elements that were built in another formulation."""
-        telling = [part for part in self.parts.values() if isinstance(part, TellsRemarks)]
+        telling = [part for part in map(bare, self.parts.values()) if isinstance(part, TellsRemarks)]
         return [*self._others, *(remark for part in telling for remark in part.remarks())]
 
 
@@ -116,8 +116,7 @@ def asking(engine: Any) -> tuple[float, float]:
 def watch_events(engine: Any) -> None:
     """Lets an engine look for events in its steps (:class:`proofroll.core.engine_abilities.WatchesEvents`)."""
     for part in _parts(engine):
-        model = part.engine if isinstance(part, CommandedEngine) else part
-        if isinstance(model, WatchesEvents):
+        if isinstance(model := bare(part), WatchesEvents):
             model.watch_events()
 
 
@@ -210,7 +209,7 @@ def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:
     Raises:
         Diverged: the engine gave something else than events.
     """
-    part = engine.parts[element.name] if isinstance(engine, IndependentElements) else engine
+    part = bare(engine.parts[element.name] if isinstance(engine, IndependentElements) else engine)
     if not isinstance(part, LocatesEvents):
         return None
     located = part.events()

@@ -12,6 +12,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns
+from proofroll.core.controlled_engine import bare
 from proofroll.core.dataset import add_events, columns_of, off_grid_apart
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import RunWatch, WatchesRuns
@@ -128,7 +129,8 @@ def record(
     columns = off_grid_apart(scene, columns, asked, np.array(sorted(between)))
     for owner, own_events in events:
         columns = add_events(scene, owner, columns, own_events)
-    remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
+    model = bare(engine)
+    remarks = tuple(model.remarks()) if isinstance(model, TellsRemarks) else ()
     return Recording(
         columns=columns,
         failure=failure,

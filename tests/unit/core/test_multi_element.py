@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from enum import StrEnum
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from placed_balls import placed, scene_with
 
+from proofroll.core.controlled_engine import CommandedEngine, bare
 from proofroll.core.dataset import observe
 from proofroll.core.errors import Refused
-from proofroll.core.multi_element import formulation_for
+from proofroll.core.events import Event
+from proofroll.core.multi_element import events_of_engine, formulation_for
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
@@ -105,3 +109,22 @@ def test_another_formulation_stands_in_for_foreign_elements_alone(
     """A formulation that knows the kind of an element and lacks something of it is replaced by none."""
     provides = {"foreign": ["a word"], "one": ["one"], "both": ["one", "another"]}
     assert formulation_for(requires, own, provides) == expected
+
+
+def test_what_an_engine_is_able_to_do_is_asked_of_it_alone() -> None:
+    """Under a controller the engine itself is looked at, for static checks of protocols see no attribute handed on."""
+
+    class Locating:
+        """Engine that locates events."""
+
+        def events(self) -> list[Event]:
+            """No events."""
+            return []
+
+    engine = Locating()
+    commanded_engine = CommandedEngine.__new__(CommandedEngine)
+    commanded_engine.engine = engine
+    assert bare(commanded_engine) is engine
+    assert bare(engine) is engine
+    assert inspect.getattr_static(commanded_engine, "events", None) is None
+    assert events_of_engine(commanded_engine, cast("Any", None)) == []
