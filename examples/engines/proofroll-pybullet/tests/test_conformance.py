@@ -9,6 +9,7 @@ DAMPED = "by default the spin of PyBullet's links is damped"
 KNOWN = {
     "moves_as_the_truth[plane-default-slow]": "damped as on the plane, and 1/240 s is long for a path that bends",
     "moves_as_the_truth[plane-default-fast]": "unless maxJointVelocity says more, PyBullet cuts spin to 100 rad/s",
+    "moves_as_the_truth[spheres-default-sled]": "where three feet slide, friction is some ten degrees off the slip",
     "moves_as_the_truth[spheres-matched-sled]": "where three feet slide, friction is some ten degrees off the slip",
     "moves_as_the_truth[spheres-default-two_spheres]": "by default a body loses 4 % of its speed in a second",
     "first_steps_fit_the_scene[urdf-default-heavy_top]": DAMPED,
