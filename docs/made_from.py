@@ -18,7 +18,7 @@ from proofroll.running.idle_workers import Workers
 
 ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.
-_NO_NUMBERS = {"report", "robots", "all", "dev", "cluster", "docs"}
+_NO_NUMBERS = {"report", "robots", "all", "dev", "cluster", "docs", "environments"}
 # Of a comparison these are for a person.
 _WORDS = ("title", "question", "order", "short")
 

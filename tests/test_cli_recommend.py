@@ -22,12 +22,12 @@ def test_an_answer_is_found_once_and_then_stored(proofroll: Proofroll, tmp_path:
     """It says what it will cost, prints answers as they come, and is the same when it is read again."""
     code, out, err = proofroll(*asked(tmp_path, "--tolerance", "1 mm"))
     assert code == 0
-    assert out.startswith("Take MuJoCo joints, tuned, dt ")
+    assert out.startswith("Take MuJoCo joints, best, dt ")
     assert all(len(line) <= 80 for line in out.splitlines())
     assert " of 1 mm in " in " ".join(out.split())
     assert "Not judged: attitudes." in " ".join(out.split())
     assert err.startswith("proofroll: searching mujoco in pendulum over 0.5 s: at most 30 s of processor time each")
-    assert "MuJoCo joints, tuned" in err
+    assert "MuJoCo joints, best" in err
     assert proofroll(*asked(tmp_path, "--tolerance", "1 mm")) == (0, out, "")
     code, text, err = proofroll(*asked(tmp_path, "--tolerance", "1 mm", "--json"))
     assert (code, err) == (0, "")

@@ -55,7 +55,7 @@ def recommend(
 
     Each engine is searched over all its settings and steps until no other can be cheaper. A step is advised if half of
     it holds, too, and a third more does not break down. A run takes at most 8 s of processor time and an engine 30 s;
-    what that leaves open is named. Exit 1 if nothing holds the tolerance.
+    what that leaves open is named. Exit 1 if nothing holds the tolerance, 3 if no engine could be tried.
     """
     from proofroll.files.json_data import plain
     from proofroll.report.answer.sentences import answer_lines, taken_sentence
@@ -84,7 +84,10 @@ def recommend(
         options.write_json(content[0] if len(content) == 1 else content)
     elif lines:
         _print_lines(made)
-    raise typer.Exit(options.OK if all(item.taken for item in made) else options.CONTRADICTED)
+    without = [item for item in made if not item.taken]
+    raise typer.Exit(
+        options.ENGINE if any(item.untried for item in without) else options.CONTRADICTED if without else options.OK
+    )
 
 
 def _require_drawable(path: Path, scenes: list[str]) -> None:

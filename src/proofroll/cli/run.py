@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,11 +12,8 @@ import typer
 
 from proofroll.cli import options
 from proofroll.core.limits import RUN_TIME_LIMIT
-from proofroll.report.kinds import EquationMatrices
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from proofroll.report.run.run import RunContent
     from proofroll.running.case import Case
 
@@ -147,6 +143,7 @@ def _show_matrices(scene: str, engine: str, settings: dict[str, str], as_json: b
     """
     from proofroll.core.errors import InputError
     from proofroll.report.kinds import kind_of
+    from proofroll.report.run.matrices import matrix_lines
     from proofroll.running.simulation import build
     from proofroll.studies.cases import scene_of_run
 
@@ -222,24 +219,3 @@ def _shorter_step(scene: str, engine: str, case: Case) -> str:
     spec = parse_engine(engine)
     shorter = replace(spec, options={**spec.options, "dt": f"{dt:g}"})
     return f"; this scene asks for steps of {dt:g} s or less: --engine '{shorter}'"
-
-
-def matrix_lines(content: EquationMatrices) -> Iterator[Table | str]:
-    """Table of M, h and g with a row for each velocity, and how far they are from the truth's."""
-    from rich.table import Table
-    from rich.text import Text
-
-    yield "M v' + h + g = tau at the start, in the velocities of the joints:"
-    table = Table(box=None, pad_edge=False)
-    table.add_column("velocity")
-    names = [Text(name) for name in content.velocities]
-    for heading in (*names, Text("h"), Text("g")):
-        table.add_column(heading, justify="right")
-    for number, name in enumerate(names):
-        row = [] if content.M is None else content.M[number]
-        ends = (part[number] for part in (content.h, content.g) if part is not None)
-        table.add_row(name, *(f"{value:.8g}" for value in (*row, *ends)))
-    yield table
-    if content.differences:
-        shown = ", ".join(f"{name} {value:.1g}" for name, value in content.differences.items())
-        yield f"differences from the truth's, relative to their largest entries: {shown}"

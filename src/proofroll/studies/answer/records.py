@@ -166,6 +166,12 @@ class SceneAnswer:
         best = next(iter(self.engines), None)
         return best if best is not None and best.holds else None
 
+    @property
+    def untried(self) -> bool:
+        """True if no engine could be tried: each refuses, cannot, or was not run."""
+        tried = [item for item in self.engines if item.state not in {State.REFUSED, State.CANNOT, State.NOT_RUN}]
+        return bool(self.engines) and not tried
+
 
 @dataclass(frozen=True)
 class StepAnswer:

@@ -104,7 +104,7 @@ def read_run(run: RunInput, scene: Scene, columns: Mapping[str, str] | None = No
     """
     dataset = _converted(_dataset(run, columns or {}))
     made_of = dataset.attrs.get("scene_digest")
-    if made_of is not None and made_of != scene.digest:
+    if made_of is not None and str(made_of) != scene.digest:
         made = str(dataset.attrs.get("scene"))
         numbers = made == scene.name
         advice = f"it is a run of {made}" + (" with other numbers; give those parameters here too" if numbers else "")
