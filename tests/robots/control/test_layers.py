@@ -37,6 +37,7 @@ def test_a_clean_record_holds(scheme: Scheme, digits: str) -> None:
         assert max(layer.residual or 0.0 for layer in layers[:5]) < 1e-9
 
 
+@pytest.mark.drill
 def test_what_rounding_leaves_hides_no_armature() -> None:
     """Where rounding makes a third of what is off, a missing armature is named, and nothing else that halves it."""
     record = recorded(ROBOT, LAW.change(armature=0 * LAW.armature), LAW, digits="3")
@@ -220,6 +221,7 @@ def test_digits_of_a_stream_are_rounding(digits: int) -> None:
     assert bars[[0, 2]] == pytest.approx(0.5 * 10.0 ** np.array([3.0 - digits, 1.0 - digits]), rel=1e-9)
 
 
+@pytest.mark.drill
 def test_an_inertia_that_is_another_has_no_size() -> None:
     """An inertia of a body is named with what is off with it alone; it is no mass."""
     trunk, *legs = ROBOT.bodies
@@ -269,6 +271,7 @@ def test_assumed_steps_decide_nothing() -> None:
     assert assumed.reason.endswith("rows are the usual step")
 
 
+@pytest.mark.drill
 def test_what_no_cause_explains_is_not_called_rounding() -> None:
     """Rows of a robot whose thighs are heavier hold in no layer of accelerations."""
     bodies = [replace(body, mass=(1.5 if body.name.endswith("HFE") else 1.0) * body.mass) for body in ROBOT.bodies]

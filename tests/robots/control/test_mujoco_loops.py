@@ -70,6 +70,7 @@ def loop(
     return judge_record(path / "run.npz", file, None, layout="playground")
 
 
+@pytest.mark.drill_of("float64-EULER")
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("precision", ["float64", "float32", "5", "3"])
 def test_a_clean_loop_is_not_accused(tmp_path: Path, integrator: str, precision: str) -> None:

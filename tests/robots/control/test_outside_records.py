@@ -111,7 +111,13 @@ def test_a_right_record_of_another_program_holds(program: str, digits: str, judg
         assert all(layer.residual is not None and layer.residual < 1e-9 for layer in layers)
 
 
-@pytest.mark.drill_of("pinocchio-single-xyzw")
+@pytest.mark.drill_of(
+    "pinocchio-single-xyzw",
+    "mujoco-single-gravity 9.80",
+    "mujoco-3-damping",
+    "pinocchio--no armature",
+    "pinocchio-3-dry friction",
+)
 @pytest.mark.parametrize(("program", "digits", "name"), ALL)
 def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: str, judged: Judged) -> None:
     """A mistake in a loop around another program stops at its layer and is named; a limit is that of the URDF."""

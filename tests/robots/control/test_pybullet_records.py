@@ -43,7 +43,7 @@ def arrays(name: str, folder: Path) -> Path:
     return folder / f"{name}.npz"
 
 
-@pytest.mark.drill_of("defaults")
+@pytest.mark.drill_of("air", "defaults", "honest", "servos", "stop")
 @pytest.mark.parametrize("name", NAMED)
 def test_columns_are_explained(name: str) -> None:
     """Columns under our names: each setting that PyBullet's user left is named, and nothing besides."""
@@ -51,7 +51,7 @@ def test_columns_are_explained(name: str) -> None:
     assert named(judgement) == NAMED[name], "\n".join(judgement.lines())
 
 
-@pytest.mark.drill_of("air", "motors", "servos")
+@pytest.mark.drill
 @pytest.mark.parametrize("name", [name for name in NAMED if name != "defaults"])
 def test_arrays_of_pybullet_have_its_frame(name: str, tmp_path: Path) -> None:
     """Arrays under PyBullet's names: the frame of its base is no mistake, and the rest is named as before."""
@@ -104,6 +104,7 @@ def test_steps_that_are_assumed_are_told(known: bool, tmp_path: Path) -> None:
     assert ("the usual step of pybullet" in layer.reason) != known
 
 
+@pytest.mark.drill
 def test_drag_has_its_size() -> None:
     """The damping of links is told with its size, 0.04, and closes what differs."""
     (cause,) = judge_record(FOLDER / "air.csv", ROBOT, None).layers[-1].causes
@@ -111,6 +112,7 @@ def test_drag_has_its_size() -> None:
     assert cause.after < 1e-10
 
 
+@pytest.mark.drill
 def test_rows_at_a_stop_are_left_out() -> None:
     """A joint that reaches its limit is told with the time, and its rows do not count."""
     layer = judge_record(FOLDER / "stop.csv", ROBOT, None).layers[-1]
