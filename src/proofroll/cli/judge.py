@@ -170,8 +170,8 @@ def _judge_record(
         options.write_json(judged)
     else:
         options.show_lines([*judged.lines()])
-    known = judged.looked_at and judged.decided
-    raise typer.Exit(options.CONTRADICTED if not judged.agrees else options.OK if known else options.ENGINE)
+    answered = options.OK if judged.looked_at and judged.decided else options.ENGINE
+    raise typer.Exit(answered if judged.agrees else options.CONTRADICTED)
 
 
 def _scene_of_run(run: Path) -> tuple[str, Mapping[str, object]]:

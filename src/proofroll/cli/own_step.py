@@ -58,10 +58,11 @@ def answer_steps(
     heads = [f"{engine}: " if len(engines) > 1 or like else "" for engine in engines]
     further: list[str] = []
     if like is not None:
-        own, engine = _own_engine(like, whole.loaded, runner)
-        heads.append(f"yours ({own.words}): ")
+        own_options, engine = _own_engine(like, whole.loaded, runner)
+        heads.append(f"yours ({own_options.words}): ")
         engines = [*engines, engine]
-        further = [f"Not compared, as the adapter has its own: {', '.join(own.others)}."] if own.others else []
+        others = ", ".join(own_options.others)
+        further = [f"Not compared, as the adapter has its own: {others}."] if others else []
     facts = [engine_facts(engine, whole, runner) for engine in engines]
     made = []
     for engine, pair in zip(engines, facts, strict=True):
@@ -98,21 +99,24 @@ def _own_engine(like: Path, scene: Scene, runner: Runner) -> tuple[OwnOptions, s
     source = source_of(str(like))
     if source is None or not isinstance(source[0], ReadsOptions):
         raise InputError("--like", like, "give the path of your own MuJoCo model, *.xml")
-    own = source[0].own_options(like)
-    formulations = able(scene, runner.workers, names=[own.engine])
+    own_options = source[0].own_options(like)
+    formulations = able(scene, runner.workers, names=[own_options.engine])
     if not formulations:
-        raise InputError("--like", like, f"no formulation of {own.engine} represents {scene.name}")
-    given = {**parse_engine(formulations[0]).options, "preset": "default", **own.settings}
-    choices = [EngineSpec(own.engine, options) for options in ({**given, **own.of_contacts}, given)]
+        raise InputError("--like", like, f"no formulation of {own_options.engine} represents {scene.name}")
+    given_options = {**parse_engine(formulations[0]).options, "preset": "default", **own_options.settings}
+    choices = [
+        EngineSpec(own_options.engine, options)
+        for options in ({**given_options, **own_options.of_contacts}, given_options)
+    ]
     resolved = resolve([(choice.name, choice.options) for choice in choices], runner.workers)
     taken = choices[1] if isinstance(resolved[0], InputError) else choices[0]
-    return own, str(taken)
+    return own_options, str(taken)
 
 
 def _change(made: StepAnswer) -> list[str]:
     """The line of a person's own model that makes the step that would do, or the command that looks for other settings.
 
-    None where theirs is good enough.
+    Empty where theirs is good enough.
     """
     from proofroll.core.errors import ProofrollError
     from proofroll.core.plugins import parse_engine

@@ -110,17 +110,17 @@ def law_acts(subject: Subject, without: Scene) -> None:
     def strength(run: Subject) -> float:
         return float((velocities(_moved(run, times, true)) - start) @ change / (change @ change))
 
-    found, left = strength(subject), 0.0
+    part, left = strength(subject), 0.0
     for halvings in range(1, _HALVINGS + 1 if subject.fixed_step else 1):
-        coarse, found = found, strength(subject.finer(0.5**halvings))
-        left = _MARGIN * abs(found - coarse)
+        coarse_part, part = part, strength(subject.finer(0.5**halvings))
+        left = _MARGIN * abs(part - coarse_part)
         if left <= _STRENGTH:
             break
     if left > _MOST_LEFT:
         raise SkipTest("the law changes less than the engine's steps do within this run")
-    if not abs(found - 1) <= _STRENGTH + left:
-        part = f"the law has {found:.2f} of its strength in a run of {times[-1]:.2g} s"
-        raise UnlikeSceneError(subject, f"{part}, allowed 1 ± {_STRENGTH + left:.2g}: the engine does not follow it")
+    if not abs(part - 1) <= _STRENGTH + left:
+        words = f"the law has {part:.2f} of its strength in a run of {times[-1]:.2g} s"
+        raise UnlikeSceneError(subject, f"{words}, allowed 1 ± {_STRENGTH + left:.2g}: the engine does not follow it")
 
 
 def _times(step: float | None) -> FloatArray:

@@ -98,10 +98,10 @@ def no_such_key(field: str, value: object, keys: Iterable[str]) -> InputError:
         value: of the key.
         keys: known keys.
     """
-    known = list(keys)
-    meant = get_close_matches(field.rpartition(".")[2].rpartition(" ")[2], known, 1)
+    names = list(keys)
+    meant = get_close_matches(field.rpartition(".")[2].rpartition(" ")[2], names, 1)
     hint = f"; did you mean {meant[0]}?" if meant else ""
-    return InputError(field, value, f"there is no such key here; the keys are {', '.join(known)}{hint}")
+    return InputError(field, value, f"there is no such key here; the keys are {', '.join(names)}{hint}")
 
 
 def require_known(

@@ -11,7 +11,7 @@ import pytest
 
 from proofroll.robots.control.judge import RecordJudgement, judge_record
 
-mujoco = pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco", reason="the loops are written in MuJoCo; pip install 'proofroll[mujoco]'")
 
 ARM = """<mujoco model="arm"><option gravity="0 0 -9.81"/><default><joint damping="{damping}"/></default><worldbody>
 <body name="one" pos="0 0 1"><joint name="a" axis="0 0 1"/>

@@ -65,7 +65,7 @@ PLANTED: dict[str, tuple[tuple[str, str], Callable[[Mechanism], Mapping[str, obj
 def test_a_law_of_another_strength_is_found(law: str, dropped: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """An honest engine passes; one that drops a law, or has it with another strength, fails by the part it has."""
     (name, formulation), fault = PLANTED[law]
-    pytest.importorskip(name)
+    pytest.importorskip(name, reason=f"the law is planted in {name}; pip install 'proofroll[{name}]'")
     engine, (scene, without) = load_engine(name), contrasts()[law]
     settings, moved = engine.presets[formulation]["matched"], response._moved
     response.law_acts(Subject(engine, settings, scene), without)

@@ -131,8 +131,8 @@ class EngineAnswer:
 
 
 @dataclass(frozen=True)
-class SceneAnswer:
-    """Answers of all engines in one scene for one tolerance.
+class AnsweredScene:
+    """Scene and tolerance of an answer.
 
     Attributes:
         scene, parameters: name of the scene, and its parameters that differ from the defaults.
@@ -141,10 +141,6 @@ class SceneAnswer:
         bounds: of the judged quantities.
         unjudged: observables of orientation that the tolerance does not bound.
         open: why no engine can be judged here; empty: all are.
-        engines: the cheapest that holds first.
-        spent: processor time, that of the truth included [s].
-        measured: time, machine and versions.
-        omitted: clauses on what the scene's file describes and the answer leaves out.
     """
 
     scene: str
@@ -155,6 +151,19 @@ class SceneAnswer:
     bounds: list[AllowedError]
     unjudged: list[str]
     open: str
+
+
+@dataclass(frozen=True)
+class SceneAnswer(AnsweredScene):
+    """Answers of all engines in one scene for one tolerance.
+
+    Attributes:
+        engines: the cheapest that holds first.
+        spent: processor time, that of the truth included [s].
+        measured: time, machine and versions.
+        omitted: clauses on what the scene's file describes and the answer leaves out.
+    """
+
     engines: list[EngineAnswer]
     spent: float
     measured: Measured
@@ -174,16 +183,10 @@ class SceneAnswer:
 
 
 @dataclass(frozen=True)
-class StepAnswer:
+class StepAnswer(AnsweredScene):
     """Answer for a person's own step: whether it is good enough, by how much, and which step would do.
 
     Attributes:
-        scene, parameters: name of the scene, and its parameters that differ from the defaults.
-        until, every: time over which runs are judged, and the sampling interval [s].
-        tolerance: as it was given.
-        bounds: of the judged quantities.
-        unjudged: observables of orientation that the tolerance does not bound.
-        open: why no engine can be judged here; empty: all are.
         spec: engine as it was given.
         resolution, step: ``dt`` or ``rtol``, and its value.
         holds: True if the step holds the tolerance and may be advised, or could not be confirmed.
@@ -196,14 +199,6 @@ class StepAnswer:
         spent: processor time [s].
     """
 
-    scene: str
-    parameters: dict[str, FloatOrInf]
-    until: float
-    every: float
-    tolerance: str
-    bounds: list[AllowedError]
-    unjudged: list[str]
-    open: str
     spec: str
     resolution: str
     step: float

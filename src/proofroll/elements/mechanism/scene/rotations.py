@@ -142,8 +142,8 @@ def frame_of_axis(z: ArrayLike, x: ArrayLike | None = None) -> Array:
     if x is None:
         x = (1.0, 0.0, 0.0) if abs(a) < 0.9 else (0.0, 1.0, 0.0)
     u, v, w = x if isinstance(x, tuple) else np.asarray(x, dtype=float).tolist()
-    along = a * u + b * v + c * w
-    u, v, w = _unit(u - a * along, v - b * along, w - c * along)
+    cosine = a * u + b * v + c * w
+    u, v, w = _unit(u - a * cosine, v - b * cosine, w - c * cosine)
     return np.array([[u, b * w - c * v, a], [v, c * u - a * w, b], [w, a * v - b * u, c]])
 
 

@@ -420,8 +420,8 @@ class ImpulseSteps:
             if closing <= set(which) and not grown:
                 driving = alone - motor_responses.T @ pushed
                 for k, held in enumerate(self._held):
-                    along = [speeds[row] + added[row] for row in own_rows[k][:2]]
-                    states[k] = STICK if states[k] == SLIP and math.hypot(*along) <= held else states[k]
+                    slips = [speeds[row] + added[row] for row in own_rows[k][:2]]
+                    states[k] = STICK if states[k] == SLIP and math.hypot(*slips) <= held else states[k]
                 moment, seen = np.zeros((count, 3)), tuple(states)
                 return Impulses(v=v, impulse=impulse, states=seen, moment=moment, along=along_rows, driving=driving)
             which, grown = tuple(sorted({*which, *closing})), False
