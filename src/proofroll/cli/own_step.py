@@ -98,7 +98,8 @@ def _own_engine(like: Path, scene: Scene, runner: Runner) -> tuple[OwnOptions, s
 
     source = source_of(str(like))
     if source is None or not isinstance(source[0], ReadsOptions):
-        raise InputError("--like", like, "give the path of your own MuJoCo model, *.xml")
+        advice = "give the path of your own MuJoCo model, *.xml" if like.is_file() else "there is no such file"
+        raise InputError("--like", like, advice)
     own_options = source[0].own_options(like)
     formulations = able(scene, runner.workers, names=[own_options.engine])
     if not formulations:

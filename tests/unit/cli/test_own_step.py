@@ -48,6 +48,8 @@ def test_another_file_is_no_model(proofroll: Proofroll, tmp_path: Path) -> None:
     code, out, err = proofroll("compare", "pendulum", "--like", str(tmp_path / "mine.txt"), "--out", str(tmp_path))
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "give the path of your own MuJoCo model, *.xml" in err
+    err = proofroll("compare", "pendulum", "--like", str(tmp_path / "none.xml"), "--out", str(tmp_path))[2]
+    assert "there is no such file" in err
 
 
 @pytest.mark.drill
