@@ -1,0 +1,1 @@
+"""Rapier for proofroll."""
