@@ -63,7 +63,7 @@ def test_what_it_has_not_is_refused_with_the_reason(scene, reason):
 
 
 def test_a_multibody_starts_as_the_scene_does():
-    """Poses and velocities of a spinning top on a ball joint are those of the scene, though a multibody begins at zero."""
+    """A spinning top on a ball joint starts as the scene says, though a multibody begins at zero."""
     scene = proofroll.load_scene("heavy_top")
     start = scene.elements[0].start
     sample = Rapier.build(scene, Rapier.presets["multibody"]["matched"]).sample()

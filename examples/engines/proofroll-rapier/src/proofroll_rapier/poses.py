@@ -11,7 +11,7 @@ from proofroll.adapter import Array, to_quaternion
 
 
 def isometry(place: Any, rotation: Any) -> Any:
-    """Rapier's pose of a place [m] and a rotation matrix; Rapier's quaternion has its scalar first, too, when it is made."""
+    """Rapier's pose of a place [m] and a rotation matrix."""
     return rapier3d.Isometry3(tuple(np.array(place, float)), turn(rotation))
 
 

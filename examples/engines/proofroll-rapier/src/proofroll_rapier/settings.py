@@ -21,7 +21,7 @@ class RapierSettings:
     """Settings of Rapier.
 
     Attributes:
-        formulation: ``impulse``: joints are constraints that impulses hold; ``multibody``: trees have joint coordinates.
+        formulation: ``impulse``: impulses hold all joints; ``multibody``: trees have joint coordinates.
         preset: ``default`` is Rapier as it comes; ``matched`` is hard and undamped.
         dt: step [s].
         iterations: of the solver in a step, each a part of the step (Rapier's small steps).
