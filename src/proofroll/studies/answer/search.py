@@ -22,6 +22,8 @@ from proofroll.studies.swept_settings import Curve, curves_of
 
 # Wall time of a run over its cap of processor time, and least limit of a run that should be cheap [s].
 _LIMIT, _LEAST_LIMIT = 1.6, 2.0
+# Doublings of a preset's own step with which a search begins: a bound from a quarter of the steps may be enough.
+_COARSER = 2
 # A coarser step may take this many times as long as the one that holds.
 _DEARER = 3.0
 
@@ -96,7 +98,7 @@ def settings_of(
             given=float(facts.settings[facts.resolution]) if facts.resolution and curve.fixed else None,
         )
         if facts.step is not None and item.given is None:
-            item.start = max(0, round(math.log2(question.every / facts.step)))
+            item.start = max(0, round(math.log2(question.every / facts.step)) - _COARSER)
         of_engine.settings.append(item)
     return list(searches.values())
 

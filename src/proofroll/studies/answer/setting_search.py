@@ -208,7 +208,7 @@ class SettingSearch:
             self.decide(State.REFUSED, latest.message)  # one refusal may be that of a step
         elif all(run.status is Status.CRASHED for run in runs) and len(runs) > 1:
             self.decide(State.NOT_RUN, latest.message)
-        elif all(run.status is Status.TIMEOUT for run in runs) and len(runs) > 1:
+        elif all(run.status is Status.TIMEOUT for run in runs) and (len(runs) > 1 or not self.fixed_step):
             self.decide(State.FINER, f"no run ended within {latest.spent:.0f} s")
         return self.state is not State.OPEN
 
