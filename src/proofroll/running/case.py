@@ -153,6 +153,7 @@ class Case:
             (:func:`proofroll.core.whole_turns.samples_between`). Studies do without, as an adaptive step ends at each.
         between: for the truth, times off the grid at which some engine is sampled [s]
             (:func:`proofroll.core.time_grid.off_grid`); those of an engine follow from its step.
+        without_events: True if no events are wanted, so that nothing looks for them in the engine's steps.
     """
 
     scene: str
@@ -166,11 +167,13 @@ class Case:
     asks: tuple[str, ...] = ()
     turns: bool = False
     between: tuple[float, ...] = ()
+    without_events: bool = False
 
     @cached_property
     def key(self) -> str:
         """Hash of everything that decides the result; the path of an interpreter is left out, its packages are not."""
-        left_out = {"time_limit", *(name for name in ("asks", "turns", "between") if not getattr(self, name))}
+        optional = ("asks", "turns", "between", "without_events")
+        left_out = {"time_limit", *(name for name in optional if not getattr(self, name))}
         content = {name: value for name, value in asdict(self).items() if name not in left_out}
         content["engine"]["name"] = plain_name(self.engine.name)
         for words in ("level", "title", "witness", "provides", "brought"):  # for people

@@ -67,7 +67,13 @@ class Recording:
 
 
 def record(
-    engine: Any, scene: Scene, asked: FloatArray, probes: Iterable[float] = (), counting: Iterable[float] = ()
+    engine: Any,
+    scene: Scene,
+    asked: FloatArray,
+    probes: Iterable[float] = (),
+    counting: Iterable[float] = (),
+    *,
+    wants_events: bool = True,
 ) -> Recording:
     """Advances a freshly built engine and samples it.
 
@@ -78,10 +84,12 @@ def record(
         probes: a few times off that grid [s], from :func:`proofroll.core.time_grid.off_grid`.
         counting: further times at which turns are counted [s], from
             :func:`proofroll.core.whole_turns.samples_between`; their samples are left out of the result.
+        wants_events: False if none are wanted, so that the engine need not look for them in its steps.
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0
-    watch_events(engine)
+    if wants_events:
+        watch_events(engine)
     samples = [_finite(engine.sample(), 0.0, scene)]
     failure: str | None = None
     wall = 0.0

@@ -83,7 +83,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         if difference is not None:
             return Result(Status.WRONG_MODEL, difference, certificate=lines, versions=versions)
         counting = samples_between(scene, times, step) if case.turns else times[:0]
-        recording = record(engine, scene, times, off_grid(times, step), counting)
+        recording = record(engine, scene, times, off_grid(times, step), counting, wants_events=not case.without_events)
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
     except (Refused, Diverged) as error:

@@ -301,7 +301,7 @@ def test_alone_in_a_folder(tmp_path: Path) -> None:
 def test_a_case_that_asks_nothing_keeps_its_key(make_case: MakeCase) -> None:
     """The key is the hash of what it was before a case could ask, so that stored results are found."""
     case = make_case("oracle")
-    later = {"time_limit", "asks", "turns", "between"}
+    later = {"time_limit", "asks", "turns", "between", "without_events"}
     content = {key: value for key, value in dataclasses.asdict(case).items() if key not in later}
     for words in ("level", "title", "witness", "provides", "brought"):
         del content["engine"][words]

@@ -174,7 +174,8 @@ def _speeds(searches: Sequence[EngineSearch], question: AnswerQuestion, runner: 
     tasks = {}
     with Stopwatch(runner.workers) as stopwatch, runner.profile.phase(TIMING):
         for spec, (item, run) in near.items():
-            case = question.case(at_step(item.facts, run.step), question.every, item.caps.run)
+            facts = at_step(item.facts, run.step)
+            case = question.case(facts, question.every, item.caps.run, item.allowed)
             tasks[spec] = partial(stopwatch, case, _SECONDS)
         timings = time_in_rounds(tasks, _ROUNDS, once_above=_ONCE)
     return {spec: min(*timing.values, near[spec][1].cost) for spec, timing in timings.items()}

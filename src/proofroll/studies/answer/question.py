@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from proofroll.core.dataset import BETWEEN
 from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene, read_scene_file
@@ -116,9 +117,11 @@ class AnswerQuestion:
         """Sampling interval of the second run of a scheme that adapts its steps [s]."""
         return float(f"{self.until / _SPARSE:.12g}")
 
-    def case(self, facts: EngineFacts, every: float, limit: float) -> Case:
-        """Case of one run; ``limit``: of its wall time [s]."""
-        return case_of(self.scene, self.loaded, self.parameters, facts, self.until, every, time_limit=limit)
+    def case(self, facts: EngineFacts, every: float, limit: float, judged: Collection[str]) -> Case:
+        """Case of one run; ``limit``: of its wall time [s]; ``judged``: observables."""
+        events = {name for name, item in self.loaded.observables.items() if item.role is Role.EVENT}
+        named = self.scene, self.loaded, self.parameters
+        return case_of(*named, facts, self.until, every, time_limit=limit, without_events=events.isdisjoint(judged))
 
     def truth(self, facts: EngineFacts) -> Case:
         """Case of the truth, with samples off the grid where runs have theirs."""

@@ -160,10 +160,10 @@ def _run(item: SettingSearch, divisor: int, question: AnswerQuestion) -> Generat
     least = min((run.cost for run in item.runs.values() if run.status is Status.DONE), default=math.inf)
     if all(divisor < finer for finer in item.runs) and math.isfinite(least):
         limit = min(limit, max(_LEAST_LIMIT, _DEARER * least * question.until))
-    run = yield question.case(facts, question.every, limit)
+    run = yield question.case(facts, question.every, limit, item.allowed)
     if facts.resolution in {None, "dt"} or run.status is not Status.DONE:
         return run
-    return run.with_sparse((yield question.case(facts, question.sparse, limit)))
+    return run.with_sparse((yield question.case(facts, question.sparse, limit, item.allowed)))
 
 
 def at_step(facts: EngineFacts, step: float) -> EngineFacts:

@@ -60,6 +60,14 @@ def test_what_cannot_be_cheaper_is_not_run_further() -> None:
     assert len([case for case in asked if case.engine.settings["preset"] == "poor"]) == 1
 
 
+def test_events_are_looked_for_only_where_they_are_judged() -> None:
+    """A case whose tolerance bounds places asks the engine for no events; one that bounds their times does."""
+    question = AnswerQuestion("sled", {}, 0.7, 0.01)
+    facts = EngineFacts("mujoco", "1", "", {"formulation": "geoms", "preset": "tuned", "dt": 1e-3}, "dt", 1)
+    assert question.case(facts, 0.01, 1.0, ["positions"]).without_events
+    assert not question.case(facts, 0.01, 1.0, ["positions", "event_times"]).without_events
+
+
 def test_the_cheaper_setting_is_found_though_its_step_is_finer() -> None:
     """Cost decides, not the step: a setting with dearer steps is not taken for its coarser one."""
     search = EngineSearch("mujoco", [setting("slow"), setting("fast")])
