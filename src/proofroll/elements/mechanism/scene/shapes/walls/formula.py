@@ -121,7 +121,7 @@ def variables(*values: Any) -> list[Jet]:
 
 def sqrt(x: Any) -> Any:
     """Square root of a number, an array, a jet, a symbol, or an expression of heyoka."""
-    return _applied("sqrt", x)
+    return math.sqrt(x) if type(x) is float and x >= 0.0 else _applied("sqrt", x)
 
 
 def sin(x: Any) -> Any:
