@@ -93,11 +93,13 @@ def skews(a: Array) -> Array:
     return matrices
 
 
-def about(axis: int, angle: float) -> Array:
-    """Rotation about a coordinate axis (0, 1, 2) by an angle, rad."""
-    c, s = math.cos(angle), math.sin(angle)
+def about(axis: int, angle: Any) -> Array:
+    """Rotation about a coordinate axis (0, 1, 2) by an angle, rad, or by a symbol of one."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
-    R = _UNIT.copy()
+    if isinstance(angle, (int, float)):
+        c, s, R = math.cos(angle), math.sin(angle), _UNIT.copy()
+    else:
+        c, s, R = angle.applied("cos"), angle.applied("sin"), _UNIT.astype(object)
     R[i, i], R[i, j], R[j, i], R[j, j] = c, -s, s, c
     return R
 
