@@ -16,7 +16,13 @@ from proofroll.truth.bodies.maximal_bodies import AXES, BodyInScalars
 from proofroll.truth.bodies.maximal_equations import Switched
 from proofroll.truth.numerics.elimination import Row
 from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
-from proofroll.truth.switching.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
+from proofroll.truth.switching.contact_scalars import (
+    ScalarTouch,
+    floats,
+    known_shapes,
+    scalar_motion,
+    touch_in_scalars,
+)
 from proofroll.truth.switching.contact_symbols import (
     SolvedSymbols,
     Vector,
@@ -87,7 +93,7 @@ class BodySymbols:
         limits = [*(guard for _, (_, guard) in limited_ones), *kink_guards(kinks)]
         numbers = [law.joint.number for law in self._laws]
         instant = _Now(motion.views, e.rate_rows(state[:-1], numbers, functions))
-        touching = [*self._touching(motion.views, features_of(mode), functions), *self._of_joints(state, instant)]
+        touching = [*self._touching(motion.views, features_of(mode)), *self._of_joints(state, instant)]
         turns = [(friction, touching[friction.pressed_by]) for friction in self._frictions]
         touching += [of_turning(friction, touch, self._relative(friction, instant)) for friction, touch in turns]
         instant = instant._replace(pressing=[touch for _, touch in turns])
@@ -176,11 +182,10 @@ class BodySymbols:
         rate = add(*(mul(value, u[n]) for n, value in row.coefficients.items()))
         return (row.residual if index is None else state[e.nx + e.nu + index]), rate
 
-    def _touching(self, views: Sequence[BodyInScalars], features: Features, functions: Any) -> list[ScalarTouch]:
-        bodies = [ScalarMotion(*pose) for pose in self._poses(views)]
+    def _touching(self, views: Sequence[BodyInScalars], features: Features) -> list[ScalarTouch]:
+        bodies = [scalar_motion(*pose) for pose in self._poses(views)]
         pairs = zip(self._bodies.mechanism.contacts, self._equations.pairs, features, strict=False)
-        root = functions["sqrt"]
-        return [touch_in_scalars(contact, bodies[a], bodies[b], root, feature) for contact, (a, b), feature in pairs]
+        return [touch_in_scalars(contact, bodies[a], bodies[b], feature) for contact, (a, b), feature in pairs]
 
     def _of_joints(self, state: Sequence[Scalar], instant: _Now) -> list[ScalarTouch]:
         """Laws of joints as contacts."""

@@ -8,6 +8,7 @@ any: a scene with other numbers has the same expression.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from operator import add, mul, sub, truediv
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,8 @@ import numpy as np
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import PIECE, Held, Table
 
+_Operation = Callable[[Any, Any], Any]
+_NEUTRAL: Mapping[_Operation, float] = {add: 0.0, sub: 0.0, mul: 1.0, truediv: 1.0, pow: 1.0}  # that change nothing
 _KEPT = frozenset({0.0, 1.0, -1.0, 2.0, -2.0, 0.5, -0.5})
 
 
@@ -76,7 +79,7 @@ class Constants:
 
 
 class Symbol:
-    """An expression whose operations with numbers take these as parameters."""
+    """An expression whose operations with numbers take these as parameters; those with zeros and ones fold."""
 
     __array_ufunc__ = None  # a number of NumPy leaves operations to this class
 
@@ -87,38 +90,39 @@ class Symbol:
         """Function of this expression, by its name."""
         return self._constants.applied(name, self)
 
-    def _with(self, operand: Any, operation: Callable[[Any, Any], Any]) -> Symbol:
+    def _with(self, operation: _Operation, operand: Any) -> Any:
+        if not isinstance(operand, Symbol) and operand == _NEUTRAL[operation]:
+            return self
         return Symbol(operation(self.expression, self._constants.symbol(operand)), self._constants)
 
-    def __add__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: a + b)
+    def _after(self, operand: Any, operation: _Operation) -> Symbol:
+        return Symbol(operation(self._constants.symbol(operand), self.expression), self._constants)
 
-    def __radd__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: b + a)
+    def __add__(self, operand: Any) -> Any:
+        return self._with(add, operand)
 
-    def __sub__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: a - b)
+    def __sub__(self, operand: Any) -> Any:
+        return self._with(sub, operand)
 
     def __rsub__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: b - a)
+        return self._after(operand, sub) if operand else -self
 
-    def __mul__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: a * b)
+    def __mul__(self, operand: Any) -> Any:
+        return self._with(mul, operand) if isinstance(operand, Symbol) or operand else 0.0
 
-    def __rmul__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: b * a)
-
-    def __truediv__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: a / b)
+    def __truediv__(self, operand: Any) -> Any:
+        return self._with(truediv, operand)
 
     def __rtruediv__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: b / a)
+        return self._after(operand, truediv)
 
-    def __pow__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: a**b)
+    def __pow__(self, operand: Any) -> Any:
+        return self._with(pow, operand)
 
     def __rpow__(self, operand: Any) -> Symbol:
-        return self._with(operand, lambda a, b: b**a)
+        return self._after(operand, pow)
+
+    __radd__, __rmul__ = __add__, __mul__
 
     def __neg__(self) -> Symbol:
         return Symbol(-self.expression, self._constants)

@@ -29,6 +29,7 @@ class ContactTree(ContactStretches):
 
     def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float) -> None:
         self.dynamics = dynamics
+        dynamics.equations.record()
         super().__init__(dynamics, dynamics.mechanism.nq + dynamics.mechanism.nv, tolerance, size)
 
     def _symbols(self) -> ModeSymbols:

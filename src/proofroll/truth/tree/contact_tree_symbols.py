@@ -5,12 +5,13 @@ Velocities of bodies are in their own axes, where those of a free body are the c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.modes import ContactMode, Features, features_of
 from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
+from proofroll.elements.mechanism.contact.touching import Moving
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.scene.kinks import Sides
 from proofroll.elements.mechanism.scene.prescribed import moved
@@ -30,7 +31,13 @@ from proofroll.truth.numerics.scalars import (
     turned,
     turned_back,
 )
-from proofroll.truth.switching.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
+from proofroll.truth.switching.contact_scalars import (
+    ScalarTouch,
+    floats,
+    known_shapes,
+    scalar_motion,
+    touch_in_scalars,
+)
 from proofroll.truth.switching.contact_symbols import (
     SolvedSymbols,
     Vector,
@@ -94,7 +101,7 @@ class TreeSymbols:
         bodies, rates = bodies_of_tree(m, q, v, functions)
         inertial = self._inertial(bodies, q, v, state[-1], clamped, functions)
         mass, load, limits = inertial.mass, inertial.load, inertial.limits
-        touching, slides = self._contacts(bodies, q, v, functions["sqrt"], features_of(mode))
+        touching, slides = self._contacts(bodies, q, v, features_of(mode))
         for k, start in enumerate(began[len(m.contacts) :], len(m.contacts)):
             bound = float(self._dynamics.contacts[k].bound)
             if start is not None and mode[k].kind == "slip" and bound:  # dry friction, which is as large as it can be
@@ -164,14 +171,13 @@ class TreeSymbols:
         bodies: Sequence[MovingBody],
         q: Sequence[Scalar],
         v: Sequence[Scalar],
-        root: Callable[[Scalar], Scalar],
         features: Features,
     ) -> tuple[list[ScalarTouch], list[tuple[dict[int, Vector], Vector]]]:
         """All contacts, and of each slide the derivative by the velocities and the rate at v̇ = 0."""
         m = self._mechanism
-        motions = [ScalarMotion(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies]
+        motions = [scalar_motion(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies]
         touching = [
-            touch_in_scalars(contact, motions[a], motions[b], root, feature)
+            touch_in_scalars(contact, motions[a], motions[b], feature)
             for contact, (a, b), feature in zip(m.contacts, self._pairs, features, strict=False)
         ]
         slides: list[tuple[dict[int, Vector], Vector]] = [
@@ -275,19 +281,17 @@ class TreeSymbols:
         return [0.0 if n in prescribed else row.get(n, 0.0) for n in range(self._mechanism.nv)]
 
 
-def _slide(
-    touch: ScalarTouch, pair: Sequence[tuple[MovingBody, ScalarMotion, float]]
-) -> tuple[dict[int, Vector], Vector]:
+def _slide(touch: ScalarTouch, pair: Sequence[tuple[MovingBody, Moving, float]]) -> tuple[dict[int, Vector], Vector]:
     """Derivative of a contact's slide by the velocities, and its rate at v̇ = 0, in world axes."""
     J: dict[int, Vector] = {}
     rate: Vector = _NONE
     for body, motion, sign in pair:
-        arm = minus(touch.place, motion.p)
+        arm = minus(touch.place, motion.p.tolist())
         move, _ = body.at(turned_back(body.R, arm))
         for n, way in move.items():
             J[n] = plus(J.get(n, _NONE), scaled(sign, turned(body.R, way)))
         turning = plus(turned(body.R, body.a), cross(turned(body.R, body.turning), arm))
-        drift = cross(motion.w, minus(touch.place_rate, motion.v))
+        drift = cross(motion.w.tolist(), minus(touch.place_rate, motion.v.tolist()))
         rate = plus(rate, scaled(sign, plus(turning, drift)))
     return J, rate
 

@@ -1,16 +1,33 @@
-"""Contact of two bodies: gap, normal, point of contact, and their rates."""
+"""Contact of two bodies: gap, normal, point of contact, and their rates, in floats or symbols.
 
-from typing import NamedTuple
+One set of rules serves all: routes of truths compile them from symbols, where features that touch are given.
+"""
+
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from proofroll.core.errors import NotUnique
-from proofroll.elements.mechanism.scene.rotations import Array, cross, dot, plain_cross, turned, turned_back
+from proofroll.elements.mechanism.scene.rotations import (
+    Array,
+    Floats3,
+    dot,
+    minus,
+    plain_cross,
+    plain_dot,
+    plus,
+    scaled,
+    square_of,
+    turned,
+    turned_back,
+)
 from proofroll.elements.mechanism.scene.shapes.box_features import BoxSlot, Lying
 from proofroll.elements.mechanism.scene.shapes.capsule_box import CapsuleBoxSlot
 from proofroll.elements.mechanism.scene.shapes.features import Border, CapsuleFeatures, SolidFeatures
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import (
+    LEAST,
     BoxShape,
     CircleShape,
     ConvexShape,
@@ -133,7 +150,8 @@ def touch(contact: BodyContact, a: Moving, b: Moving, feature: int | None = None
         ends = ((contact.shape_a, a), (contact.shape_b, b))
         for (shape, body), (partner, of) in (ends, ends[::-1]):
             if isinstance(shape, CircleShape):
-                result = result._replace(tilt=float(np.linalg.norm(cross(body.R @ shape.normal, result.normal))))
+                leaning = plain_cross((body.R @ shape.normal).tolist(), result.normal.tolist())
+                result = result._replace(tilt=sqrt(square_of(leaning)))
             elif isinstance(shape, ConeWall) and isinstance(partner, SphereShape):
                 result = result._replace(tilt=_from_tip(partner, of, shape, body))
         return result
@@ -220,16 +238,15 @@ def _lying_of(slot: BoxSlot, a: Moving, b: Moving) -> Lying:
     return lying
 
 
-def _measures(features: SolidFeatures, a: Moving, b: Moving) -> tuple[float, float, float, float]:
+def _measures(features: SolidFeatures, a: Moving, b: Moving) -> tuple[Any, ...]:
     """Measures of two solids, see :mod:`.features`, and the sine of the angle between two capsules, or 1."""
     of_a, of_b = features.centres
     apart = a.p + a.R @ of_a - b.p - b.R @ of_b
     if isinstance(features, CapsuleFeatures):
         u, w = a.R @ features.first.axis, b.R @ features.second.axis
-        return float(apart @ u), float(apart @ w), float(u @ w), float(np.linalg.norm(cross(u, w)))
+        return dot(apart, u), dot(apart, w), dot(u, w), sqrt(square_of(plain_cross(u.tolist(), w.tolist())) + LEAST)
     R, apart = (b.R, apart) if features.ball_first else (a.R, -apart)
-    x, y, z = ((R @ features.axes).T @ apart).tolist()
-    return x, y, z, 1.0
+    return *((R @ features.axes).T @ apart).tolist(), 1.0
 
 
 def _touch(shape_a: Shape, a: Moving, shape_b: Shape, b: Moving) -> Touching:
@@ -241,33 +258,32 @@ def _touch(shape_a: Shape, a: Moving, shape_b: Shape, b: Moving) -> Touching:
         gap, n, n_rate, place, rate = _on_wall(shape_a, a, shape_b, b)
     elif isinstance(shape_a, Wall):
         gap, n, n_rate, place, rate = _on_wall(shape_b, b, shape_a, a)
-        n, n_rate = -n, -n_rate
+        n, n_rate = scaled(-1.0, n), scaled(-1.0, n_rate)
     else:
         assert isinstance(shape_a, SphereShape)
         assert isinstance(shape_b, SphereShape)
         gap, n, n_rate, place, rate = _two_spheres(shape_a, a, shape_b, b)
+    point = np.array(place)
     return Touching(
         gap=gap,
-        normal=n,
-        normal_rate=n_rate,
-        place=place,
-        place_rate=rate,
-        slide=a.velocity(place) - b.velocity(place),
+        normal=np.array(n),
+        normal_rate=np.array(n_rate),
+        place=point,
+        place_rate=np.array(rate),
+        slide=a.velocity(point) - b.velocity(point),
     )
 
 
 def _on_first(touching: Touching, a: Moving, b: Moving) -> Touching:
     """The contact with its place moved from the second shape to the first."""
-    place = touching.place + touching.gap * touching.normal
-    rate = (
-        touching.place_rate
-        + float(touching.normal @ touching.slide) * touching.normal
-        + touching.gap * touching.normal_rate
-    )
-    return touching._replace(place=place, place_rate=rate, slide=a.velocity(place) - b.velocity(place))
+    n, closing = touching.normal.tolist(), dot(touching.normal, touching.slide)
+    place = touching.place + np.array(scaled(touching.gap, n))
+    moved = plus(scaled(closing, n), scaled(touching.gap, touching.normal_rate.tolist()))
+    slide = a.velocity(place) - b.velocity(place)
+    return touching._replace(place=place, place_rate=touching.place_rate + np.array(moved), slide=slide)
 
 
-_Lying = tuple[float, Array, Array, Array, Array]
+_Lying = tuple[Any, Floats3, Floats3, Floats3, Floats3]
 
 
 def _on_wall(shape: ConvexShape, body: Moving, wall: Wall, wall_body: Moving) -> _Lying:
@@ -279,73 +295,83 @@ def _on_wall(shape: ConvexShape, body: Moving, wall: Wall, wall_body: Moving) ->
 
 
 def _on_curve(sphere: SphereShape, body: Moving, wall: CurvedWall, wall_body: Moving) -> _Lying:
-    """Numbers of :func:`_on_wall` on a curved wall, in plain floats."""
-    axes, (ox, oy, oz), spin = (wall_body.R @ wall.frame).tolist(), wall_body.p.tolist(), wall_body.w.tolist()
-    (px, py, pz), arm = body.p.tolist(), turned(body.R.tolist(), sphere.centre.tolist())
-    cx, cy, cz = px + arm[0], py + arm[1], pz + arm[2]  # the centre, and its velocity
-    (vx, vy, vz), (ux, uy, uz) = body.v.tolist(), plain_cross(body.w.tolist(), arm)
-    vx, vy, vz = vx + ux, vy + uy, vz + uz
-    x, y, z = cx - ox, cy - oy, cz - oz
-    (wx, wy, wz), (ux, uy, uz) = wall_body.v.tolist(), plain_cross(spin, (x, y, z))
-    slides = vx - wx - ux, vy - wy - uy, vz - wz - uz  # of the centre over the wall's body
-    ax, ay, az = turned(wall_body.R.tolist(), wall.point.tolist())
-    distance, normal, (xx, xy, xz, yy, yz, zz) = wall.seen(*turned_back(axes, (x - ax, y - ay, z - az)))
-    n = turned(axes, normal)
+    """Numbers of :func:`_on_wall` on a curved wall."""
+    axes, spin, radius = (wall_body.R @ wall.frame).tolist(), wall_body.w.tolist(), sphere.radius
+    centre, velocity = _carried(body, sphere.centre)
+    beside = minus(centre, wall_body.p.tolist())
+    slides = minus(velocity, plus(wall_body.v.tolist(), plain_cross(spin, beside)))  # over the wall's body
+    foot = turned(wall_body.R.tolist(), wall.point.tolist())
+    distance, normal, (xx, xy, xz, yy, yz, zz) = wall.seen(*turned_back(axes, minus(beside, foot)))
     bent = turned(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), turned_back(axes, slides))
-    (ax, ay, az), (bx, by, bz) = plain_cross(spin, n), turned(axes, bent)
-    rate, r = (ax + bx, ay + by, az + bz), sphere.radius
-    place = cx - r * n[0], cy - r * n[1], cz - r * n[2]
-    place_rate = vx - r * rate[0], vy - r * rate[1], vz - r * rate[2]
-    return distance - r, np.array(n), np.array(rate), np.array(place), np.array(place_rate)
+    n = turned(axes, normal)
+    n_rate = plus(plain_cross(spin, n), turned(axes, bent))
+    return distance - radius, n, n_rate, minus(centre, scaled(radius, n)), minus(velocity, scaled(radius, n_rate))
 
 
-def _from_tip(sphere: SphereShape, body: Moving, cone: ConeWall, cone_body: Moving) -> float:
+def _carried(body: Moving, place: Array) -> tuple[Floats3, Floats3]:
+    """Place in the world and velocity of a place in the body's frame."""
+    arm = turned(body.R.tolist(), place.tolist())
+    return plus(body.p.tolist(), arm), plus(body.v.tolist(), plain_cross(body.w.tolist(), arm))
+
+
+def _from_tip(sphere: SphereShape, body: Moving, cone: ConeWall, cone_body: Moving) -> Any:
     """Square of the distance of a sphere's centre from the axis of a cone over its radius [1]; it is smooth."""
-    seen = cone.frame.T @ (cone_body.R.T @ (body.p + body.R @ sphere.centre - cone_body.p) - cone.point)
-    return float(seen[:2] @ seen[:2]) / (sphere.radius or 1.0) ** 2
+    centre = minus(_carried(body, sphere.centre)[0], cone_body.p.tolist())
+    seen = minus(turned_back(cone_body.R.tolist(), centre), cone.point.tolist())
+    return square_of(plain_cross(cone.axis.tolist(), seen)) / (sphere.radius or 1.0) ** 2
 
 
 def _on_plane(shape: ConvexShape, body: Moving, plane: HalfSpace, wall_body: Moving) -> _Lying:
     """Numbers of :func:`_on_wall` on a plane, of any convex shape."""
-    n = wall_body.R @ plane.normal
-    n_rate = cross(wall_body.w, n)
-    point, by_direction = shape.support(-(body.R.T @ n))
-    arm = body.R @ point
-    turning = cross(body.w, n) - n_rate  # rate of the direction in the body's frame
-    place = body.p + arm
-    rate = body.v + cross(body.w, arm) + body.R @ (by_direction @ (body.R.T @ turning))
-    gap = dot(n, place - wall_body.p - wall_body.R @ plane.point)
-    return gap, n, n_rate, place, rate
+    R, spin = body.R.tolist(), body.w.tolist()
+    n = turned(wall_body.R.tolist(), plane.normal.tolist())
+    n_rate = plain_cross(wall_body.w.tolist(), n)
+    turning = minus(plain_cross(spin, n), n_rate)  # rate of the direction -n in the body's frame
+    if isinstance(shape, SphereShape):
+        arm, moved = minus(turned(R, shape.centre.tolist()), scaled(shape.radius, n)), scaled(shape.radius, turning)
+    else:
+        point, by_turning = shape.support(scaled(-1.0, turned_back(R, n)), turned_back(R, turning))
+        arm, moved = turned(R, point), turned(R, by_turning)
+    place = plus(body.p.tolist(), arm)
+    rate = plus(plus(body.v.tolist(), plain_cross(spin, arm)), moved)
+    foot = plus(wall_body.p.tolist(), turned(wall_body.R.tolist(), plane.point.tolist()))
+    return plain_dot(n, minus(place, foot)), n, n_rate, place, rate
 
 
 def _two_spheres(sphere_a: SphereShape, a: Moving, sphere_b: SphereShape, b: Moving) -> _Lying:
-    centre_a, centre_b = a.p + a.R @ sphere_a.centre, b.p + b.R @ sphere_b.centre
-    d, d_rate = centre_a - centre_b, a.velocity(centre_a) - b.velocity(centre_b)
-    distance = sqrt(dot(d, d))
-    length = distance or 1.0  # a trial step may lay one centre on the other, where the normal is zero
-    n = d / length
-    n_rate = (d_rate - n * dot(n, d_rate)) / length
-    place, rate = centre_a - sphere_a.radius * n, a.velocity(centre_a) - sphere_a.radius * n_rate
-    return distance - sphere_a.radius - sphere_b.radius, n, n_rate, place, rate
+    (centre_a, velocity_a), (centre_b, velocity_b) = _carried(a, sphere_a.centre), _carried(b, sphere_b.centre)
+    apart, apart_rate = minus(centre_a, centre_b), minus(velocity_a, velocity_b)
+    distance = sqrt(square_of(apart))
+    inverse = 1.0 / (distance or 1.0)  # a trial step may lay one centre on the other, where the normal is zero
+    n = scaled(inverse, apart)
+    n_rate = scaled(inverse, minus(apart_rate, scaled(plain_dot(n, apart_rate), n)))
+    place, rate = minus(centre_a, scaled(sphere_a.radius, n)), minus(velocity_a, scaled(sphere_a.radius, n_rate))
+    return distance - (sphere_a.radius + sphere_b.radius), n, n_rate, place, rate
 
 
 def _two_shafts(shaft_a: Shaft, a: Moving, shaft_b: Shaft, b: Moving) -> _Lying:
     """Numbers of :func:`_on_wall` of two round shafts that cross, where their axes are nearest."""
-    u, w = a.R @ shaft_a.axis, b.R @ shaft_b.axis
-    u_rate, w_rate = cross(a.w, u), cross(b.w, w)
-    foot_a, foot_b = a.p + a.R @ shaft_a.point, b.p + b.R @ shaft_b.point
-    d, d_rate = foot_a - foot_b, a.velocity(foot_a) - b.velocity(foot_b)
-    across, across_rate = cross(u, w), cross(u_rate, w) + cross(u, w_rate)
-    square = float(across @ across) or 1.0  # of parallel shafts, which have no normal
-    ahead = b.R @ shaft_b.outward if isinstance(shaft_b, EdgeLine) else d
-    sign = np.copysign(1.0, float(ahead @ across)) / np.sqrt(square)
-    n, n_rate = sign * across, sign * across_rate
-    n_rate = n_rate - n * (n @ n_rate)
-    cosine, cosine_rate = float(u @ w), float(u_rate @ w + u @ w_rate)
-    along_a, along_b = float(d @ u), float(d @ w)
-    rate_a, rate_b = float(d_rate @ u + d @ u_rate), float(d_rate @ w + d @ w_rate)
+    u, w = turned(a.R.tolist(), shaft_a.axis.tolist()), turned(b.R.tolist(), shaft_b.axis.tolist())
+    u_rate, w_rate = plain_cross(a.w.tolist(), u), plain_cross(b.w.tolist(), w)
+    (foot_a, velocity_a), (foot_b, velocity_b) = _carried(a, shaft_a.point), _carried(b, shaft_b.point)
+    apart, apart_rate = minus(foot_a, foot_b), minus(velocity_a, velocity_b)
+    across, across_rate = plain_cross(u, w), plus(plain_cross(u_rate, w), plain_cross(u, w_rate))
+    square = square_of(across) or 1.0  # of parallel shafts, which have no normal
+    ahead = turned(b.R.tolist(), shaft_b.outward.tolist()) if isinstance(shaft_b, EdgeLine) else apart
+    factor = _sign(plain_dot(ahead, across)) / sqrt(square)
+    n, n_rate = scaled(factor, across), scaled(factor, across_rate)
+    n_rate = minus(n_rate, scaled(plain_dot(n, n_rate), n))
+    cosine, cosine_rate = plain_dot(u, w), plain_dot(u_rate, w) + plain_dot(u, w_rate)
+    along_a, along_b = plain_dot(apart, u), plain_dot(apart, w)
+    rate_a = plain_dot(apart_rate, u) + plain_dot(apart, u_rate)
+    rate_b = plain_dot(apart_rate, w) + plain_dot(apart, w_rate)
     s = (cosine * along_b - along_a) / square
-    s_rate = (cosine_rate * along_b + cosine * rate_b - rate_a + 2 * s * cosine * cosine_rate) / square
-    place = foot_a + s * u - shaft_a.radius * n
-    rate = a.velocity(foot_a) + s_rate * u + s * u_rate - shaft_a.radius * n_rate
-    return float(n @ d) - shaft_a.radius - shaft_b.radius, n, n_rate, place, rate
+    s_rate = (cosine_rate * along_b + cosine * rate_b - rate_a + 2.0 * s * cosine * cosine_rate) / square
+    place = minus(plus(foot_a, scaled(s, u)), scaled(shaft_a.radius, n))
+    rate = plus(plus(velocity_a, scaled(s_rate, u)), minus(scaled(s, u_rate), scaled(shaft_a.radius, n_rate)))
+    return plain_dot(n, apart) - (shaft_a.radius + shaft_b.radius), n, n_rate, place, rate
+
+
+def _sign(number: Any) -> Any:
+    """Sign of a number or of a symbol."""
+    return math.copysign(1.0, number) if isinstance(number, float) else number / sqrt(number * number)

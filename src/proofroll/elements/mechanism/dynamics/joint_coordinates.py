@@ -6,7 +6,7 @@ each step the violations of Φ and C v are eliminated along the locked direction
 spherical and free joints are states in the child's axes, which keeps digits when a body spins fast.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any
@@ -22,11 +22,16 @@ from proofroll.elements.mechanism.dynamics.named_forces import joint_force_share
 from proofroll.elements.mechanism.dynamics.point_loads import point_loads
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
 from proofroll.elements.mechanism.dynamics.switches import REDUNDANT, STOPPED, Mode, held_joints, switched_joints
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE
 from proofroll.elements.mechanism.scene.kinks import Functions
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array, skews, to_quaternion
+from proofroll.elements.mechanism.scene.shapes.walls.formula import RecordedProgram
 from proofroll.elements.mechanism.scene.signal import FUNCTIONS, value_at, varies
 
+_OF_ROWS = "residual", "C", "bias", "force", "torque"
+_OF_BODIES = "p_WB", "R_WB", "v_WB", "w_WB", "J", "bias", "p_joint", "R_parent"
+_MOST = 12  # bodies of a tree whose terms are recorded
 _NEAR = 1e-7  # displacement of coordinates for finite differences of accelerations [m, 1]
 _STEP = 0.05  # of DOP853, in times in which the fastest mode turns by 1 rad; chains of 5 to 80 links need no less
 
@@ -78,6 +83,7 @@ class JointCoordinates:
         self.sides: Mode = ()  # modes of limited efforts that are kept; empty: they follow from the state
         self.functions: Functions = FUNCTIONS  # of formulas, which may hold the sides of their kinks
         self.switches = bool(self.switched or self.limited)
+        self._program: Callable[[Sequence[float]], list[Array]] | None = None
         self._light = self.rank > 0 and lacks_inertia(mechanism)
         self._armature = np.diag([joint.armature for joint in by_velocity])
         laws = zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
@@ -96,9 +102,8 @@ class JointCoordinates:
             Refused: joints that are held and loops lock the same direction, so that their forces are not determinate.
         """
         mode = self.sliding(v) if mode is None else mode
-        motion = self.tree.at(q, v)
-        J, M, loads = self.inertial(motion)
-        b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
+        motion, M, inertial, rows = self._terms(q, v, time)
+        b = self._torque - self._damping * v - inertial
         for stiffness, rest, at_q, at_v in self._springs:
             b[at_v] -= stiffness * (q[at_q] - rest)
         for acting in point_loads(self.mechanism, motion, time, self.functions):
@@ -112,7 +117,6 @@ class JointCoordinates:
         if self.actuators:
             for (_, _, column), effort in zip(self.actuators, self.efforts(time, q, v, mode), strict=True):
                 b[column] += effort
-        rows = self.tree.loop_rows(motion, time, self.functions)
         C, bias, rank = rows.C, rows.bias, self.rank
         if held := [self.switched[number].velocity for number in held_joints(mode)]:
             C, bias, rank = np.vstack([C, np.eye(len(v))[held]]), np.append(bias, np.zeros(len(held))), rank + len(held)
@@ -150,6 +154,35 @@ class JointCoordinates:
             holding=multipliers[loops:],
         )
 
+    def record(self) -> None:
+        """Records the terms of :meth:`solve` as plain assignments, which pays from some hundred solutions on.
+
+        Trees of few bodies are recorded whose loops hold points and axes, without prescribed motions.
+        """
+        mechanism, nq = self.mechanism, self.mechanism.nq
+        few = len(mechanism.bodies) <= _MOST and not mechanism.prescribed
+        if few and all(loop.kind != DISTANCE for loop in mechanism.loops):
+            program = RecordedProgram(nq + mechanism.nv)
+            x = np.array(program.symbols, dtype=object)
+            motion, M, inertial, rows = self._terms(x[:nq], x[nq:], 0.0)
+            of_rows, of_bodies = (
+                (getattr(rows, name) for name in _OF_ROWS),
+                (getattr(motion, name) for name in _OF_BODIES),
+            )
+            self._program, self._loop = program.arrays([M, inertial, *of_rows, *of_bodies]), rows.loop
+
+    def _terms(self, q: Array, v: Array, time: float) -> tuple[BodyMotion, Array, Array, Rows]:
+        """Motion, mass matrix, inertial minus gravity forces along the velocities at v̇ = 0, (nv), and rows."""
+        if self._program is not None:
+            M, inertial, *arrays = self._program([*q.tolist(), *v.tolist()])
+            of_rows = dict(zip(_OF_ROWS, arrays, strict=False))
+            of_bodies = dict(zip(_OF_BODIES, arrays[len(_OF_ROWS) :], strict=True))
+            return BodyMotion(**of_bodies, q=q), M, inertial, Rows(**of_rows, loop=self._loop, moved=0)
+        motion = self.tree.at(q, v)
+        J, M, loads = self.inertial(motion)
+        rows = self.tree.loop_rows(motion, time, self.functions)
+        return motion, M, loads.ravel() @ J.reshape(-1, len(v)), rows
+
     def weighted(self, M: Array, b: Array, C: Array, bias: Array) -> tuple[Array, Array]:
         """Mass matrix and forces with a weight on the rows, if the mass matrix is singular without them.
 
@@ -162,7 +195,7 @@ class JointCoordinates:
 
     def rows(self, q: Array) -> Rows:
         """Constraints of loops and couplings for coordinates (nq), at rest."""
-        return self.tree.loop_rows(self.tree.at(q, np.zeros(self.mechanism.nv)))
+        return self._terms(q, np.zeros(self.mechanism.nv), 0.0)[-1]
 
     def efforts(self, time: float, q: Array, v: Array, mode: Mode = ()) -> list[float]:
         """Effort of each actuator at its joint [N m, N], by its mode if ``mode`` has one, else clamped to its limit."""

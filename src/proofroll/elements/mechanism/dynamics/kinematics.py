@@ -127,8 +127,8 @@ class Tree:
     def at(self, q: Array, v: Array) -> BodyMotion:
         """Motion of all bodies for coordinates q (nq) and velocities v (nv)."""
         n, nj = len(self.mechanism.bodies), len(self._static)
-        p, R = np.zeros((n + 1, 3)), np.zeros((n + 1, 3, 3))
-        p_joint, frames = np.zeros((nj, 3)), np.zeros((2, nj, 3, 3))
+        shapes = (n + 1, 3), (n + 1, 3, 3), (nj, 3), (2, nj, 3, 3)
+        p, R, p_joint, frames = (np.zeros(shape, np.result_type(q, float)) for shape in shapes)  # floats or symbols
         R[n] = _UNIT
         for k, (kind, columns, position, frame, back, child_position) in enumerate(self._static):
             i, c = self.parents[k], self.children[k]
@@ -157,7 +157,7 @@ class Tree:
 
     def _twists(self, sliding: Array, turning: Array, turned: Array) -> Array:
         """Jacobian of each body, (bodies + 1, 6, nv), from columns that slide and turn it and ω × arm."""
-        J = np.empty((len(self._moves), 6, len(self._joint)))
+        J = np.empty((len(self._moves), 6, len(self._joint)), turning.dtype)
         J[:, :3] = (sliding[:, None] + turned).transpose(1, 0, 2)
         J[:, 3:] = turning
         J *= self._moves[:, None]

@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.report.ball_on_net import ball_on_net
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.checks import WORLD
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, SLIDING, JointKind
-from proofroll.elements.mechanism.scene.rotations import frame_of_axis
+from proofroll.elements.mechanism.scene.rotations import frame_of_axis, scaled
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Shape, SphereShape, Wall
 from proofroll.elements.mechanism.scene.shapes.walls import BowlWall, CurvedWall
 from proofroll.report.pen import Drawing, View, across, circle, unit
@@ -93,10 +93,10 @@ def _reach(element: MechanismElement) -> float:
     gaps = [0.5 * touch.gap for touch in touches(mechanism, Tree(mechanism).at(*mechanism.start()))]
     shapes = [shape for contact in mechanism.contacts for shape in (contact.shape_a, contact.shape_b)]
     sizes = [
-        float(np.linalg.norm(shape.support(axis)[0] - shape.support(-axis)[0]))
+        float(np.linalg.norm(np.subtract(shape.support(axis)[0], shape.support(scaled(-1.0, axis))[0])))
         for shape in shapes
         if not isinstance(shape, Wall)
-        for axis in np.eye(3)
+        for axis in np.eye(3).tolist()
     ]
     return max([element.length, *sizes, *gaps])
 

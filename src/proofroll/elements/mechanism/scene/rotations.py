@@ -32,8 +32,36 @@ def plain_cross(a: Sequence[float], b: Sequence[float]) -> Floats3:
 
 def dot(a: Array, b: Array) -> Any:
     """Product of two 3-vectors, as a plain float, or as a symbol of symbols."""
-    (x, y, z), (u, v, w) = a.tolist(), b.tolist()
+    return plain_dot(a.tolist(), b.tolist())
+
+
+def plain_dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    """:func:`dot` in plain floats or symbols."""
+    (x, y, z), (u, v, w) = a, b
     return x * u + y * v + z * w
+
+
+def square_of(a: Sequence[Any]) -> Any:
+    """Square of the length of a vector in plain floats or symbols."""
+    return plain_dot(a, a)
+
+
+def plus(a: Sequence[float], b: Sequence[float]) -> Floats3:
+    """Sum of two vectors in plain floats."""
+    (x, y, z), (u, v, w) = a, b
+    return x + u, y + v, z + w
+
+
+def minus(a: Sequence[float], b: Sequence[float]) -> Floats3:
+    """Difference of two vectors in plain floats."""
+    (x, y, z), (u, v, w) = a, b
+    return x - u, y - v, z - w
+
+
+def scaled(factor: Any, a: Sequence[float]) -> Floats3:
+    """Product of a number and a vector in plain floats."""
+    x, y, z = a
+    return factor * x, factor * y, factor * z
 
 
 def turned(R: Sequence[Sequence[float]], a: Sequence[float]) -> Floats3:
@@ -65,11 +93,13 @@ def skews(a: Array) -> Array:
     return matrices
 
 
-def about(axis: int, angle: float) -> Array:
-    """Rotation about a coordinate axis (0, 1, 2) by an angle, rad."""
-    c, s = math.cos(angle), math.sin(angle)
+def about(axis: int, angle: Any) -> Array:
+    """Rotation about a coordinate axis (0, 1, 2) by an angle, rad, or by a symbol of one."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
-    R = _UNIT.copy()
+    if isinstance(angle, (int, float)):
+        c, s, R = math.cos(angle), math.sin(angle), _UNIT.copy()
+    else:
+        c, s, R = angle.applied("cos"), angle.applied("sin"), _UNIT.astype(object)
     R[i, i], R[i, j], R[j, i], R[j, j] = c, -s, s, c
     return R
 

@@ -4,7 +4,6 @@ The formulas of the numpy solver are evaluated once on symbols of :mod:`.formula
 many operations as the mode needs, and costs a tenth of numpy's calls for arrays of three numbers.
 """
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -76,23 +75,17 @@ class RecordedMode:
         """Takes a mechanism that is :func:`recordable`, and a mode without lines of slips."""
         equations = DependentCoordinates(mechanism, Recursion)
         program = RecordedProgram(len(equations.start))
-        parts = _formulas(equations, mechanism, mode, np.array(program.symbols, dtype=object))
-        flat = [np.asarray(part, dtype=object) for part in parts]
-        ends = np.cumsum([part.size for part in flat]).tolist()
-        self._parts = [(slice(end - part.size, end), part.shape) for end, part in zip(ends, flat, strict=True)]
-        (self._program,) = program.functions([item for part in flat for item in part.ravel().tolist()], math)
+        symbols = np.array(program.symbols, dtype=object)
+        self._program = program.arrays(_formulas(equations, mechanism, mode, symbols))
         self._accelerations = slice(7 * len(equations.mass), 13 * len(equations.mass))
         self._slips = [k for k, acting in enumerate(mode) if acting.kind == "slip"]
 
     def at(self, y: Array, slipping: SlipDirections) -> InMode | None:
         """Motion at a state, the time last; None where a slip has no direction of its own, a wall no normal."""
         try:
-            flat = np.array(self._program(*y.tolist()[:-1]))
+            rates, by_unknown, matrix, targets, pushes, gaps, vectors = self._program(y.tolist()[:-1])
         except (ArithmeticError, ValueError):
             return None
-        rates, by_unknown, matrix, targets, pushes, gaps, vectors = [
-            flat[part].reshape(shape) for part, shape in self._parts
-        ]
         touching = [
             Touching(gap=gap, normal=n, normal_rate=n_rate, place=place, place_rate=place_rate, slide=slide)
             for gap, (n, n_rate, place, place_rate, slide) in zip(gaps.tolist(), vectors, strict=True)

@@ -1,5 +1,6 @@
 """Contact kinematics against what their definition says."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
     SphereShape,
 )
 from proofroll.elements.mechanism.scene.shapes.walls import Bore, BowlWall, ConeWall, Shaft, TorusWall
+from proofroll.elements.mechanism.scene.shapes.walls.formula import RecordedProgram
 
 STEP = 1e-5  # s; central differences leave 1e-10 of it, round-off 1e-11
 
@@ -73,30 +75,30 @@ def test_a_ball_on_the_axis_of_its_bore_has_numbers() -> None:
     assert all(np.isfinite(part).all() for part in found)
 
 
-@pytest.mark.parametrize(
-    "pair",
-    [
-        "ball plane",
-        "plane ball",
-        "vertex plane",
-        "ellipsoid plane",
-        "disc plane",
-        "plane disc",
-        "ball ball",
-        "ball bore",
-        "bore vertex",
-        "ball shaft",
-        "bowl ball",
-        "ball cone",
-        "vertex cone",
-        "ring ball",
-        "ball box",
-        "box ball",
-        "ball capsule",
-        "cylinder ball",
-        "capsule capsule",
-    ],
-)
+PAIRS = [
+    "ball plane",
+    "plane ball",
+    "vertex plane",
+    "ellipsoid plane",
+    "disc plane",
+    "plane disc",
+    "ball ball",
+    "ball bore",
+    "bore vertex",
+    "ball shaft",
+    "bowl ball",
+    "ball cone",
+    "vertex cone",
+    "ring ball",
+    "ball box",
+    "box ball",
+    "ball capsule",
+    "cylinder ball",
+    "capsule capsule",
+]
+
+
+@pytest.mark.parametrize("pair", PAIRS)
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_rates_are_derivatives(pair: str, seed: int) -> None:
     """The rates of gap, normal and place are their differences over a short time, wherever two bodies are."""
@@ -112,6 +114,32 @@ def test_rates_are_derivatives(pair: str, seed: int) -> None:
     assert rate("gap") == pytest.approx(float(now.normal @ now.slide), abs=1e-7)
     assert np.abs(rate("normal") - now.normal_rate).max() < 1e-7
     assert np.abs(rate("place") - now.place_rate).max() < 1e-7
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_symbols_have_the_rules_of_numbers(pair: str) -> None:
+    """A contact recorded with symbols gives the numbers of the same contact, with the same features."""
+    rng, program = np.random.default_rng(4), RecordedProgram(36)
+    one, two = (some_shape(kind, rng) for kind in pair.split())
+    contact, bodies = BodyContact("c", "a", "b", one, two, 0.0, 0.0), (some_body(rng), some_body(rng))
+    expected = touch(contact, *bodies)
+    symbols = np.array(program.symbols, dtype=object).reshape(2, 18)
+    recorded = touch(
+        contact, *(Moving(p[:3], p[3:12].reshape(3, 3), *p[12:].reshape(2, 3)) for p in symbols), expected.feature
+    )
+
+    def flat(touching: Touching) -> list[Any]:
+        vectors = touching[1:6]
+        return [
+            touching.gap,
+            *(x for v in vectors for x in v.tolist()),
+            touching.tilt,
+            *(at for at, _ in touching.borders),
+        ]
+
+    (calculated,) = program.functions(flat(recorded), math)
+    numbers = np.concatenate([np.ravel(part) for body in bodies for part in body])
+    assert np.array(calculated(*numbers.tolist())) == pytest.approx(np.array(flat(expected)), abs=1e-12)
 
 
 def test_an_ellipsoid_is_as_far_from_a_plane_as_its_nearest_point() -> None:

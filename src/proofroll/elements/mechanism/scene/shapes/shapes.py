@@ -1,18 +1,33 @@
 """Shapes that touch: convex ones by their support function, and the walls that these lie on.
 
-A support function gives the farthest point in a direction, and its derivative by the direction. Solids meet each other
-with those of their features that are nearest: see :mod:`proofroll.elements.mechanism.scene.shapes.features`.
+A support function gives the farthest point in a direction, and how it moves as the direction turns. Solids meet each
+other with those of their features that are nearest: see :mod:`proofroll.elements.mechanism.scene.shapes.features`.
 
 All coordinates are in the frame of the body that a shape is fixed to.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.rotations import (
+    Array,
+    Floats3,
+    minus,
+    plain_dot,
+    plus,
+    scaled,
+    square_of,
+    turned,
+)
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls.formula import sqrt
+
+# Square of a sine far below that of a flat disc or of parallel capsules, which with it have numbers.
+LEAST = 1e-32
+_STILL = (0.0, 0.0, 0.0)
 
 
 class ConvexShape(Protocol):
@@ -22,8 +37,8 @@ class ConvexShape(Protocol):
     def centre(self) -> Array:
         """Centre of the shape [m], shape (3,)."""
 
-    def support(self, d: Array) -> tuple[Array, Array]:
-        """Farthest point in a unit direction [m], shape (3,), and its derivative by the direction, shape (3, 3)."""
+    def support(self, d: Sequence[Any], rate: Sequence[Any] = _STILL) -> tuple[Floats3, Floats3]:
+        """Farthest point in a unit direction [m], and its rate by that of the direction, in floats or symbols."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +48,9 @@ class SphereShape:
     centre: Array
     radius: float
 
-    def support(self, d: Array) -> tuple[Array, Array]:
+    def support(self, d: Sequence[Any], rate: Sequence[Any] = _STILL) -> tuple[Floats3, Floats3]:
         """See :class:`ConvexShape`."""
-        return self.centre + self.radius * d, self.radius * np.eye(3)
+        return plus(self.centre.tolist(), scaled(self.radius, d)), scaled(self.radius, rate)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +61,13 @@ class EllipsoidShape:
     axes: Array
     frame: Array
 
-    def support(self, d: Array) -> tuple[Array, Array]:
+    def support(self, d: Sequence[Any], rate: Sequence[Any] = _STILL) -> tuple[Floats3, Floats3]:
         """See :class:`ConvexShape`; with Q = F diag(axes²) Fᵀ the point is Q d/√(d·Q d)."""
-        Q = (self.frame * self.axes**2) @ self.frame.T
-        image = Q @ d
-        h = np.sqrt(d @ image)
-        return self.centre + image / h, Q / h - np.outer(image, image) / h**3
+        Q = ((self.frame * self.axes**2) @ self.frame.T).tolist()
+        image = turned(Q, d)
+        h = sqrt(plain_dot(d, image))
+        beside = scaled(plain_dot(image, rate) / (h * h), image)
+        return plus(self.centre.tolist(), scaled(1.0 / h, image)), scaled(1.0 / h, minus(turned(Q, rate), beside))
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +78,15 @@ class CircleShape:
     radius: float
     normal: Array
 
-    def support(self, d: Array) -> tuple[Array, Array]:
+    def support(self, d: Sequence[Any], rate: Sequence[Any] = _STILL) -> tuple[Floats3, Floats3]:
         """See :class:`ConvexShape`."""
-        across = d - (d @ self.normal) * self.normal
-        across -= (across @ self.normal) * self.normal  # of a disc that is almost flat round-off is left
-        length = float(np.linalg.norm(across))
-        e = across / length if length else across
-        flat = np.eye(3) - np.outer(self.normal, self.normal) - np.outer(e, e)
-        return self.centre + self.radius * e, self.radius * flat / max(length, np.finfo(float).tiny)
+        normal = self.normal.tolist()
+        across = minus(d, scaled(plain_dot(d, normal), normal))
+        across = minus(across, scaled(plain_dot(across, normal), normal))  # of a disc almost flat round-off is left
+        inverse = 1.0 / sqrt(square_of(across) + LEAST)
+        e = scaled(inverse, across)
+        beside = plus(scaled(plain_dot(normal, rate), normal), scaled(plain_dot(e, rate), e))
+        return plus(self.centre.tolist(), scaled(self.radius, e)), scaled(self.radius * inverse, minus(rate, beside))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +105,14 @@ class BoxShape:
     half: Array
     frame: Array
 
-    def support(self, d: Array) -> tuple[Array, Array]:
+    def support(
+        self,
+        d: Sequence[Any],
+        rate: Sequence[Any] = _STILL,  # noqa: ARG002 -- a corner stays
+    ) -> tuple[Floats3, Floats3]:
         """See :class:`ConvexShape`; a corner, which does not move with the direction."""
-        return self.centre + self.frame @ (self.half * np.where(d @ self.frame < 0, -1.0, 1.0)), np.zeros((3, 3))
+        corner = self.frame @ (self.half * np.where(np.asarray(d) @ self.frame < 0, -1.0, 1.0))
+        return plus(self.centre.tolist(), corner.tolist()), _STILL
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,10 +124,10 @@ class CapsuleShape:
     half: float
     radius: float
 
-    def support(self, d: Array) -> tuple[Array, Array]:
+    def support(self, d: Sequence[Any], rate: Sequence[Any] = _STILL) -> tuple[Floats3, Floats3]:
         """See :class:`ConvexShape`; a point of one of its ends."""
-        end = self.centre + float(np.sign(d @ self.axis)) * self.half * self.axis
-        return end + self.radius * d, self.radius * np.eye(3)
+        end = self.centre + float(np.sign(np.asarray(d) @ self.axis)) * self.half * self.axis
+        return SphereShape(end, self.radius).support(d, rate)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +139,10 @@ class CylinderShape:
     half: float
     radius: float
 
-    def support(self, d: Array) -> tuple[Array, Array]:
+    def support(self, d: Sequence[Any], rate: Sequence[Any] = _STILL) -> tuple[Floats3, Floats3]:
         """See :class:`ConvexShape`; a point of one of its rims."""
-        side = float(np.sign(d @ self.axis)) * self.half
-        return CircleShape(self.centre + side * self.axis, self.radius, self.axis).support(d)
+        side = float(np.sign(np.asarray(d) @ self.axis)) * self.half
+        return CircleShape(self.centre + side * self.axis, self.radius, self.axis).support(d, rate)
 
 
 Solid = BoxShape | CapsuleShape | CylinderShape

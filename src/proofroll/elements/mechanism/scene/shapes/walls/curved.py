@@ -61,11 +61,6 @@ class CurvedWall:
         with np.errstate(invalid="ignore"):
             return float(self.away(x, y, z)), NO_NORMAL, NO_BEND
 
-    def near_in_scalars(self, place: Any) -> tuple[Any, list[Any], list[list[Any]]]:
-        """Distance, normal and rows of the normal's gradient in any scalars."""
-        jet = self.away(*variables(*place))
-        return jet.value, jet.first, [[jet.second[k] for k in row] for row in UPPER]
-
 
 class PlacedWall:
     """A wall in axes other than those of its body, for places in plain floats."""

@@ -15,6 +15,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
+
 _NAMES = re.compile(r"\bn\d+\b")  # of results
 
 
@@ -121,7 +123,7 @@ def variables(*values: Any) -> list[Jet]:
 
 def sqrt(x: Any) -> Any:
     """Square root of a number, an array, a jet, a symbol, or an expression of heyoka."""
-    return _applied("sqrt", x)
+    return math.sqrt(x) if type(x) is float and x >= 0.0 else _applied("sqrt", x)
 
 
 def sin(x: Any) -> Any:
@@ -137,8 +139,6 @@ def cos(x: Any) -> Any:
 def _applied(name: str, x: Any) -> Any:
     if isinstance(x, Jet):
         return x.call(name, _applied)
-    if isinstance(x, _Symbol):
-        return x.noted(f"{name}({x.text})")
     if isinstance(x, (int, float, np.ndarray, np.generic)):
         return getattr(np, name)(x)
     if isinstance(x, Applicable):
@@ -164,6 +164,10 @@ class _Symbol:
     def noted(self, formula: str, negative: bool = False) -> _Symbol:
         """Result of a formula as a symbol; a repeated formula is recorded once."""
         return _Symbol(self.steps, self.steps.setdefault(formula, f"n{len(self.steps)}"), negative)
+
+    def applied(self, name: str) -> Any:
+        """See :class:`Applicable`."""
+        return self.noted(f"{name}({self.text})")
 
     def __add__(self, other: Any) -> Any:
         if _is(other, 0):
@@ -245,6 +249,22 @@ class RecordedProgram:
         for scope in scopes:
             exec(source, scope)  # only the arithmetic recorded above
         return [scope["calculated"] for scope in scopes]
+
+    def arrays(self, parts: Sequence[Any]) -> Callable[[Sequence[float]], list[FloatArray]]:
+        """Function of the arguments' values that returns arrays of results as arrays of floats.
+
+        It raises ArithmeticError or ValueError where a formula has no value.
+        """
+        flat = [np.asarray(part, dtype=object) for part in parts]
+        ends = np.cumsum([part.size for part in flat]).tolist()
+        places = [(slice(end - part.size, end), part.shape) for end, part in zip(ends, flat, strict=True)]
+        (program,) = self.functions([item for part in flat for item in part.ravel().tolist()], math)
+
+        def calculated(values: Sequence[float]) -> list[FloatArray]:
+            numbers = np.array(program(*values))
+            return [numbers[place].reshape(shape) for place, shape in places]
+
+        return calculated
 
 
 def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
