@@ -1,6 +1,7 @@
 """Loads the engine and the scene of a case in the process that runs it, and checks their versions."""
 
 import gc
+from functools import lru_cache
 from typing import Any
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
@@ -10,6 +11,8 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case
 from proofroll.running.program import engine, path_of
 
+# Scenes that a process keeps, as most cases are of few.
+_SCENES = 8
 # Place that this process serves: the part after ``@`` of its engines; empty: engines of this interpreter.
 _settled = ""
 
@@ -64,7 +67,13 @@ def scene_of(case: Case) -> Scene:
         InputError: there is no such scene or parameter.
         ProofrollError: the scene has another digest here than when the case was made.
     """
-    scene = load_scene(case.scene, asks=case.asks, **case.parameters)
+    scene = _scene(case.scene, case.scene_digest, case.asks, tuple(case.parameters.items()))
     if scene.digest != case.scene_digest:
         raise ProofrollError(f"{case.scene} is another scene where {case.engine.name} runs than where it was asked for")
     return scene
+
+
+@lru_cache(maxsize=_SCENES)
+def _scene(name: str, _digest: str, asks: tuple[str, ...], parameters: tuple[tuple[str, float], ...]) -> Scene:
+    """One of the last scenes of this process; engines get copies of them."""
+    return load_scene(name, asks=asks, **dict(parameters))
