@@ -21,3 +21,5 @@ def pytest_terminal_summary(terminalreporter: Any, exitstatus: int) -> None:
     if module is not None and exitstatus == 0:
         for name in sorted(name for name, passes in module.checked.items() if passes):
             terminalreporter.write_line(f"{name} passes the conformance checks; proofroll fuzz {name} next")
+            if left := module.not_looked_at[name]:
+                terminalreporter.write_line(f"provided and never looked at: {', '.join(sorted(left))}")

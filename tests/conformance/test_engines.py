@@ -27,6 +27,7 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
         "first_steps_fit_the_scene[joints-tuned-slider_crank]": "at a time constant of two steps a loop's force is off "
         "by a thousandth at every step, at ten steps by a hundred-thousandth",
         "moves_as_the_truth[joints-tuned-slider_crank]": "as its first steps",
+        "first_steps_fit_the_scene[joints-tuned-spatial_slider_crank]": "as the slider-crank's",
         "moves_as_the_truth[joints-default-double_pendulum-friction]": "with MuJoCo's default solref friction comes up "
         "over 0.02 s at every step, and the presets with hard rows pass",
         "moves_as_the_truth[geoms-default-sled]": "the pyramid brakes more along its edges than across, at every step",

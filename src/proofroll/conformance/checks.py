@@ -29,6 +29,8 @@ _PASSED, _SKIPPED, _FAILED = "passed", "skipped", "failed"
 _processes: dict[str, ProcessPoolExecutor] = {}
 checked: dict[str, bool] = {}
 """Name of each engine whose checks were run in this process -> True if none has failed."""
+not_looked_at: dict[str, set[str]] = {}
+"""Name of each such engine -> capabilities that it provides and none of its runs against the truth needed."""
 
 
 # Checks that run once per engine.
@@ -79,12 +81,14 @@ class Check:
         name: e.g. ``certificate_holds[free-matched-plane]``.
         known: reason of a known failure; then the check must not pass. Empty: the check should pass.
         run: the check itself.
+        needs: capabilities that a run against the truth needs; empty for other checks.
     """
 
     engine: Any
     name: str
     known: str
     run: Callable[[], None]
+    needs: frozenset[str] = frozenset()
 
     @property
     def __name__(self) -> str:  # what pytest shows
@@ -99,11 +103,14 @@ class Check:
         """
         name = str(getattr(self.engine, "name", ""))
         checked.setdefault(name, True)
+        left = not_looked_at.setdefault(name, set(_provided(self.engine)))
         try:
             self.run()
+            left -= self.needs
         except SkipTest:
             raise
         except Exception as error:
+            left -= self.needs
             checked[name] &= bool(self.known)
             if self.known:
                 raise SkipTest(f"known: {self.known}") from error
@@ -140,17 +147,30 @@ def checks(engine: Any, accepted: Mapping[str, str] | None = None, *, apart: boo
         ValueError: a name in ``accepted`` fits no check.
     """
     patterns = dict(accepted or {})
-    all_runs = runs(engine)
-    if apart:
-        all_runs = ((name, partial(_run_apart, engine, name)) for name, _ in all_runs)
     selected = [
-        Check(engine, name, next((why for pattern, why in patterns.items() if _fits(name, pattern)), ""), run)
-        for name, run in all_runs
+        Check(
+            engine=engine,
+            name=name,
+            known=next((why for pattern, why in patterns.items() if _fits(name, pattern)), ""),
+            run=partial(_run_apart, engine, name) if apart else run,
+            needs=_needs(run),
+        )
+        for name, run in runs(engine)
     ]
     for pattern in patterns:
         if not any(_fits(check.name, pattern) for check in selected):
             raise ValueError(f"no check of {engine.__name__} fits {pattern!r}")
     return selected
+
+
+def _needs(run: partial[None]) -> frozenset[str]:
+    """Capabilities that a run against the truth needs; empty for another check."""
+    return run.args[0].scene.requires if run.func in (response.moves_as_the_truth, response.law_acts) else frozenset()
+
+
+def _provided(engine: Any) -> frozenset[str]:
+    provides = getattr(engine, "provides", None)
+    return frozenset(itertools.chain(*provides.values())) if isinstance(provides, Mapping) else frozenset()
 
 
 def _run_apart(engine: Any, name: str) -> None:
@@ -200,7 +220,7 @@ def _of_one_process(engine: Any, name: str) -> str:
     return next((key for key in keys if name.partition("[")[2].removesuffix("]").startswith(key)), "")
 
 
-def runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
+def runs(engine: Any) -> Iterator[tuple[str, partial[None]]]:
     """Name and callable of every check of an engine."""
     for check in _OF_ENGINES:
         yield check.__name__, partial(check, engine)

@@ -72,11 +72,13 @@ def moves_as_the_truth(subject: Subject) -> None:
     sizes = _sizes(subject.scene, times[-1], true)
     beside = _beside_events(subject.scene, step or 0.0, true)
     for name, values in moved.items():
+        exact = true[name].to_numpy()[1:]
+        known = ~np.isnan(exact)  # forces that the scene does not determine are not
         error, change = (
-            float(np.max(np.abs(values - exact))) / sizes[name] for exact in (true[name].to_numpy()[1:], finer[name])
+            float(np.max(np.abs(values - rival)[known], initial=0.0)) / sizes[name] for rival in (exact, finer[name])
         )
         # Round-off is relative to the value, which may be many times its change by gravity.
-        size = float(np.max(np.abs(true[name].to_numpy()))) / sizes[name]
+        size = float(np.nanmax(np.abs(exact), initial=0.0)) / sizes[name]
         rough = max(_ROUND_OFF, 10 * subject.closeness, round_off_of(precision_of(subject.settings), size))
         allowed = min(_MOST, _MARGIN * change + soft + rough + beside.get(name, 0.0) / sizes[name])
         if error > allowed or math.isnan(error):

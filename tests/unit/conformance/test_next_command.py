@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import ClassVar
 from unittest import SkipTest
 
 import pytest
 from tiny import Tiny
 
 from proofroll.conformance import checks
-from proofroll.conformance.checks import Check, checked
+from proofroll.conformance.checks import Check, checked, not_looked_at
 from proofroll.pytest_plugin import pytest_terminal_summary
 
 
@@ -41,6 +42,7 @@ def test_an_engine_that_passes_is_sent_to_random_scenes(
     install_engines({"tiny": "tiny:Tiny"})
     for name in list(checked):
         monkeypatch.delitem(checked, name)
+    monkeypatch.setitem(not_looked_at, "tiny", set())
     assert _lines(0) == []
     _run("version_is_told")
     assert _lines(0) == ["tiny passes the conformance checks; proofroll fuzz tiny next"]
@@ -50,3 +52,30 @@ def test_an_engine_that_passes_is_sent_to_random_scenes(
     assert _lines(0) == []
     with pytest.raises(SkipTest):
         Check(Tiny, "known", "its reason", lambda: (_ for _ in ()).throw(AssertionError("no")))()
+
+
+def test_what_no_run_needed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Capabilities of an engine leave the line as runs against the truth need them, known to fail or not."""
+
+    class Provides(Tiny):
+        name = "provides"
+        provides: ClassVar = {"euler": frozenset({"free bodies", "bushings", "gears"})}
+
+    monkeypatch.setitem(checked, "provides", True)
+
+    def check(known: str, needs: str, error: Exception | None = None) -> Check:
+        def run() -> None:
+            if error is not None:
+                raise error
+
+        return Check(Provides, "moves", known, run, frozenset({needs}))
+
+    check("", "free bodies")()
+    assert _lines(0)[-1] == "provided and never looked at: bushings, gears"
+    with pytest.raises(SkipTest):
+        check("its reason", "gears", AssertionError("no"))()
+    with pytest.raises(SkipTest):
+        check("", "bushings", SkipTest("refused"))()
+    assert _lines(0)[-1] == "provided and never looked at: bushings"
+    check("", "bushings")()
+    assert _lines(0)[-1] == "provides passes the conformance checks; proofroll fuzz provides next"

@@ -52,6 +52,10 @@ PLANTED: dict[str, tuple[tuple[str, str], Callable[[Mechanism], Mapping[str, obj
     "held_targets": (MUJOCO, lambda m: {"control": replace(m.control, delay=1)}),  # type: ignore[type-var]  # it has one
     "damping": (MUJOCO, lambda m: {"joints": tuple(replace(joint, damping=0.5 * joint.damping) for joint in m.joints)}),
     "stops": (MUJOCO, lambda m: {"joints": tuple(replace(joint, limits=None) for joint in m.joints)}),
+    "rebounds_from_stops": (
+        PINOCCHIO,
+        lambda m: {"joints": tuple(replace(joint, restitution=0.8 * joint.restitution) for joint in m.joints)},
+    ),
     "restitution": (PINOCCHIO, lambda m: {"pairs": (replace(m.pairs[0], restitution=0.8 * m.pairs[0].restitution),)}),
     "friction_of_contacts": (
         PINOCCHIO,

@@ -13,8 +13,10 @@ from proofroll.core.scene import Scene
 from proofroll.core.validation import all_units_of
 from proofroll.elements.mechanism.reading.reader import KINDS, made_mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
+from proofroll.elements.mechanism.scene.checks import WORLD
 from proofroll.elements.mechanism.scene.control import Control
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
+from proofroll.elements.mechanism.scene.parts import Spring
 from proofroll.elements.mechanism.scene.published import read_published
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.elements.mechanism.scene.spring_law import IN_LAWS
@@ -28,6 +30,11 @@ if TYPE_CHECKING:
 # [SI].
 _PLAIN = "double_pendulum"
 _LAWS: Mapping[str, float] = {"damping": 2.0, "torque": 3.0, "armature": 0.3, "friction": 0.7}
+# Scenes of models/ that require what no scene below does, each in a run of a tenth of a second.
+_SHOWN = (
+    *("slider_crank", "heavy_top", "oscillators", "sled", "falling_rod", "joint_bench"),
+    *("engine_on_mounts", "spatial_slider_crank"),
+)
 _SPEED = 1.0  # rad/s, at which a damper acts
 
 
@@ -55,7 +62,9 @@ def _with_drive(scene: Scene, drive: str) -> Scene:
     joints = joint_1, joint_2 = tuple(replace(joint, v0=(_SPEED,)) for joint in the_mechanism(scene).mechanism.joints)
     servo = Actuator("servo", joint_2.name, "position", 1.0, kp=30.0, kd=2.0, gear=2.0)
     of_time = replace(servo, target=Formula("cos(5*t)"))
+    ends: dict[str, Any] = {"body_a": WORLD, "body_b": joint_2.child, "position_a": (0.3, 0.0, 0.4)}
     drives: Mapping[str, Mapping[str, Any]] = {
+        "spring": {"springs": (Spring("spring", stiffness=40.0, damping=1.0, length=0.5, **ends),)},
         "servo": {"actuators": (servo,)},
         "limit": {"actuators": (replace(servo, limit=5.0),)},
         "target": {"actuators": (of_time,)},
@@ -77,7 +86,7 @@ def _with_drive(scene: Scene, drive: str) -> Scene:
 # s: the spheres then hit and stick at 0.03822 s, an impact that half a step resolves better than a step of 2e-3 s does.
 _SOONER = 0.06178
 _RATE = 50.0  # Hz, of a controller; common steps divide the time between its instants
-_DRIVES = ("servo", "limit", "target", "coupling")
+_DRIVES = ("servo", "limit", "target", "coupling", "spring")
 
 
 def _sooner(scene: Scene, time: float) -> Scene:
@@ -134,7 +143,7 @@ class MechanismKind:
         """
         from proofroll.files.scene_file import load_scene
 
-        scenes = {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators", "sled")}
+        scenes = {name: load_scene(name) for name in _SHOWN}
         scenes[_PLAIN] = plain = load_scene(_PLAIN)
         scenes["slow_top"] = load_scene("heavy_top", spin=2.0, tilt=1.2)
         scenes["falling_body"] = _falling(load_scene("free_body", w1=2.0, w3=1.0))
@@ -164,6 +173,10 @@ class MechanismKind:
             "stiffness_of_servos": (driven, weak),
             "damping": (_with_law(plain, "damping", _LAWS["damping"]), free),
             "stops": (_changed(free, f"{_PLAIN}-stopped", joints=(first, stopped)), free),
+            "rebounds_from_stops": (
+                _changed(free, f"{_PLAIN}-thrown", joints=(first, replace(stopped, restitution=0.8))),
+                _changed(free, f"{_PLAIN}-caught", joints=(first, stopped)),
+            ),
             "friction_of_contacts": (sleds[0], sleds[1]),
         }
 
