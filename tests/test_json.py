@@ -58,8 +58,7 @@ from proofroll.studies.fuzz.hunt import FoundKind, Hunt
 from proofroll.studies.fuzz.shrink import SmallestScene
 from proofroll.studies.fuzz.surprises import Surprise, SurpriseKind
 from proofroll.studies.ladder.models import Ran
-from proofroll.studies.stability.axes import Axis
-from proofroll.studies.stability.effort import Effort
+from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.records import (
     Boundary,
     BoundaryPoint,

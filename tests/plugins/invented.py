@@ -16,9 +16,8 @@ from proofroll.report.stability.part import StabilityPart
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies import study_store
-from proofroll.studies.stability.axes import Axis
+from proofroll.studies.stability.axes import QUICK, Axis
 from proofroll.studies.stability.claims import file_for
-from proofroll.studies.stability.effort import QUICK
 from proofroll.studies.stability.records import Boundary, BoundaryPoint, ExplainedBoundary, StabilityStudy
 
 

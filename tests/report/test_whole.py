@@ -21,7 +21,7 @@ from proofroll.report.parts import PartEntry, absent, all_parts, attempt, part_k
 from proofroll.report.stability.part import StabilityPart
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import Outcome
-from proofroll.studies.stability.effort import QUICK, Effort
+from proofroll.studies.stability.axes import QUICK, Effort
 from proofroll.studies.stability.map import stability_path
 from proofroll.studies.study_store import keep_study
 

@@ -31,9 +31,8 @@ def stability(
     from proofroll.report.stability.part import StabilityPart
     from proofroll.report.stability.tables import stability_parts
     from proofroll.running.store import write_text
-    from proofroll.studies.stability.axes import chosen
+    from proofroll.studies.stability.axes import QUICK, Effort, chosen
     from proofroll.studies.stability.claims import file_for
-    from proofroll.studies.stability.effort import QUICK, Effort
     from proofroll.studies.stability.study import make_stability
 
     asked = file_for(scene)

@@ -54,7 +54,7 @@ class Limit:
         shown: True if the differences shrink, so that there is a limit to speak of.
         saturated: True if two tolerances gave the same run but for round-off: something else (samples at which steps
             end) limits the steps, so that no limit of small steps follows.
-        beside: effect on the finest curve of events that are one step late (:mod:`proofroll.core.beside_events`).
+        beside: effect on the finest curve of events that are one step late .
         chance: further doubt in a limit whose order is not the scheme's: its last change may be small by chance, or the
             next order may yet show.
         regular: True if the differences follow one power of the step, or come from tolerances; only then do they show

@@ -15,9 +15,8 @@ from proofroll.running.environments import STAMP, VARIABLE, Environment
 from proofroll.running.timing import machine
 from proofroll.studies import study_store
 from proofroll.studies.answer.records import SceneAnswer
-from proofroll.studies.stability.axes import Axis
+from proofroll.studies.stability.axes import QUICK, Axis, Effort
 from proofroll.studies.stability.claims import file_for
-from proofroll.studies.stability.effort import QUICK, Effort
 from proofroll.studies.stability.map import stability_path
 from proofroll.studies.stability.records import MappedValue, StabilityStudy
 from proofroll.studies.study_store import keep_study, valid_study

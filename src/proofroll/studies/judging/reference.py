@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray, Vectors, magnitudes
-from proofroll.core.beside_events import beside_events
 from proofroll.core.columns import SAMPLED_BAR
 from proofroll.core.dataset import (
     CONTINUOUS,
@@ -36,6 +35,44 @@ from proofroll.studies.judging.quiet import quiet, untouched
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+# Samples on each side of an event through which a parabola is laid.
+_SIDE = 3
+
+
+def beside_events(times: FloatArray, curve: FloatArray, events: Sequence[float], late: float) -> float:
+    """Largest error of a curve if each of its events is late by a given time.
+
+    At an event a curve jumps in value, slope or curvature (position, velocity, force where friction switches). A sample
+    between the true event and the late one is wrong by the jump of the value. Later samples are wrong by what the jumps
+    of slope and curvature make of the delay.
+
+    Args:
+        times: times of the curve [s], shape (time,).
+        curve: values, shape (time, …).
+        events: times of the events [s].
+        late: largest delay of an event [s].
+    """
+    error = 0.0
+    for event in events:
+        index = int(np.searchsorted(times, event))
+        sides = slice(max(index - _SIDE, 0), index), slice(index, index + _SIDE)
+        if min(len(times[side]) for side in sides) < _SIDE:
+            continue
+        earlier_part, later_part = (_taylor(times[side] - event, curve[side]) for side in sides)
+        value, slope, bend = np.max(np.abs(later_part - earlier_part), axis=1)
+        error += late * float(slope + bend * (times[-1] - event))
+        if np.any(np.abs(times - event) <= late):
+            error += float(value)
+    return error
+
+
+def _taylor(t: FloatArray, values: FloatArray) -> FloatArray:
+    """Value, slope and curvature at t = 0 of the parabola through three samples, shape (3, components)."""
+    made = np.linalg.solve(t[:, None] ** np.arange(_SIDE), values.reshape(_SIDE, -1))
+    return np.asarray(made * [[1.0], [1.0], [2.0]])
+
 
 # At which other forces that have no value beside impacts jump, too; those of contacts are judged there.
 _REVERSES = frozenset({EventKind.SLIP, EventKind.STICK, EventKind.REST, EventKind.TURN})
@@ -195,7 +232,7 @@ class Reference:
         return max([*widths, float(dataset.attrs.get(LEFT_OUT, 0.0))]) / 2
 
     def beside(self, name: str, values: FloatArray, dataset: xr.Dataset, step: float | None) -> float:
-        """Error of an observable of a run whose events are a step late or early (:mod:`proofroll.core.beside_events`).
+        """Error of an observable of a run whose events are a step late or early .
 
         Args:
             name: of the observable.

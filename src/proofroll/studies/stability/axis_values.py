@@ -13,8 +13,7 @@ from proofroll.running.engine_questions import resolve_with_truth
 from proofroll.running.runner import Runner
 from proofroll.studies.cases import case_of
 from proofroll.studies.failure import Yardstick
-from proofroll.studies.stability.axes import Axis
-from proofroll.studies.stability.effort import Effort
+from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.records import MappedValue
 
 # Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.

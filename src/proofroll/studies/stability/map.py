@@ -17,10 +17,9 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.failure import TOO_SLOW, RunOutcome, run_outcome
-from proofroll.studies.stability.axes import Axis
+from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.axis_values import AxisValue, axis_values, case_at, measure
 from proofroll.studies.stability.bisection import SearchResult, search
-from proofroll.studies.stability.effort import Effort
 from proofroll.studies.stability.records import MappedValue
 from proofroll.studies.swept_settings import Curve, curves_of
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from proofroll.core.number_format import number
 from proofroll.core.validation import FloatOrInf
 from proofroll.studies.claim_judgement import JudgedFile
-from proofroll.studies.stability.axes import Axis
-from proofroll.studies.stability.effort import Effort
+from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.step_numbers import Explanation
 from proofroll.studies.study_store import Measured
 from proofroll.studies.swept_settings import SweptSetting

@@ -10,9 +10,8 @@ from proofroll.running.case import hosts
 from proofroll.running.runner import Runner
 from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.failure import ACCURATE, NOT_RUN, REFUSED, WRONG_MODEL, meanings
-from proofroll.studies.stability.axes import Axis
+from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.claims import StabilityFile
-from proofroll.studies.stability.effort import Effort
 from proofroll.studies.stability.map import MapPoint, Progress, StabilityMap, failure_beyond, stability, stability_path
 from proofroll.studies.stability.records import (
     BOUNDARIES,

@@ -16,8 +16,8 @@ from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.studies.ladder.ladder import Ladder
 from proofroll.studies.ladder.models import Need
+from proofroll.studies.stability.axes import QUICK
 from proofroll.studies.stability.claims import file_for
-from proofroll.studies.stability.effort import QUICK
 from proofroll.studies.stability.map import stability
 from proofroll.studies.stability.records import BOUNDARIES
 from proofroll.studies.stability.study import stability_study

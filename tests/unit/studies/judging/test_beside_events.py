@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from proofroll.core.beside_events import beside_events
 
 TIMES = np.linspace(0.0, 1.0, 101)
