@@ -27,7 +27,7 @@ from proofroll.report.comparison.summary import outcome_content
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store, write_text
 from proofroll.studies.answer.answers import answer
-from proofroll.studies.answer.by_name import question_named
+from proofroll.studies.answer.question import question_named
 from proofroll.studies.comparison.compare import compare
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import point_name

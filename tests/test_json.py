@@ -53,7 +53,6 @@ from proofroll.studies.answer.records import (
     StepAnswer,
     StepTried,
 )
-from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.fuzz.hunt import FoundKind, Hunt
 from proofroll.studies.fuzz.shrink import SmallestScene
 from proofroll.studies.fuzz.surprises import Surprise, SurpriseKind
@@ -63,6 +62,7 @@ from proofroll.studies.stability.records import (
     Boundary,
     BoundaryPoint,
     ExplainedBoundary,
+    JudgedFile,
     MappedValue,
     StabilityStudy,
 )

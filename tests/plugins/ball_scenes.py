@@ -7,8 +7,8 @@ import pytest
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion
 from proofroll.papers.blajer_2006.truth.polar import first_route
 
 # Nothing about this motion is zero or symmetric, so a lost sign or a swapped axis shows.

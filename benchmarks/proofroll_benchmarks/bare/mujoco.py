@@ -21,7 +21,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.rolling_and_spin import turning_frictions
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.mujoco.contact.walls import curved_end
-from proofroll.engines.mujoco.reproducer import stepped
+from proofroll.engines.mujoco.own_lines import stepped
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 

@@ -47,8 +47,8 @@ def answer_steps(
     from proofroll.report.answer.sentences import scope_sentence, step_sentence
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.studies.answer.answers import answer_path, stored
-    from proofroll.studies.answer.by_name import question_named
     from proofroll.studies.answer.own_step import engine_facts, step_answer
+    from proofroll.studies.answer.question import question_named
     from proofroll.studies.answer.records import StepAnswer
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
     from proofroll.studies.study_store import keep_study

@@ -61,7 +61,7 @@ def recommend(
     from proofroll.report.answer.sentences import answer_lines, taken_sentence
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.running.idle_workers import Workers
-    from proofroll.studies.answer.by_name import question_named
+    from proofroll.studies.answer.question import question_named
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
 
     if plot is not None:

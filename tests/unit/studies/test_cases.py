@@ -8,7 +8,7 @@ import pytest
 
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.answer.by_name import question_named
+from proofroll.studies.answer.question import question_named
 from proofroll.studies.cases import single_case
 from proofroll.studies.ladder.ladder import Ladder
 

@@ -96,7 +96,7 @@ class Mujoco:
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.Reproduces`: steps of the model file."""
-        from proofroll.engines.mujoco.reproducer import mechanism_source
+        from proofroll.engines.mujoco.own_lines import mechanism_source
 
         if settings.formulation not in _MECHANISMS:
             raise Refused(f"the steps of {settings.formulation} are not MuJoCo's alone")

@@ -22,9 +22,8 @@ from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rollin
 from proofroll.papers.blajer_2006.ball.compiled.rolling import parameters, reduced
 from proofroll.papers.blajer_2006.ball.compiled.rolling import start as start_along_arc
 from proofroll.papers.blajer_2006.ball.compiled.series import Series, still_moving
-from proofroll.papers.blajer_2006.ball.mechanics import natural_speed
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion, natural_speed, world_motion
 from proofroll.papers.blajer_2006.ball.model import NO_OTHER_BODIES, ROLLS, RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion, world_motion
 from proofroll.papers.blajer_2006.ball.rolling_equations import closed_form, placed, reduced_rates, start
 from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
 

@@ -14,11 +14,10 @@ from proofroll.report.parts import Part, PartEntry, Tell, claims_sentence
 from proofroll.report.stability import map as stability_map
 from proofroll.report.stability.tables import silent_lines
 from proofroll.running.runner import Runner
-from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.stability.axes import QUICK, Axis, Effort
 from proofroll.studies.stability.claims import STUDY, Claim, StabilityFile, file_for
 from proofroll.studies.stability.map import stability_path
-from proofroll.studies.stability.records import StabilityStudy
+from proofroll.studies.stability.records import ClaimJudgement, StabilityStudy
 from proofroll.studies.stability.study import make_stability
 from proofroll.studies.study_store import valid_study
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,10 +14,12 @@ from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
-from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.files.comparison_file import load_comparison
+from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.cases import case_of
+from proofroll.studies.comparison.planning import with_edges
 from proofroll.studies.judging.reference import Reference
 
 # Length of the runs of a scene whose file has no duration [s].
@@ -146,6 +148,27 @@ class AnswerQuestion:
         indices = np.unique(np.abs(times[:, None] - sparse).argmin(axis=0))
         few = dataset.drop_dims(BETWEEN, errors="ignore").isel(time=indices)
         return {self.every: Reference.of(self.loaded, dataset), self.sparse: Reference.of(self.loaded, few)}
+
+
+def question_named(name: str, parameters: Mapping[str, object], until: float | None = None) -> AnswerQuestion:
+    """Question about a scene, or about the first brief point of a comparison; what is given counts more.
+
+    Args:
+        name: of a scene, of a comparison, or the path of either or of a robot file.
+        parameters: values of parameters, as text or numbers.
+        until: length of the runs [s]; None: the duration of the scene's file, or else that of the comparison, or 2 s.
+
+    Raises:
+        InputError: there is neither, or a value makes no sense.
+    """
+    scene, point = name, dict(parameters)
+    if not is_scene(name):
+        comparison = with_edges(load_comparison(name).briefly())
+        scene = comparison.scene
+        point = {**next(iter(comparison.combinations())), **point}
+        until = until or read_scene_file(scene).duration or comparison.until
+    loaded = load_scene(scene, **point)  # type: ignore[arg-type]  # text is checked and converted there
+    return AnswerQuestion.of(scene, {key: loaded.parameters[key] for key in point}, until)
 
 
 def _steps(every: float) -> Iterator[float | None]:

@@ -5,11 +5,43 @@ from dataclasses import dataclass, field
 
 from proofroll.core.number_format import number
 from proofroll.core.validation import FloatOrInf
-from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.step_numbers import Explanation
 from proofroll.studies.study_store import Measured
 from proofroll.studies.swept_settings import SweptSetting
+
+
+@dataclass(frozen=True)
+class ClaimJudgement:
+    """Judgement of a claim by a study.
+
+    Attributes:
+        claim: in one sentence.
+        because: reason that the file gives for it.
+        holds: True or False; None: the measurements do not decide.
+        found: result of the study, in one sentence.
+    """
+
+    claim: str
+    because: str
+    holds: bool | None
+    found: str
+
+
+@dataclass(frozen=True)
+class JudgedFile:
+    """Judgement of all claims of a file, as sentences.
+
+    Attributes:
+        file: its path; None: no file was judged.
+        contradictions: about claims that do not hold.
+        undecided: about claims that the measurements do not decide.
+    """
+
+    file: str | None = None
+    contradictions: list[str] = field(default_factory=list)
+    undecided: list[str] = field(default_factory=list)
+
 
 BOUNDARIES = ("stable", "accurate")
 # Boundaries within this factor count as equal: two rungs of a ladder of steps (True), one of tolerances (False).

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from proofroll.running.case import hosts
 from proofroll.running.runner import Runner
-from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.failure import ACCURATE, NOT_RUN, REFUSED, WRONG_MODEL, meanings
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.claims import StabilityFile
@@ -18,6 +17,7 @@ from proofroll.studies.stability.records import (
     Boundary,
     BoundaryPoint,
     ExplainedBoundary,
+    JudgedFile,
     StabilityStudy,
     dependence,
 )

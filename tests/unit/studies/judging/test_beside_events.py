@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from proofroll.core.beside_events import beside_events
+
+from proofroll.studies.judging.reference import beside_events
 
 TIMES = np.linspace(0.0, 1.0, 101)
 EVENT, STEP = 0.5005, 1e-3  # a step early it is before the sample at 0.5 s

@@ -12,7 +12,7 @@ from proofroll.core.diagnosis.fitting import factor_text, known_factor, least_sq
 from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.elements.mechanism.diagnosis.contacts import FORCES_AT_START, SeenContact, forces_of_lines, touch_of
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
-from proofroll.elements.mechanism.diagnosis.frames import SURFACE, surface_axes
+from proofroll.elements.mechanism.diagnosis.reporting_errors import SURFACE, surface_axes
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.scene.model import Mechanism
 

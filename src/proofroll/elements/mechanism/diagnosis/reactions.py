@@ -16,7 +16,7 @@ from proofroll.core.diagnosis.samples import departure, forced_otherwise, run_an
 from proofroll.core.diagnosis.vectors import ReportedVector, product
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
-from proofroll.elements.mechanism.diagnosis.frames import BODY
+from proofroll.elements.mechanism.diagnosis.reporting_errors import BODY
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.switches import switched_joints

@@ -21,12 +21,34 @@ from proofroll.core.diagnosis.samples import (
 from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
-from proofroll.elements.mechanism.diagnosis.frames import frames_of
+from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.run.dataset import quaternions
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+BODY, SURFACE = "body axes", "the surface's axes e1, e2, e3"
+
+
+def surface_axes(element: Any, placed: Placed) -> FloatArray | None:
+    """Axes of the wall where its ball is, as columns, (time, 3, 3); None: the element is no ball on a wall."""
+    if element.on_wall is None:
+        return None
+    surface = element.on_wall.surface
+    return np.asarray(surface.frame(surface.locate(placed.p_WB[:, element.on_wall.index])))
+
+
+def frames_of(element: Any, placed: Placed) -> dict[str, FloatArray]:
+    """Frames of all bodies by name, (time, bodies, 3, 3); of a body without axes of its wall those of the world."""
+    frames, axes = {BODY: placed.R_WB[:, :-1]}, surface_axes(element, placed)
+    if axes is not None:
+        of_bodies = np.tile(np.eye(3), (*placed.p_WB.shape[:2], 1, 1))
+        of_bodies[:, element.on_wall.index] = axes
+        frames[SURFACE] = of_bodies
+    return frames
+
 
 # Lines of the certificate that follow from velocities.
 _FOLLOWS = frozenset(

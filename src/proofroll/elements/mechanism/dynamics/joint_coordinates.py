@@ -15,9 +15,8 @@ import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism.dynamics.analysis import BRANCHES, RANK, RowSign, analyse, reactions
+from proofroll.elements.mechanism.dynamics.analysis import BRANCHES, RANK, RowSign, analyse, lacks_inertia, reactions
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Rows, Tree
-from proofroll.elements.mechanism.dynamics.light_joints import lacks_inertia
 from proofroll.elements.mechanism.dynamics.named_forces import joint_force_shares, lengths, pick_named
 from proofroll.elements.mechanism.dynamics.point_loads import point_loads
 from proofroll.elements.mechanism.dynamics.record import Record, record_of

@@ -6,10 +6,9 @@ import numpy as np
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.contact.start import extent
-from proofroll.elements.mechanism.dynamics.analysis import RANK, least_norm_solution, rank_of, singular_values
+from proofroll.elements.mechanism.dynamics.analysis import RANK, SINGULAR, least_norm_solution, rank_of, singular_values
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Rows, Tree
-from proofroll.elements.mechanism.dynamics.light_joints import SINGULAR
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, FACTS
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.parts import Loop

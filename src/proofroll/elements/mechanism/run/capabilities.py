@@ -5,8 +5,8 @@ from collections.abc import Collection, Mapping
 from enum import StrEnum
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.dynamics.analysis import lacks_inertia
 from proofroll.elements.mechanism.dynamics.held_signals import has_held
-from proofroll.elements.mechanism.dynamics.light_joints import lacks_inertia
 from proofroll.elements.mechanism.scene.joint_kinds import FACTS
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.signal import is_held, varies

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
-from proofroll.elements.mechanism.dynamics.light_joints import lacks_inertia
+from proofroll.elements.mechanism.dynamics.analysis import lacks_inertia
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.scene.bushing import Bushing
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind

@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion
 
 
 def start(body: RollingBall) -> FloatArray:

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion
 from proofroll.truth.check.laws.integrals import COUNT, POINTS, integral
 from proofroll.truth.check.laws.law_check import LawCheck
 from proofroll.truth.check.laws.record import Modes, Pieces

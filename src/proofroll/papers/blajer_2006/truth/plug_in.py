@@ -21,8 +21,8 @@ from proofroll.elements.mechanism.run.dataset import columns, unturned
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.papers.blajer_2006.ball.as_body import ball_of
 from proofroll.papers.blajer_2006.ball.element import EvenRolling
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion
 from proofroll.papers.blajer_2006.ball.rolling_equations import closed_form
 from proofroll.papers.blajer_2006.truth import series
 from proofroll.papers.blajer_2006.truth.ball_laws import checked_motion

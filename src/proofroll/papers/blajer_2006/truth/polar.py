@@ -19,8 +19,8 @@ from proofroll.core import heyoka_library as library
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import TIGHTEST, controlled_step, solver_from
 from proofroll.core.event_location import locate_rise
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion, world_motion
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion, world_motion
 from proofroll.papers.blajer_2006.ball.rolling_equations import reduced_rates, start
 from proofroll.papers.blajer_2006.truth.sliding import End, Sliding
 from proofroll.papers.blajer_2006.truth.taylor import SlidingTaylor

@@ -13,9 +13,8 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import TIGHTEST, integrate
-from proofroll.papers.blajer_2006.ball.mechanics import newton_euler
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion, newton_euler
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion
 from proofroll.papers.blajer_2006.ball.rolling_equations import placed, reduced_rates, start
 
 # Absolute tolerance relative to the natural size of each state: the round-off where a state passes through zero.

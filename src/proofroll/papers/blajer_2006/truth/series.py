@@ -10,9 +10,8 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.papers.blajer_2006.ball.compiled.rolling import parameters, start
 from proofroll.papers.blajer_2006.ball.compiled.rolling import reduced as compiled_reduced
-from proofroll.papers.blajer_2006.ball.mechanics import newton_euler
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion, newton_euler, world_motion
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion, world_motion
 from proofroll.truth.numerics.scalars import cross, dot, minus, plus, scaled
 
 # Tolerance of a step: less than round-off.

@@ -9,8 +9,8 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion
 
 _FLOOR = 1e-6  # |u| below which the rest of a slip is extrapolated, relative to |u| at the handover
 

@@ -10,8 +10,8 @@ from typing_extensions import override
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.papers.blajer_2006.ball.compiled.rolling import parameters, start
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion, world_motion
 from proofroll.papers.blajer_2006.ball.model import RollingBall
-from proofroll.papers.blajer_2006.ball.motion import BallMotion, world_motion
 from proofroll.papers.blajer_2006.truth.sliding import End, Sliding
 from proofroll.papers.blajer_2006.truth.taylor_model import TaylorModel, model
 

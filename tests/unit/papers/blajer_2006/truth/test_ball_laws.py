@@ -15,7 +15,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
-from proofroll.papers.blajer_2006.ball.motion import BallMotion
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion
 from proofroll.papers.blajer_2006.ball.rolling_equations import closed_form
 from proofroll.papers.blajer_2006.truth import ball_laws
 

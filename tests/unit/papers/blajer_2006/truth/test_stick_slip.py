@@ -19,8 +19,8 @@ from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.truth.polar import Polar, first_route
+from proofroll.papers.blajer_2006.truth.regimes import Path, follow
 from proofroll.papers.blajer_2006.truth.sliding import Sliding
-from proofroll.papers.blajer_2006.truth.switching import Path, follow
 from proofroll.papers.blajer_2006.truth.taylor import SlidingTaylor
 from proofroll.truth.plug_in import MechanismTruth
 

@@ -23,8 +23,7 @@ from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall
 from proofroll.elements.mechanism.run.contacts.stretches import with_sticking
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
-from proofroll.papers.blajer_2006.ball.mechanics import natural_acceleration
-from proofroll.papers.blajer_2006.ball.motion import BallMotion
+from proofroll.papers.blajer_2006.ball.mechanics import BallMotion, natural_acceleration
 
 TIMES = np.linspace(0, 0.6, 61)
 
