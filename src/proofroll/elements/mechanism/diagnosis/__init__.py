@@ -9,13 +9,12 @@ from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.core.diagnosis.lines import built_otherwise
 from proofroll.core.entry_points import loaded
 from proofroll.elements.mechanism.diagnosis import contacts
-from proofroll.elements.mechanism.diagnosis.applied_forces import of_applied_forces
-from proofroll.elements.mechanism.diagnosis.bushings import of_bushings
 from proofroll.elements.mechanism.diagnosis.contact_forces import REPORTED_FORCES
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import at_start
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.impacts import impacts, laws_of_impacts
 from proofroll.elements.mechanism.diagnosis.joint_laws import of_actuators, of_couplings, of_stops, soft_couplings
+from proofroll.elements.mechanism.diagnosis.laws_of_parts import of_applied_forces, of_bushings, rolling_resistance
 from proofroll.elements.mechanism.diagnosis.motions import of_motions
 from proofroll.elements.mechanism.diagnosis.numbers import (
     FACTORS_OF_ALL,
@@ -27,7 +26,6 @@ from proofroll.elements.mechanism.diagnosis.numbers import (
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
 from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, PLACED, STATE, residuals_of
-from proofroll.elements.mechanism.diagnosis.resistance import rolling_resistance
 from proofroll.elements.mechanism.diagnosis.starts import start_not_taken
 from proofroll.elements.mechanism.diagnosis.structure import (
     axis_of_first_steps,

@@ -1,0 +1,184 @@
+"""Hypotheses of applied forces, bushings and rolling resistance with another law than the scene's."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis.fitting import Residuals, change_by, factor_text, known_factor, possible
+from proofroll.elements.mechanism.diagnosis.equations import Change
+from proofroll.elements.mechanism.diagnosis.pressing import Resisting
+from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
+from proofroll.elements.mechanism.scene.bushing import Bushing, Six
+from proofroll.elements.mechanism.scene.checks import WORLD, ZERO
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.parts import Axes, Force
+from proofroll.elements.mechanism.scene.rotations import Array, to_rpy
+from proofroll.elements.mechanism.scene.signal import delayed, varies
+
+PartT = TypeVar("PartT", Force, Bushing)
+_PROOF = "the equations of motion balance at every state of the run with that law, and not with the scene's"
+# Axes of a bushing in another order: words, numbers of the axes whose values they take.
+_ORDERS = (
+    ("exchanges x and y", (1, 0, 2)),
+    ("exchanges y and z", (0, 2, 1)),
+    ("exchanges z and x", (2, 1, 0)),
+    ("shifts x to y, y to z, z to x", (2, 0, 1)),
+    ("shifts x to z, z to y, y to x", (1, 2, 0)),
+)
+_REMEDY = "the moment is an arm, in metres, times the normal force of that moment, against what the scene says"
+_LAWS = (
+    # of a scene's law against motion alone
+    (Resisting(turning=True), "the rolling resistance is against turning where the ball slips, not against its motion"),
+    (
+        Resisting(along_spin=True),
+        "the rolling resistance acts against the whole angular velocity, spin about the normal included",
+    ),
+    (Resisting(by_weight=True), "the rolling resistance is its arm times the weight, not times the normal force"),
+)
+
+
+def _with(mechanism: Mechanism, table: str, number: int, part: Force | Bushing) -> Mechanism:
+    """Mechanism with another part of its ``forces`` or ``bushings``."""
+    parts = getattr(mechanism, table)
+    changed: dict[str, Any] = {table: (*parts[:number], part, *parts[number + 1 :])}
+    return replace(mechanism, **changed)
+
+
+def _exchanged(
+    residuals: Residuals[Change],
+    mechanism: Mechanism,
+    table: str,
+    mistakes: Callable[[PartT], Iterator[tuple[str, PartT, str]]],
+) -> Iterator[Cause]:
+    """Hypotheses: one of the parts of a table has one of its mistakes: words, other part, remedy."""
+    for number, part in enumerate(getattr(mechanism, table)):
+        for says, other_part, remedy in mistakes(part):
+            name = f"{table.removesuffix('s')} {part.name}"
+            kind = getattr(part, "kind", "bushing")
+            model = Change(_with(mechanism, table, number, other_part))
+            yield residuals.cause(name, f"{kind} {part.name} {says}", model, remedy, 0)
+
+
+@hypothesis("bushing", _PROOF)
+def of_bushings(evidence: Evidence) -> Iterator[Cause]:
+    """Hypotheses: one bushing with its axes in another order, along those of a body, or without its dampers."""
+    for residuals in residuals_of(evidence):
+        yield from _exchanged(residuals, evidence.element.mechanism, "bushings", _of_bushing)
+
+
+def _of_bushing(bushing: Bushing) -> Iterator[tuple[str, Bushing, str]]:
+    """Words, changed bushing and remedy of each mistake that would change this bushing."""
+    for says, order in _ORDERS:
+        stiffness, damping = _ordered(bushing.stiffness, order), _ordered(bushing.damping, order)
+        if (stiffness, damping) != (bushing.stiffness, bushing.damping):
+            remedy = "give each axis of its frame its stiffness and damping, along and then about it"
+            yield says, replace(bushing, stiffness=stiffness, damping=damping), remedy
+    translation, rotation = bushing.stiffness[:3], bushing.stiffness[3:]
+    if any(bushing.orientation_a):
+        # B turns with A, or the bushing would be loaded at rest
+        along_body = replace(bushing, orientation_a=ZERO, orientation_b=_less(bushing))
+        says = f"acts along the axes of {bushing.body_a}, not of its frame there"
+        yield says, along_body, f"turn its frame by its orientation in {bushing.body_a}"
+    if any(rotation) and any(translation):
+        without = replace(bushing, stiffness=(*translation, 0.0, 0.0, 0.0))
+        yield "has no stiffness about axes", without, "give it all six values"
+    if any(bushing.damping):
+        yield "has no damping", replace(bushing, damping=(0.0,) * 6), "give it its six values of damping"
+
+
+def _ordered(values: Six, order: tuple[int, int, int]) -> Six:
+    x, y, z = order
+    return (values[x], values[y], values[z], values[3 + x], values[3 + y], values[3 + z])
+
+
+def _less(bushing: Bushing) -> tuple[float, float, float]:
+    """Orientation of B that keeps B at rest where A has the axes of body_a."""
+    return to_rpy(bushing.frame_b @ bushing.frame_a.T)
+
+
+@hypothesis("applied force", _PROOF)
+def of_applied_forces(evidence: Evidence) -> Iterator[Cause]:
+    """Hypotheses: one applied force with a factor, in other axes, at another place, without reaction, or late."""
+    mechanism = evidence.element.mechanism
+    for residuals in residuals_of(evidence):
+        yield from _exchanged(residuals, mechanism, "forces", lambda force: _of_force(mechanism, force, evidence.step))
+        for number, force in enumerate(mechanism.forces):
+
+            def scaled(x: float, number: int = number) -> Change:
+                return Change(mechanism, factors_of_forces=((number, x),))
+
+            factor, fitted = best(residuals, scaled)
+            if possible(factor, signed=True):
+                says = f"the engine moves it with the {force.kind} {force.name} {factor_text(factor)}"
+                remedy = f"give {force.name} its value, on {force.body}"
+                yield residuals.cause(f"size of {force.name}", says, scaled(factor), remedy, fitted, change_by(factor))
+            if force.kind == "force":
+                yield _elsewhere(residuals, mechanism, number, evidence.element.length)
+
+
+def _elsewhere(residuals: Residuals[Change], mechanism: Mechanism, number: int, length: float) -> Cause:
+    """Hypothesis: the force acts along another line, through its nearest place that balances the equations."""
+    force = mechanism.forces[number]
+
+    def at(place: Array) -> Change:
+        x, y, z = map(float, place)
+        return Change(_with(mechanism, "forces", number, replace(force, position=(x, y, z))))
+
+    position = np.array(force.position)
+    left = residuals.left(at(position))
+    slopes = [residuals.left(at(position + axis)) - left for axis in np.eye(3)]
+    shift = -np.linalg.lstsq(np.stack(slopes, axis=-1), left, rcond=1e-6)[0]
+    place = np.where(np.abs(position + shift) < 1e-6 * length, 0.0, position + shift)
+    words = ", ".join(f"{x:.3g}" for x in place)
+    says = f"force {force.name} acts along a line through ({words}) m of {force.body}, not through its place"
+    remedy = f"give its place in the axes of {force.body}, from the origin of its frame"
+    size = float(np.linalg.norm(shift)) / length
+    return residuals.cause(f"place of {force.name}", says, at(place), remedy, 3, size)
+
+
+def _of_force(mechanism: Mechanism, force: Force, step: float | None) -> Iterator[tuple[str, Force, str]]:
+    """Words, changed force and remedy of each mistake that would change this force."""
+    frame: Axes = "world" if force.frame == "body" else "body"
+    axes = {"world": "of the world", "body": f"of {force.body}"}
+    says = f"acts along the axes {axes[frame]}, not {axes[force.frame]}"
+    yield says, replace(force, frame=frame), "look at whose axes its components are along"
+    if force.kind == "force":
+        com = next(body.com for body in mechanism.bodies if body.name == force.body)
+        x, y, z = force.position
+        mirrored = (-x, -y, -z)
+        for place, words in ((com, "the centre of mass"), (ZERO, "the origin"), (mirrored, "the opposite place")):
+            if place != force.position:
+                says = f"acts at {words} of {force.body}, not at its place"
+                yield says, replace(force, position=place), "add the moment of the force about the centre of mass"
+    if force.reaction != WORLD:
+        says = f"has no reaction on {force.reaction}"
+        yield says, replace(force, reaction=WORLD), f"apply the opposite to {force.reaction} at the same place"
+    if step and any(map(varies, force.value)):
+        late = replace(force, value=tuple(delayed(part, step) for part in force.value))  # type: ignore[arg-type]  # three
+        yield "is a step late", late, "evaluate it at the time of each stage of the step"
+
+
+@hypothesis("rolling resistance", _PROOF)
+def rolling_resistance(evidence: Evidence) -> Iterator[Cause]:
+    """Hypotheses: rolling resistance has a factor, is against the whole spin, or is by the weight."""
+    mechanism = evidence.element.mechanism
+    if not any(contact.rolling_resistance for contact in mechanism.contacts):
+        return
+    moves = any(contact.bend for contact in mechanism.contacts)
+    for residuals in residuals_of(evidence):
+        for law, says in _LAWS if moves else _LAWS[1:]:
+            yield residuals.cause("rolling resistance", says, Change(mechanism, resisting=law), _REMEDY, 0)
+
+        def changed(factor: float) -> Change:
+            return Change(mechanism, resisting=Resisting(factor))
+
+        factor = residuals.fit(changed, 1.0)
+        mistake = known_factor(factor)
+        factor = mistake[0] if mistake else factor
+        if np.isfinite(factor) and factor >= 0:
+            says = f"the engine moves it with rolling resistance {factor_text(factor)}"
+            number = 0 if mistake else 1
+            yield residuals.cause("rolling resistance", says, changed(factor), _REMEDY, number, change_by(factor))
