@@ -30,7 +30,7 @@ def off(name, formulation, until, dt=1e-3):
     ],
 )
 def test_errors_are_those_of_the_table(scene, formulation, until, error):
-    """At a step of 1 ms a place is as far from the truth as the table says, within a third for other processors."""
+    """A place is as far from the truth as the table says at a step of 1 ms, within a third for other processors."""
     assert off(scene, formulation, until) == pytest.approx(error, rel=0.35)
 
 
