@@ -3,7 +3,7 @@
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from proofroll.truth import SAFETY
 from proofroll.truth.error_bars import (
     JUDGED,
     ROUND_OFF,
+    Routed,
     TwoRouteMotion,
     bar_of,
     differences_of,
@@ -37,7 +38,7 @@ CLOSE = 1e-9
 
 # Fields whose error at a single sample is of that sample alone, as that of friction just before a slip stops: its
 # direction is known to the error of the slip by its speed.
-_FORCES = {"wrench", "links", "pressed", "sums"}
+_FORCES = {"wrench", "links", "pressed", "turning", "sums"}
 
 # Accuracies of a time by which the second route is followed beyond an early end of the first, to see its reason, too.
 _BEHIND = 10
@@ -68,22 +69,6 @@ def followed(
     end = until if path.known else path.stretches[-1].end
     last = min(until, end + _BEHIND * time_accuracy(end))
     return path, follow(body_route, last, kinks, CLOSE, first_close([path], CLOSE))
-
-
-class Routed(NamedTuple):
-    """Motion of one route at some times.
-
-    Attributes:
-        record: the motion.
-        pressed: contact forces [N], (times, contacts, 3).
-        sums: their sums [N], (times, sums, 3).
-        works: work of drives since the start [J], (times, drives).
-    """
-
-    record: Record
-    pressed: Array
-    sums: Array
-    works: Array
 
 
 def cut_early(
@@ -175,8 +160,8 @@ def two_route_motion(
         works: work of drives along both [J], (times, drives).
         unresolved: part of it that is not known better [J], of all times or of each.
         kinds: part of a mode in which both routes must agree.
-        pressed: contact forces by both routes [N], (times, contacts, 3).
-        sums: their sums by both routes [N], (times, sums, 3).
+        pressed: contact forces [N] and moments [N m] by both routes, (times, contacts, 6).
+        sums: sums of the forces by both routes [N], (times, sums, 3).
         until: last time asked for [s].
         cut: motion of the first route with rebounds cut early, and at which times it counts.
         left: errors that a difference of the routes leaves out, in each field at each time; None: those of ``cut``, and
@@ -188,10 +173,11 @@ def two_route_motion(
     masked = replace(by_tree, wrench=np.where(determinate, by_tree.wrench, np.nan))
     fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, by_bodies)
     fields["work"], others["work"] = works
-    if pressed is not None:
-        fields["pressed"], others["pressed"] = pressed
-    if sums is not None:
-        fields["sums"], others["sums"] = sums
+    if pressed is not None and sums is not None:
+        fields, others = (
+            own | _of_contacts(*borne)
+            for own, borne in zip((fields, others), zip(pressed, sums, strict=True), strict=True)
+        )
     placed = masked.placed(mechanism)
     least, step = round_off(fields, placed), dict.fromkeys(fields, 0.0)
     alone = _FORCES if left is None else set()
@@ -235,6 +221,11 @@ def two_route_motion(
     )
 
 
+def _of_contacts(pressed: Array, sums: Array) -> dict[str, Array]:
+    """Fields of contacts: forces, moments against turning, and sums of the forces."""
+    return {"pressed": pressed[..., :3], "turning": pressed[..., 3:], "sums": sums}
+
+
 def _left_by_a_cut(
     mechanism: Mechanism,
     fields: Mapping[str, Array],
@@ -249,7 +240,7 @@ def _left_by_a_cut(
     record = replace(routed.record, wrench=np.where(determinate, routed.record.wrench, np.nan))
     others = fields_with_bars(mechanism, record)
     others |= {"work": routed.works}
-    others |= {"pressed": routed.pressed, "sums": routed.sums} if mechanism.contacts else {}
+    others |= _of_contacts(routed.pressed, routed.sums) if mechanism.contacts else {}
     for name, values in fields.items():
         left[name] = np.where(counts, differences_of(values, others[name]), 0.0)
     return left
@@ -269,6 +260,7 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     sizes |= {
         "wrench": quadratic * sizes["wrench"],
         "pressed": quadratic * units.force,
+        "turning": quadratic * units.force * units.length,
         "sums": quadratic * units.force * max(1.0, units.length),  # forces and moments
         "links": quadratic * sizes["wrench"]
         + max((link.stiffest for link in mechanism.links), default=0.0) * units.length,

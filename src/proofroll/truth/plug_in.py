@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounces import with_bounces
+from proofroll.core.columns import Columns
 from proofroll.core.dataset import ENDED, ENDS, LAWS
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
@@ -16,6 +17,7 @@ from proofroll.core.events import with_events
 from proofroll.core.observable import Role
 from proofroll.elements.mechanism.dynamics.named_forces import FIELDS, named_forces
 from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.run.contacts.local_frame import local_bars
 from proofroll.elements.mechanism.run.contacts.observables import PRESSES, SLIDES
 from proofroll.elements.mechanism.run.dataset import UNDETERMINED, columns
@@ -70,7 +72,8 @@ class MechanismTruth:
         dataset = MechanismTruth._dataset(element, motion, branching(motion.branches))
         if motion.tiles is None:
             return dataset
-        check = held_answer(element, dataset, motion.tiles, times)
+        between = None if motion.between is None else _columns(element, *motion.between)
+        check = held_answer(element, dataset, motion.tiles, times, between)
         if text := check.residuals.broken("what the truth publishes"):
             assert check.residuals.first is not None  # as there is a text
             motion = cut_motion(motion, check.residuals.first.time, text)
@@ -82,24 +85,14 @@ class MechanismTruth:
     def _dataset(element: MechanismElement, motion: TwoRouteMotion, branches: str) -> xr.Dataset:
         """Dataset of a motion with its bars; ``branches``: note on singular poses along it."""
         record = motion.record
-        wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
-        pressed = np.zeros((len(record.time), 0, 3)) if motion.pressed is None else motion.pressed
-        dataset = columns(
-            element,
-            record.placed(element.mechanism),
-            wrench,
-            pressed,
-            record.named,
-            motion.sums,
-            UNDETERMINED,
-            motion.works,
-        ).dataset()
+        dataset = _columns(element, record, motion.pressed, motion.sums, motion.works).dataset()
         points = [point.name for point in element.mechanism.points]
         fields_of = {
             f"{kind}.{contact.name}{axis}": field
             for contact in element.mechanism.contacts
             for kind, axes, field in (
                 ("force", (".x", ".y", ".z"), "pressed"),
+                ("torque", (".x", ".y", ".z"), "turning"),
                 ("gap", ("",), "gap"),
                 ("slip", ("",), "slip"),
             )
@@ -152,6 +145,20 @@ class MechanismTruth:
         if not element.mechanism.has_events:
             return dataset
         return with_bounces(with_events(dataset, motion.events), motion.bounces)
+
+
+def _columns(
+    element: MechanismElement,
+    record: Record,
+    pressed: FloatArray | None,
+    sums: FloatArray | None,
+    works: FloatArray | None,
+) -> Columns:
+    """Variables of a motion; the rest as in :class:`.TwoRouteMotion`."""
+    wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
+    borne = np.zeros((len(record.time), 0, 6)) if pressed is None else pressed
+    placed, moments = record.placed(element.mechanism), borne[..., 3:]
+    return columns(element, placed, wrench, borne[..., :3], record.named, sums, UNDETERMINED, works, moments)
 
 
 def _unknown_from(element: MechanismElement, motion: TwoRouteMotion) -> tuple[float, str] | None:

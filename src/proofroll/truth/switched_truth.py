@@ -31,13 +31,12 @@ from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, tiles_of, work_along
+from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.early_end import cut_at
-from proofroll.truth.error_bars import ROUND_OFF, TwoRouteMotion, check_start, on_same_turns
+from proofroll.truth.error_bars import ROUND_OFF, Routed, TwoRouteMotion, check_start, on_same_turns
 from proofroll.truth.followed_paths import (
     CLOSE,
     TOLERANCES,
-    Routed,
     at_times,
     counterparts,
     cut_early,
@@ -110,7 +109,6 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     stretches = stretches_at(paths, times)
     others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
     states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
-    tiles = tiles_of(recorded[0], float(times[-1]) * (1 + CLOSE), outcome.pieces)
     for values in held_paths:
         values.finish()
     seconds, known_until = times * units.time, _works_known(tree, paths[0])
@@ -126,7 +124,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     switched = [equations.switched(state, mode) for state, mode in zip(states[1], modes, strict=True)]
     pushes, wrenches = zip(*applied, strict=True)
     by_bodies = on_same_turns(scaled, by_tree, second.recorded(times, states[1][:, :-1], switched, wrenches))
-    forces_of_bodies = np.array(pushes) * units.force
+    forces_of_bodies = np.array(pushes) * _borne_units(units)
     # samples at instants are at the times that were asked for, to the last bit
     by_tree, by_bodies = (units.record(mechanism, replace(record, time=asked)) for record in (by_tree, by_bodies))
     forces_of_tree, sums_of_bodies = (
@@ -140,6 +138,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier, early_works)
         early = early._replace(record=on_same_turns(scaled, tree_states.record, early.record))
         left = _in_si(mechanism, units, early), cut[1]
+    middles = _between(tree, routes[0], paths[0], works[0].shape[1])
     motion = replace(
         two_route_motion(
             mechanism,
@@ -158,7 +157,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
             cut=left,
         ),
         laws=outcome.laws,
-        tiles=tiles,
+        tiles=outcome.tiles,
+        between=None if middles is None else _in_si(mechanism, units, middles),
     )
     if not scaled.contacts:
         return motion
@@ -268,17 +268,33 @@ def _by_the_tree(
     return Routed(record_of(times, records), np.array(forces), np.array(sums), works)
 
 
+def _between(tree: ContactTree, route: HybridRoute[ContactMode], path: _Path, drives: int) -> Routed | None:
+    """Motion and forces of the first route in the middle of each stretch of a path; None: it has none."""
+    lasting = [number for number, stretch in enumerate(path.stretches) if stretch.end > stretch.start]
+    if not lasting:
+        return None
+    times = np.array([path.stretches[k].middle for k in lasting])
+    works = np.full((len(times), drives), np.nan)
+    return _by_the_tree(tree, path, times, states_of(route, path, times, lasting), lasting, works)
+
+
 def _sums_along(placed: Placed, pressed: Array) -> Array:
     """Sums of contact forces [N] and of their moments [N m] along a motion, (times, sums, 3)."""
-    sums = contact_sums(placed.mechanism.contacts) @ pressed
-    return np.concatenate([sums, moments_along(placed, follow_contacts(placed).place, pressed)], axis=1)
+    forces = pressed[..., :3]
+    sums = contact_sums(placed.mechanism.contacts) @ forces
+    return np.concatenate([sums, moments_along(placed, follow_contacts(placed).place, forces)], axis=1)
+
+
+def _borne_units(units: Units) -> Array:
+    """Units of force and moment of a contact, (6,)."""
+    return np.repeat([units.force, units.force * units.length], 3)
 
 
 def _in_si(mechanism: Mechanism, units: Units, states: Routed) -> Routed:
     """Motion and forces in SI units."""
     moment = np.arange(states.sums.shape[1]) >= len(contact_sums(mechanism.contacts))
     sums = states.sums * (units.force * np.where(moment, units.length, 1.0))[:, None]
-    return Routed(units.record(mechanism, states.record), states.pressed * units.force, sums, states.works)
+    return Routed(units.record(mechanism, states.record), states.pressed * _borne_units(units), sums, states.works)
 
 
 def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:

@@ -194,24 +194,12 @@ def led_symbols(mode: ContactMode, solved: SolvedSymbols) -> list[Scalar]:
     return symbols
 
 
-def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
-    """Record of the law check at a state: poses, then forces of all contacts with places and normals, efforts, drives.
-
-    Empty: the route has no rule for a force.
-    """
+def stated_symbols(solved: SolvedSymbols) -> list[Scalar]:
+    """Record of the checks at a state: poses, then efforts and drives; empty: the route has no rule for a drive."""
     if solved.drives is None:
         return []
-    symbols: list[Scalar] = []
-    for p, R, v, w in solved.poses:
-        symbols += [*p, *(entry for row in R for entry in row), *v, *w]
-    for acting, contact, touch, line, force in zip(
-        mode, contacts, solved.touching, solved.lines, solved.forces, strict=True
-    ):
-        rubs = acting.kind == "slip" and contact.bound
-        rubbing = force if not rubs or line is None else scaled(-float(contact.bound), line)
-        location = (*touch.place, *touch.normal) if contact.pressed_by is None else (*_NONE, *_NONE)
-        symbols += [*(rubbing or _NONE), *location]
-    return [*symbols, *solved.efforts, *solved.drives]
+    poses = [entry for p, R, v, w in solved.poses for part in (p, *R, v, w) for entry in part]
+    return [*poses, *solved.efforts, *solved.drives]
 
 
 def turning_slip(acting: Acting, contact: Touchable) -> bool:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from proofroll.elements.mechanism.run.element import MechanismElement
+    from proofroll.elements.mechanism.scene.model import Mechanism
 
 # Reasons why a variable has no value.
 UNTURNED = np.array([[1.0, 0.0, 0.0, 0.0]])
@@ -136,6 +137,7 @@ def columns(
     sums: FloatArray | None = None,
     unsaid: str = UNSAID,
     work: FloatArray | None = None,
+    moments: FloatArray | None = None,
 ) -> Columns:
     """Variables of a run, from the motion of the bodies and the forces and moments on them.
 
@@ -143,7 +145,7 @@ def columns(
     ``sums``: of forces of contacts by :func:`.contact_sums`, then their moments by :func:`.moments_along`,
     (time, sums, 3), by default from ``pressed``;
     ``unsaid``: reason of what is NaN at the last time; ``work``: of drives [J], (time, drives), by default summed over
-    the samples;
+    the samples; ``moments``: against turning, of contacts on their first bodies [N m], (time, contacts, 3), if known;
     ``named``: see :func:`~proofroll.elements.mechanism.dynamics.named_forces.named_forces`, (time, forces).
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
@@ -152,9 +154,11 @@ def columns(
     determinate components of all; ``effort.<actuator>``, ``coupling.<name>``, ``friction.<joint>``, ``stop.<joint>``
     [N, N m] along coordinates; ``force.<spring>`` [N], ``force.<bushing>.x|y|z``, ``torque.<bushing>.x|y|z`` on its
     body_b, ``work.effort.<actuator>``, ``work.drive.<joint>`` [J]; ``force.<pair>.x|y|z`` [N] on the body of its first
-    geometry, the sum where a pair touches at several places, ``net_force.<body>.x|y|z`` [N], the sum of the contacts
-    of a body that touches in several pairs, ``net_torque.<body>.x|y|z`` [N m], the moment about its centre of mass of
-    the contacts of a body that touches at several places, ``gap.<pair>`` [m], ``slip.<pair>`` [m/s], and residuals
+    geometry, the sum where a pair touches at several places, ``torque.<pair>.x|y|z`` [N m], the moment of rolling
+    resistance and of friction against spin on that body, where it is known, ``net_force.<body>.x|y|z`` [N], the sum of
+    the contacts of a body that touches in several pairs, ``net_torque.<body>.x|y|z`` [N m], the moment about its centre
+    of mass of the contacts of a body that touches at several places, ``gap.<pair>`` [m], ``slip.<pair>`` [m/s], and
+    residuals
     of Coulomb's law, see
     :data:`~proofroll.elements.mechanism.run.contacts.observables.RESIDUALS`; ``energy`` [J], ``drift`` [m], and
     ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
@@ -196,6 +200,7 @@ def columns(
             put(f"{kind}s", values[:, mask], unit, meaning, f"{kind}_component")
     if mechanism.contacts:
         _put_contacts(element, placed, pressed, sums, unsaid, put)
+        _put_moments(mechanism, moments, unsaid, put)
     for values, item in zip(named.T, named_forces(mechanism), strict=True):
         put(item.name, values, str(item.unit), item.meaning, absent=unsaid if np.isnan(values[-1]) else "")
     put_links(placed, named, put, unsaid, work)
@@ -292,6 +297,16 @@ def _put_contacts(
     put("unpressed", left["unpressed"], "1", "share of samples so far without a normal force", "contact")
     for name, unit, meaning in RESIDUALS:
         put(name, left[name], unit, meaning, "contact")
+
+
+def _put_moments(mechanism: Mechanism, moments: FloatArray | None, unsaid: str, put: Callable[..., None]) -> None:
+    """Puts moments against rolling and spin, (time, contacts, 3), of contacts that have some; None: not known."""
+    for index, contact in enumerate(mechanism.contacts):
+        if moments is not None and (contact.rolling_resistance or contact.spinning_friction):
+            meaning = f"moment of {contact.name} against rolling and spin on {contact.body_a}"
+            for component, letter in zip(moments[:, index].T, "xyz", strict=True):
+                absent = unsaid if np.isnan(component[-1]) else ""
+                put(f"torque.{contact.name}.{letter}", component, "N m", meaning, absent=absent)
 
 
 def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:

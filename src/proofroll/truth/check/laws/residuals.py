@@ -149,12 +149,13 @@ class LawResiduals:
 
     def held(self) -> str:
         """Clause on the laws that hold; empty: nothing could be held to a law."""
-        if not self.points:
+        if not (self.points or self.events):
             return ""
         law, (part, time, _) = max(self.largest.items(), key=lambda item: item[1][0], default=("", (0.0, 0.0, "")))
-        events = f" and on both sides of {self.events} events" if self.events else ""
+        points = [f"at {self.points:,} points"] * bool(self.points)
+        events = [f"on both sides of {self.events} events"] * bool(self.events)
         return (
-            f"holds {len(self.largest)} laws at {self.points:,} points{events}; "
+            f"holds {len(self.largest)} laws {' and '.join(points + events)}; "
             f"largest residual {part:.2g} of its allowance ({law}, {time:.3g} s)"
         )
 

@@ -10,7 +10,6 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.contacts import gap_of, rolling_of, slide_of
 from proofroll.truth.check.laws.impacts import impact
 from proofroll.truth.check.laws.integrals import dot, norm
-from proofroll.truth.check.laws.joints import Coordinates
 from proofroll.truth.check.laws.motion import jump
 from proofroll.truth.check.laws.record import Passage, Pieces
 from proofroll.truth.check.laws.residuals import LawResiduals
@@ -20,13 +19,14 @@ _STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an
 
 
 def transition(
-    scene: LawScene, passage: Passage, residuals: LawResiduals, coordinates: Coordinates, fastest: dict[str, float]
+    scene: LawScene, passage: Passage, residuals: LawResiduals, fastest: dict[str, float]
 ) -> dict[int, float]:
     """Checks a transition; impulse along each driven joint, by its number, if velocities jump [N s, N m s].
 
     ``fastest``: largest speed of impact of each contact and stop so far, kept up to date.
     """
     pieces_before, pieces_after = passage.before, passage.after
+    residuals.coarse, residuals.events = 1.0, residuals.events + 1
     residuals.note(
         "joined",
         "",
@@ -36,7 +36,7 @@ def transition(
     )
     is_struck = bool(jump(scene, pieces_after, pieces_before, slice(None), slice(None))[0] > _STRUCK)
     if is_struck:
-        return impact(scene, passage, residuals, coordinates, fastest)
+        return impact(scene, passage, residuals, fastest)
     if not passage.decided:
         return {}
     zeros = [*_of_contacts(scene, pieces_before, pieces_after), *_of_joints(scene, pieces_before, pieces_after)]
