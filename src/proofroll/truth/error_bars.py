@@ -36,15 +36,15 @@ class Routed(NamedTuple):
 
     Attributes:
         record: the motion.
-        pressed: contact forces [N] and moments against turning [N m], (times, contacts, 6).
-        sums: sums of the forces [N], (times, sums, 3).
         works: work of drives since the start [J], (times, drives).
+        pressed: contact forces [N] and moments against turning [N m], (times, contacts, 6); None: no contacts.
+        sums: sums of the forces [N], (times, sums, 3); None: as ``pressed``.
     """
 
     record: Record
-    pressed: Array
-    sums: Array
     works: Array
+    pressed: Array | None = None
+    sums: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from proofroll.core.events import with_events
 from proofroll.core.observable import Role
 from proofroll.elements.mechanism.dynamics.named_forces import FIELDS, named_forces
 from proofroll.elements.mechanism.dynamics.placed import Placed
-from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.run.contacts.local_frame import local_bars
 from proofroll.elements.mechanism.run.contacts.observables import PRESSES, SLIDES
 from proofroll.elements.mechanism.run.dataset import UNDETERMINED, columns
@@ -27,7 +26,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import shared_pairs
 if TYPE_CHECKING:
     import xarray as xr
 
-    from proofroll.truth.error_bars import TwoRouteMotion
+    from proofroll.truth.error_bars import Routed, TwoRouteMotion
 
 # Error bar of the routes that a variable gets.
 _BARS = {
@@ -72,7 +71,7 @@ class MechanismTruth:
         dataset = MechanismTruth._dataset(element, motion, branching(motion.branches))
         if motion.tiles is None:
             return dataset
-        between = None if motion.between is None else _columns(element, *motion.between)
+        between = None if motion.between is None else _columns(element, motion.between)
         check = held_answer(element, dataset, motion.tiles, times, between)
         if text := check.residuals.broken("what the truth publishes"):
             assert check.residuals.first is not None  # as there is a text
@@ -85,7 +84,7 @@ class MechanismTruth:
     def _dataset(element: MechanismElement, motion: TwoRouteMotion, branches: str) -> xr.Dataset:
         """Dataset of a motion with its bars; ``branches``: note on singular poses along it."""
         record = motion.record
-        dataset = _columns(element, record, motion.pressed, motion.sums, motion.works).dataset()
+        dataset = _columns(element, motion).dataset()
         points = [point.name for point in element.mechanism.points]
         fields_of = {
             f"{kind}.{contact.name}{axis}": field
@@ -147,18 +146,14 @@ class MechanismTruth:
         return with_bounces(with_events(dataset, motion.events), motion.bounces)
 
 
-def _columns(
-    element: MechanismElement,
-    record: Record,
-    pressed: FloatArray | None,
-    sums: FloatArray | None,
-    works: FloatArray | None,
-) -> Columns:
-    """Variables of a motion; the rest as in :class:`.TwoRouteMotion`."""
+def _columns(element: MechanismElement, motion: TwoRouteMotion | Routed) -> Columns:
+    """Variables of a motion."""
+    record, placed = motion.record, motion.record.placed(element.mechanism)
     wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
-    borne = np.zeros((len(record.time), 0, 6)) if pressed is None else pressed
-    placed, moments = record.placed(element.mechanism), borne[..., 3:]
-    return columns(element, placed, wrench, borne[..., :3], record.named, sums, UNDETERMINED, works, moments)
+    borne = np.zeros((len(record.time), 0, 6)) if motion.pressed is None else motion.pressed
+    return columns(
+        element, placed, wrench, borne[..., :3], record.named, motion.sums, UNDETERMINED, motion.works, borne[..., 3:]
+    )
 
 
 def _unknown_from(element: MechanismElement, motion: TwoRouteMotion) -> tuple[float, str] | None:

@@ -100,19 +100,15 @@ class WorkAlong:
                 # a joint that a motion holds at rest does no work, whatever its impulse
                 self._total[k] += impulses[joint] * rate if rate else 0.0
 
-    def at(self, times: Array, stretches: Sequence[int]) -> Array:
-        """Work at times [s] in stretches, (times, drives)."""
-        parts = zip(times.tolist(), self._parts_at(times, stretches), strict=True)
-        works = [np.zeros(len(self._drives)) if part is None else part.at(time) for time, part in parts]
-        return np.array(works).reshape(len(times), len(self._drives))
+    def at(self, times: Array, stretches: Sequence[int]) -> tuple[Array, Array]:
+        """Work at times [s] in stretches, and the part of it that points of pieces do not resolve [J].
 
-    def unresolved(self, times: Array, stretches: Sequence[int]) -> Array:
-        """Part of the work at times [s] in stretches that the points of pieces do not resolve [J], (times, drives)."""
-        rests = [
-            np.zeros(len(self._drives)) if part is None else part.unresolved
-            for part in self._parts_at(times, stretches)
-        ]
-        return np.array(rests).reshape(len(times), len(self._drives))
+        Both have the shape (times, drives).
+        """
+        none, parts = np.zeros(len(self._drives)), zip(times.tolist(), self._parts_at(times, stretches), strict=True)
+        values = [(none, none) if part is None else (part.at(time), part.unresolved) for time, part in parts]
+        works, rests = np.array(values).reshape(len(times), 2, len(none)).swapaxes(0, 1)
+        return works, rests
 
     def _parts_at(self, times: Array, stretches: Sequence[int]) -> list[_Part | None]:
         """Part that holds each time [s] in a stretch, or the nearest; None: there is none."""
@@ -194,5 +190,4 @@ def works_of_steps(
         parts.sort(key=lambda part: float(part[0][0]))
         time, power = unit * np.array([moments for moments, _ in parts]), np.array([values for _, values in parts])
         works.add(0, time, np.broadcast_to((time[:, -1:] - time[:, :1]) / 2, time.shape), power)
-    stretches = [0] * len(times)
-    return works.at(times, stretches), works.unresolved(times, stretches)
+    return works.at(times, [0] * len(times))

@@ -56,7 +56,7 @@ def held_answer(
 def _published(element: MechanismElement, values: Mapping[str, Array]) -> PublishedValues:
     """Values and forces of variables, without bars and events."""
     m = element.mechanism
-    count, joints = len(values["time"]), len(m.joints)
+    count = len(values["time"])
 
     def along(field: str, names: list[str]) -> Array:
         columns = [values.get(f"{field}.{name}", np.zeros(count)) for name in names]
@@ -89,7 +89,6 @@ def _published(element: MechanismElement, values: Mapping[str, Array]) -> Publis
         effort=along("effort", [item.name for item in m.actuators]),
         coupling=along("coupling", [item.name for item in m.couplings]),
         drive=along("drive", names),
-        loop=np.concatenate([vectors(kind, connections[joints:]) for kind in ("force", "torque")], -1),
         friction=along("friction", names),
         # a force along the coordinate is that of the lower stop, one against it of the upper
         stops=np.stack([np.maximum(stop, 0.0), np.minimum(stop, 0.0)], -1),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +12,10 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.dynamics.link_forces import working
+from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.check.law_records import LawRecorder
-from proofroll.truth.check.law_states import named_by_the_bodies, named_by_the_tree
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiles import Tiles, joined_tiles
@@ -31,29 +30,22 @@ from proofroll.truth.work_of_drives import WorkAlong
 _Path = HybridPath[Stretch[ContactMode]]
 
 
-class Recorded(NamedTuple):
-    """A route with its path.
-
-    Attributes:
-        recorder: of its statements.
-        path: in natural units.
-        held: held values along it; None: there are none.
-    """
-
-    recorder: LawRecorder
-    path: _Path
-    held: HeldPath | None = None
-
-
 def of_tree(
     mechanism: Mechanism,
     units: Units,
     tree: ContactTree,
     path: _Path,
     held_path: HeldPath | None = None,
-) -> Recorded:
+) -> LawRecorder:
     """A path of the first route; ``mechanism`` in SI units."""
-    return Recorded(LawRecorder(mechanism, units, tree, partial(named_by_the_tree, tree)), path, held_path)
+    dynamics = tree.dynamics
+
+    def named_at(state: Array, mode: ContactMode) -> Array:
+        q, v, time = dynamics.parts(state)
+        named: Array = dynamics.sample(q, v, mode, time)[0]["named"]
+        return np.nan_to_num(named)  # what is not determinate does no work
+
+    return LawRecorder(mechanism, units, tree, path, held_path, named_at)
 
 
 def of_bodies(
@@ -63,11 +55,15 @@ def of_bodies(
     second: MaximalCoordinates,
     path: _Path,
     held_path: HeldPath | None = None,
-) -> Recorded:
+) -> LawRecorder:
     """A path of the second route; ``second``: its equations of all joints."""
-    return Recorded(
-        LawRecorder(mechanism, units, bodies, partial(named_by_the_bodies, bodies, second)), path, held_path
-    )
+
+    def named_at(state: Array, mode: ContactMode) -> Array:
+        wrenches, switched = bodies.forces(state, mode)[1], bodies.equations.switched(state, mode)
+        second.take_functions(bodies.equations.equations.functions)
+        return second.reactions(float(state[-1]), state[:-1], switched, wrenches)[1]
+
+    return LawRecorder(mechanism, units, bodies, path, held_path, named_at)
 
 
 class HeldMotion(NamedTuple):
@@ -88,7 +84,7 @@ class HeldMotion(NamedTuple):
     tiles: Tiles | None
 
 
-def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[Recorded]) -> HeldMotion:
+def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[LawRecorder]) -> HeldMotion:
     """Outcome of the law check of the first route, which is published; what another one misses is in the bars.
 
     Args:
@@ -115,16 +111,16 @@ def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[Recorded])
     return HeldMotion(end=residuals.first.time / units.time, text=text, laws="", works=works, tiles=tiles)
 
 
-def tiles_of(route: Recorded, until: float) -> Tiles | None:
+def tiles_of(route: LawRecorder, until: float) -> Tiles | None:
     """Poses and velocities in all pieces of a route that begin before a time in natural units; None: there are none."""
-    stretches = [stretch for stretch in route.path.stretches if stretch.start < until] or route.path.stretches[:1]
-    return _joined([route.recorder.tiles(number, stretch) for number, stretch in enumerate(stretches)], route)
+    count = sum(stretch.start < until for stretch in route.path.stretches) or 1
+    return _joined([route.tiles(number) for number in range(count)], route)
 
 
-def _joined(parts: Sequence[Tiles | None], route: Recorded) -> Tiles | None:
+def _joined(parts: Sequence[Tiles | None], route: LawRecorder) -> Tiles | None:
     """Tiles of all stretches of a route; None: there are none."""
     tiles = [part for part in parts if part is not None]
-    borders = np.array([stretch.start for stretch in route.path.stretches[1:]]) * route.recorder.second
+    borders = np.array([stretch.start for stretch in route.path.stretches[1:]]) * route.second
     return replace(joined_tiles(tiles), borders=borders) if tiles else None
 
 
@@ -144,29 +140,25 @@ class _Walk:
         work: of drives.
     """
 
-    def __init__(self, mechanism: Mechanism, units: Units, route: Recorded) -> None:
-        self._recorder, self._path, self._held = route.recorder, route.path, route.held
-        self._scene, self.residuals = (
-            LawScene(mechanism, units.length, 1 / units.time),
-            LawResiduals(rate=1 / units.time),
-        )
-        self.work, self._working = WorkAlong(mechanism, units.length, 1 / units.time), bool(working(mechanism))
+    def __init__(self, mechanism: Mechanism, units: Units, route: LawRecorder) -> None:
+        self._route, scale = route, (units.length, 1 / units.time)
+        self._scene, self.residuals = LawScene(mechanism, *scale), LawResiduals(rate=scale[1])
+        self.work, self._working = WorkAlong(mechanism, *scale), bool(working(mechanism))
 
     def through(self, end: float) -> list[Tiles | None]:
         """Tiles of all stretches; transitions are judged up to a time in natural units."""
-        parts, ending, last = list[Tiles | None](), None, self._path.stretches[-1]
+        parts, ending, route = list[Tiles | None](), None, self._route
         fastest, unjudged = dict[str, float](), LawResiduals(rate=self.residuals.rate)
-        for number, stretch in enumerate(self._path.stretches):
-            if self._held is not None:
-                self._held.recall(stretch.start)
+        for number, stretch in enumerate(route.path.stretches):
+            if route.held is not None:
+                route.held.recall(stretch.start)
             if ending is not None:
-                passage = self._recorder.passage(self._path, number, ending)
                 residuals = self.residuals if stretch.start < end else unjudged
+                passage = route.passage(number, ending)
                 self.work.passes(passage, transition(self._scene, passage, residuals, fastest))
-            part = self._recorder.tiles(number, stretch, drives=self._working)
-            if self._working and part is not None:
+            parts.append(route.tiles(number, drives=self._working))
+            if self._working and (part := parts[-1]) is not None:
                 self.work.take(part)
-            parts.append(part)
-            goes_on = stretch is not last and (stretch.end < end or self._working)
-            ending = self._recorder.ending(stretch) if goes_on else None
+            goes_on = stretch is not route.path.stretches[-1] and (stretch.end < end or self._working)
+            ending = route.ending(stretch) if goes_on else None
         return parts

@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.events import EventKind
 from proofroll.elements.mechanism import Mechanism
@@ -25,6 +24,7 @@ from proofroll.truth.check.laws.tiles import Tiles
 from proofroll.truth.natural_units import Units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, states_inside
 from proofroll.truth.switching.contact_taylor import CompiledStretch
+from proofroll.truth.switching.held_route import HeldPath
 from proofroll.truth.switching.planar_slip import BegunSlip
 from proofroll.truth.switching.stopping_slip import StoppingSlip
 from proofroll.truth.tree.contact_tree import ContactTree
@@ -52,6 +52,8 @@ class LawRecorder:
     angular velocity; then the forces of drives. Other modes have both in numbers.
 
     Attributes:
+        path: in natural units.
+        held: held values along it; None: there are none.
         second: natural unit of time [s].
     """
 
@@ -60,18 +62,22 @@ class LawRecorder:
         mechanism: Mechanism,
         units: Units,
         route: ContactTree | ContactBodies,
+        path: HybridPath[Stretch[ContactMode]],
+        held_path: HeldPath | None,
         named_at: Callable[[Array, ContactMode], Array],
     ) -> None:
         """Takes a mechanism in SI units; ``named_at``: named forces at a state of the route in a mode."""
         self._mechanism, self._units, self._route, self._named_at = mechanism, units, route, named_at
-        self.second, self._moment = units.time, units.force * units.length
+        self.path, self.held, self.second = path, held_path, units.time
+        self._moment = units.force * units.length
         self._drives = [number for number, _ in working(mechanism)]
         self._drive_units = np.array(
             [units.force if item.unit == "N" else self._moment for _, item in working(mechanism)]
         )
 
-    def tiles(self, number: int, stretch: Stretch[ContactMode], *, drives: bool = False) -> Tiles | None:
-        """Poses and velocities in all pieces of a numbered stretch, and forces of ``drives``; None: there are none."""
+    def tiles(self, number: int, *, drives: bool = False) -> Tiles | None:
+        """Poses and velocities in all pieces of a stretch, and forces of ``drives``; None: there are none."""
+        stretch = self.path.stretches[number]
         cut = list(self._cut(stretch))
         if not cut:
             return None
@@ -145,10 +151,10 @@ class LawRecorder:
             pieces.place[0, 0, k], pieces.normal[0, 0, k] = touch.place * units.length, touch.normal
         return pieces
 
-    def passage(self, path: HybridPath[Stretch[ContactMode]], number: int, ending: Pieces) -> Passage:
-        """Transition to a stretch of a path, from the end of the one before."""
-        sooner, later = path.stretches[number - 1], path.stretches[number]
-        change = path.transitions[number] if number < len(path.transitions) else None
+    def passage(self, number: int, ending: Pieces) -> Passage:
+        """Transition to a stretch, from the end of the one before."""
+        sooner, later = self.path.stretches[number - 1 : number + 1]
+        change = self.path.transitions[number] if number < len(self.path.transitions) else None
         happenings = () if change is None else change.happenings
         border = features_of(sooner.mode) != features_of(later.mode)
         modes = self._modes(self._route.acting(later, later.first))
@@ -191,9 +197,7 @@ class LawRecorder:
         if isinstance(stretch, BegunSlip):
             edges = np.linspace(stretch.start, stretch.end, _PARTS + 1)
             for start, end in pairwise(edges):
-                yield from self._parts(
-                    start, end, lambda times: stretch.at(times).T, stretch.recorded if stretch.compiled else None
-                )
+                yield from self._parts(start, end, lambda times: stretch.at(times).T, None)
         elif isinstance(stretch, StoppingSlip):
             for start, end in pairwise([stretch.start, *(step.time for step in stretch.steps), stretch.end]):
                 if end > start:
@@ -219,25 +223,15 @@ class LawRecorder:
         """True if points do not resolve the states, (state, points), and turns of a piece, which takes a ``span``."""
         if _unresolved(states):
             return True
-        if record is not None and len(record):
-            moving = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, len(POINTS))
-            turning, spins = moving[:, 3:12], moving[:, 15:]
-        else:
-            turning, spins = self._turns(states)
-        if float(np.abs(spins).max(initial=0.0)) * span > _TURN:
-            return True
         # no state has a prescribed motion, which may turn bodies as no polynomial of the points does
-        return bool(self._mechanism.prescribed) and _unresolved(turning.reshape(-1, len(POINTS)))
-
-    def _turns(self, states: Array) -> tuple[Array, Array]:
-        """Rotations and angular velocities of the bodies [rad/s] at states of a piece, (state, points).
-
-        Where no motion is prescribed, which no state contains, those at both ends suffice.
-        """
-        rows = states.T if self._mechanism.prescribed else states.T[[0, -1]]
-        poses = [self._route.bodies(y) for y in rows]
-        turning = np.array([Rotation.from_quat(pose[2], scalar_first=True).as_matrix() for pose in poses]).T
-        return turning, np.array([pose[3] for pose in poses])
+        prescribed = bool(self._mechanism.prescribed)
+        if record is None or not len(record):
+            record = self._poses(states.T if prescribed else states.T[[0, -1]]).T
+        moving = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, record.shape[1])
+        turning, spins = moving[:, 3:12], moving[:, 15:]
+        # an angle whose rate changes needs more points
+        fastest = np.abs(spins).max(initial=0.0) + np.ptp(spins, axis=-1).max(initial=0.0)
+        return bool(fastest * span > _TURN) or (prescribed and _unresolved(turning.reshape(-1, len(POINTS))))
 
     def _parts(
         self,

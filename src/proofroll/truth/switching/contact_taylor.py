@@ -247,7 +247,6 @@ class CompiledMode:
                 slides=slides,
                 slide_rates=slide_rates,
                 guards=values[: self._count].T,
-                record=values[self._first_rate - self._stated : self._first_rate],
             )
 
         return led

@@ -59,7 +59,7 @@ class StandingEnds:
         bars["pressed"] = bars["sums"] + _CORNERS / 2 * bars["pressed"]
         pressed, sums = self._of_ends(motion.pressed, motion.sums)
         between = motion.between
-        if between is not None:
+        if between is not None and between.pressed is not None and between.sums is not None:
             borne, summed = self._of_ends(between.pressed, between.sums)
             between = between._replace(pressed=borne, sums=summed)
         return replace(

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from proofroll.elements.mechanism.run.element import MechanismElement
-    from proofroll.elements.mechanism.scene.model import Mechanism
 
 # Reasons why a variable has no value.
 UNTURNED = np.array([[1.0, 0.0, 0.0, 0.0]])
@@ -199,8 +198,7 @@ def columns(
             meaning = f"determinate components of the {kind}s on children"
             put(f"{kind}s", values[:, mask], unit, meaning, f"{kind}_component")
     if mechanism.contacts:
-        _put_contacts(element, placed, pressed, sums, unsaid, put)
-        _put_moments(mechanism, moments, unsaid, put)
+        _put_contacts(element, placed, (pressed, moments), sums, unsaid, put)
     for values, item in zip(named.T, named_forces(mechanism), strict=True):
         put(item.name, values, str(item.unit), item.meaning, absent=unsaid if np.isnan(values[-1]) else "")
     put_links(placed, named, put, unsaid, work)
@@ -244,13 +242,16 @@ def _local(element: MechanismElement, placed: Placed, pressed: FloatArray) -> di
 def _put_contacts(
     element: MechanismElement,
     placed: Placed,
-    pressed: FloatArray,
+    borne: tuple[FloatArray, FloatArray | None],
     sums: FloatArray | None,
     unsaid: str,
     put: Callable[..., None],
 ) -> None:
-    """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact, pair and of all together."""
-    followed = follow_contacts(placed)
+    """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact, pair and of all together.
+
+    ``borne``: forces, and moments against turning if they are known.
+    """
+    followed, (pressed, moments) = follow_contacts(placed), borne
     contacts = placed.mechanism.contacts
     shared, carried, turned = shared_pairs(contacts), carried_bodies(contacts), turned_bodies(contacts)
     if sums is None:
@@ -279,11 +280,14 @@ def _put_contacts(
                 meaning = f"{'sum' if kind == 'force' else 'moment'} of the contact forces on {body}"
                 put(f"net_{kind}.{body}.{letter}", component, unit, meaning, absent=absent)
     for index, contact in enumerate(placed.mechanism.contacts):
-        for axis, letter in enumerate("xyz"):
-            component = pressed[:, index, axis]
-            absent = unsaid if np.isnan(component[-1]) else ""
-            meaning = f"force of {contact.name} on {contact.body_a}"
-            put(f"force.{contact.name}.{letter}", component, "N", meaning, absent=absent)
+        resists = contact.rolling_resistance or contact.spinning_friction
+        of_contact = [("force", "N", "force", pressed)]
+        of_contact += [("torque", "N m", "moment against turning", moments)] if resists and moments is not None else []
+        for kind, unit, what, values in of_contact:
+            for component, letter in zip(values[:, index].T, "xyz", strict=True):
+                absent = unsaid if np.isnan(component[-1]) else ""
+                meaning = f"{what} of {contact.name} on {contact.body_a}"
+                put(f"{kind}.{contact.name}.{letter}", component, unit, meaning, absent=absent)
         put(f"gap.{contact.name}", followed.gap[:, index], "m", f"distance of what {contact.name} may touch")
         put(f"slip.{contact.name}", followed.slip[:, index], "m/s", f"speed of slip of {contact.name}")
     put("gaps", followed.gap, "m", "distances between what may touch", "contact")
@@ -297,16 +301,6 @@ def _put_contacts(
     put("unpressed", left["unpressed"], "1", "share of samples so far without a normal force", "contact")
     for name, unit, meaning in RESIDUALS:
         put(name, left[name], unit, meaning, "contact")
-
-
-def _put_moments(mechanism: Mechanism, moments: FloatArray | None, unsaid: str, put: Callable[..., None]) -> None:
-    """Puts moments against rolling and spin, (time, contacts, 3), of contacts that have some; None: not known."""
-    for index, contact in enumerate(mechanism.contacts):
-        if moments is not None and (contact.rolling_resistance or contact.spinning_friction):
-            meaning = f"moment of {contact.name} against rolling and spin on {contact.body_a}"
-            for component, letter in zip(moments[:, index].T, "xyz", strict=True):
-                absent = unsaid if np.isnan(component[-1]) else ""
-                put(f"torque.{contact.name}.{letter}", component, "N m", meaning, absent=absent)
 
 
 def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:

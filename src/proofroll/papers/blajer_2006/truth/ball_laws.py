@@ -12,7 +12,7 @@ from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.ball.motion import BallMotion
 from proofroll.truth.check.laws.integrals import COUNT, POINTS, integral
-from proofroll.truth.check.laws.law_check import laws_of_pieces
+from proofroll.truth.check.laws.motion import laws_of_pieces
 from proofroll.truth.check.laws.record import Modes, Pieces, stated
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import LawScene

@@ -14,7 +14,7 @@ import numpy as np
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.check.laws.contacts import gap_of, slide_of
 from proofroll.truth.check.laws.integrals import norm, turned
-from proofroll.truth.check.laws.joints import Coordinates
+from proofroll.truth.check.laws.joints import coordinate_of
 from proofroll.truth.check.laws.record import Array, Passage, Pieces
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import FREE, HELD_PLACES, HELD_TURNS, JointFrames, LawScene
@@ -149,7 +149,7 @@ def _reached(scene: LawScene, pieces_before: Pieces, number: int, coordinate: Co
     length = 1.0 if joint.kind == JointKind.REVOLUTE else scene.length
     for sign, stop in zip((1.0, -1.0), joint.limits, strict=True):
         near = replace(pieces_before, turns=np.full((1, 1, len(scene.mechanism.joints), 1), stop))
-        place = float(Coordinates(scene).at(number, 0, near, placed, connection.kind)[0, 0])
+        place = float(coordinate_of(scene, number, 0, near, placed)[0, 0])
         if abs(place - stop) < _CLOSED * (abs(stop) + length):
             rates = sign * coordinate.rates[0], sign * coordinate.rates[1]
             stops.append(Stop(joint.name, joint.restitution, rates))

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.truth.check.laws.contacts import contact_laws
 from proofroll.truth.check.laws.integrals import integral, norm, since_start, tail, turned
+from proofroll.truth.check.laws.joints import joint_laws
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import Array, BodyPoses, Pieces
-from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.residuals import COARSE, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 
 _ARM = 1e-2  # part of the natural length that a body extends at least, for the size of its angular momentum
@@ -78,3 +80,15 @@ def momenta(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: Bod
         ):
             left, unresolved = norm(since_start(value) - integral(rate, pace)), norm(tail(rate, pace))
             residuals.note(law, joint.child, left, size, time, span * digits, unresolved)
+
+
+def laws_of_pieces(scene: LawScene, pieces: Pieces, residuals: LawResiduals) -> None:
+    """Checks pieces of free bodies in one mode, whose record has all forces at their points, in order of time."""
+    residuals.coarse = COARSE if pieces.coarse else 1.0
+    residuals.points += pieces.time.size
+    kinematics(scene, pieces, residuals)
+    joined(scene, pieces, residuals)
+    loads = BodyLoads(scene, pieces)
+    joint_laws(scene, pieces, residuals, loads)
+    contact_laws(scene, pieces, residuals, loads)
+    momenta(scene, pieces, residuals, loads)

@@ -73,7 +73,6 @@ class Pieces(BodyPoses):
         effort: of each actuator along its joint [N, N m], (actuators).
         coupling: multiplier of each coupling: force along its first joint [N, N m], (couplings).
         drive: force that imposes the motion of each joint [N, N m], (joints); 0 where none is prescribed.
-        loop: force and moment of each loop on its second body, at its place there [N, N m], (loops, 6).
         friction: dry friction along each joint [N, N m], (joints).
         stops: force of each stop along its joint [N, N m], (joints, 2).
         force: on the first body of each contact [N], (contacts, 3).
@@ -86,7 +85,6 @@ class Pieces(BodyPoses):
     effort: Array
     coupling: Array
     drive: Array
-    loop: Array
     friction: Array
     stops: Array
     force: Array
@@ -96,13 +94,6 @@ class Pieces(BodyPoses):
     spinning: Array
     modes: Modes
 
-    def points(self, piece: int, point: int) -> Pieces:
-        """One point as pieces of one point."""
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        part = slice(piece, piece + 1 or None), slice(point, point + 1 or None)
-        arrays: dict[str, Any] = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
-        return replace(self, **arrays)
-
 
 def stated(mechanism: Mechanism, modes: Modes, time: Array, **stated_fields: Any) -> Pieces:
     """Pieces of a motion with these times [s]; ``stated_fields``: of :class:`Pieces`; forces left out are zero."""
@@ -111,7 +102,6 @@ def stated(mechanism: Mechanism, modes: Modes, time: Array, **stated_fields: Any
         "effort": (len(mechanism.actuators),),
         "coupling": (len(mechanism.couplings),),
         "drive": (joints,),
-        "loop": (len(mechanism.loops), 6),
         "friction": (joints,),
         "stops": (joints, 2),
         **dict.fromkeys(("force", "place", "normal", "rolling", "spinning"), (contacts, 3)),

@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.truth.check.laws.record import Array
 
+STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
 INSTANT = 1e-6  # natural times beside an event of which what jumps may be on either side
 _HOLE = 1e-6  # natural times that steps may leave out
 # Law -> allowance of its residual, relative to its natural size, and the law as a clause. On honest records of all

@@ -57,10 +57,6 @@ class Tiles(BodyPoses):
         known: dict[Modes, Modes] = {}
         return replace(self, modes=tuple(known.setdefault(item, folded(item)) for item in self.modes))
 
-    def one(self, number: int) -> Tiles:
-        """One tile."""
-        return self.ordered(np.array([number]))
-
     def holding(self, times: Array) -> Places:
         """Places of times [s] in the tiles that hold them; of two that meet there the later."""
         begins = self.time[:, 0]

@@ -12,10 +12,8 @@ from proofroll.truth.check.laws.impacts import impact
 from proofroll.truth.check.laws.integrals import dot, norm
 from proofroll.truth.check.laws.motion import jump
 from proofroll.truth.check.laws.record import Passage, Pieces
-from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.residuals import STRUCK, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
-
-_STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
 
 
 def transition(
@@ -27,14 +25,9 @@ def transition(
     """
     pieces_before, pieces_after = passage.before, passage.after
     residuals.coarse, residuals.events = 1.0, residuals.events + 1
-    residuals.note(
-        "joined",
-        "",
-        jump(scene, pieces_after, pieces_before, slice(None), slice(None), rates=False),
-        1.0,
-        pieces_before.time[:, 0],
-    )
-    is_struck = bool(jump(scene, pieces_after, pieces_before, slice(None), slice(None))[0] > _STRUCK)
+    apart = jump(scene, pieces_after, pieces_before, slice(None), slice(None), rates=False)
+    residuals.note("joined", "", apart, 1.0, pieces_before.time[:, 0])
+    is_struck = bool(jump(scene, pieces_after, pieces_before, slice(None), slice(None))[0] > STRUCK)
     if is_struck:
         return impact(scene, passage, residuals, fastest)
     if not passage.decided:

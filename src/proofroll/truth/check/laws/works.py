@@ -9,14 +9,12 @@ from proofroll.truth.check.laws.integrals import integral
 from proofroll.truth.check.laws.joint_forces import law_of, target_of
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, PublishedValues
-from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.residuals import STRUCK, LawResiduals
 from proofroll.truth.check.laws.samples import kinetic_energy
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.signals import value_of
 from proofroll.truth.check.laws.tiled import Turns, changed_velocity
 from proofroll.truth.check.laws.tiles import Places, Tiles
-
-_STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
 
 
 def works_follow(
@@ -41,7 +39,7 @@ def works_follow(
         )
     if any({"slip", SPREAD} & {*mode.contacts, *mode.rolling, *mode.spinning} for mode in tiles.modes):
         return
-    if (changed_velocity(scene, tiles) > _STRUCK).any():
+    if (changed_velocity(scene, tiles) > STRUCK).any():
         return
     energy, parts = kinetic_energy(scene, tiles)
     loads = BodyLoads(scene, tiles)

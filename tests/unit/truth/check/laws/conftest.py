@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.check.laws.integrals import POINTS
-from proofroll.truth.check.laws.law_check import laws_of_pieces
+from proofroll.truth.check.laws.motion import laws_of_pieces
 from proofroll.truth.check.laws.record import Array, Modes, Passage, Pieces, stated
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
@@ -61,6 +61,13 @@ def without_contacts(mechanism: Mechanism, time: Array, **known: Any) -> Pieces:
     joints = len(mechanism.joints)
     modes = known.pop("modes", Modes((), (), (), ("open",) * joints, (("open", "open"),) * joints))
     return stated(mechanism, modes, time, **known)
+
+
+def point(pieces: Pieces, number: int) -> Pieces:
+    """First or last point as a piece of one point; ``number``: 0 or -1."""
+    part = slice(number, number + 1 or None)
+    arrays = {name: value[part, part] for name, value in vars(pieces).items() if isinstance(value, np.ndarray)}
+    return replace(pieces, **arrays)
 
 
 def times(start: float, end: float, count: int = 3) -> tuple[Array, Array]:
@@ -200,5 +207,5 @@ def bounce(restitution: float = 0.5, speed: float = 0.0, kinetic: float = 0.2, c
         fields = contact(time, 0 * p, np.stack([x, none, none], -1), count) | poses(p, v, about(1, turns * past), w)
         pieces.append(without_contacts(mechanism, time, pace=pace, **fields, modes=touching("open", count)))
     names = frozenset(each.name for each in mechanism.pairs)
-    passage = Passage(pieces[0].points(-1, -1), pieces[1].points(0, 0), impacts=names)
+    passage = Passage(point(pieces[0], -1), point(pieces[1], 0), impacts=names)
     return HandMade(mechanism, tuple(pieces), (passage,))
