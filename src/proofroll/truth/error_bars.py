@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,22 @@ ROUND_OFF = 16 * float(np.finfo(float).eps)  # relative round-off after some ten
 JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "named")
 
 
+class Routed(NamedTuple):
+    """Motion of one route at some times.
+
+    Attributes:
+        record: the motion.
+        works: work of drives since the start [J], (times, drives).
+        pressed: contact forces [N] and moments against turning [N m], (times, contacts, 6); None: no contacts.
+        sums: sums of the forces [N], (times, sums, 3); None: as ``pressed``.
+    """
+
+    record: Record
+    works: Array
+    pressed: Array | None = None
+    sums: Array | None = None
+
+
 @dataclass(frozen=True)
 class TwoRouteMotion:
     """Motion taken as the truth, with its accuracy.
@@ -49,12 +65,13 @@ class TwoRouteMotion:
         reason: cause why the question is ill-posed from the horizon on.
         end: time from which the motion is not known, s; the record ends before it; inf: it reaches all times asked for.
         ended: reason why it ends there, as a clause.
-        pressed: contact forces on the first bodies [N], (times, contacts, 3), NaN where not determinate; None: no
-            contacts.
-        sums: their sums, (times, sums, 3); None: as ``pressed``.
+        pressed: contact forces [N] and moments against turning [N m] on the first bodies, (times, contacts, 6), NaN
+            where not determinate; None: no contacts.
+        sums: sums of the forces, (times, sums, 3); None: as ``pressed``.
         works: work of drives since the start [J], (times, drives).
         laws: outcome of the law check, as a clause; empty: it ended the motion, or there was none.
         tiles: poses and velocities in all pieces of the route of the record; None: there are none.
+        between: motion and forces in the middle of each of its stretches; None: nothing switches.
     """
 
     record: Record
@@ -75,6 +92,7 @@ class TwoRouteMotion:
     works: Array | None = None
     laws: str = ""
     tiles: Tiles | None = None
+    between: Routed | None = None
 
 
 def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:

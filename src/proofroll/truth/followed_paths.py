@@ -3,7 +3,7 @@
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from proofroll.truth import SAFETY
 from proofroll.truth.error_bars import (
     JUDGED,
     ROUND_OFF,
+    Routed,
     TwoRouteMotion,
     bar_of,
     differences_of,
@@ -37,7 +38,7 @@ CLOSE = 1e-9
 
 # Fields whose error at a single sample is of that sample alone, as that of friction just before a slip stops: its
 # direction is known to the error of the slip by its speed.
-_FORCES = {"wrench", "links", "pressed", "sums"}
+_FORCES = {"wrench", "links", "pressed", "turning", "sums"}
 
 # Accuracies of a time by which the second route is followed beyond an early end of the first, to see its reason, too.
 _BEHIND = 10
@@ -68,22 +69,6 @@ def followed(
     end = until if path.known else path.stretches[-1].end
     last = min(until, end + _BEHIND * time_accuracy(end))
     return path, follow(body_route, last, kinks, CLOSE, first_close([path], CLOSE))
-
-
-class Routed(NamedTuple):
-    """Motion of one route at some times.
-
-    Attributes:
-        record: the motion.
-        pressed: contact forces [N], (times, contacts, 3).
-        sums: their sums [N], (times, sums, 3).
-        works: work of drives since the start [J], (times, drives).
-    """
-
-    record: Record
-    pressed: Array
-    sums: Array
-    works: Array
 
 
 def cut_early(
@@ -146,17 +131,13 @@ def before_first(end: float, reason: str) -> Refused:
 def two_route_motion(
     mechanism: Mechanism,
     paths: tuple[FollowedPath, FollowedPath],
-    by_tree: Record,
-    by_bodies: Record,
+    routed: tuple[Routed, Routed],
     routes: tuple[str, ...],
     reason: str,
     units: Units,
-    works: tuple[Array, Array],
     *,
     unresolved: float | Array = 0.0,
     kinds: Callable[[Any], Any] = lambda mode: mode,
-    pressed: tuple[Array, Array] | None = None,
-    sums: tuple[Array, Array] | None = None,
     until: float = np.inf,
     cut: tuple[Routed, NDArray[np.bool_]] | None = None,
     left: Mapping[str, Array] | None = None,
@@ -167,16 +148,12 @@ def two_route_motion(
     Args:
         mechanism: bodies and joints, in SI units.
         paths: of both routes, in natural units.
-        by_tree: record of the first route, taken as the truth, in SI units.
-        by_bodies: record of the second, matched to the first, in SI units.
+        routed: motion of the first route, taken as the truth, and of the second, matched to the first.
         routes: their names.
         reason: cause why the question is ill-posed from the horizon on.
         units: natural units of the paths.
-        works: work of drives along both [J], (times, drives).
-        unresolved: part of it that is not known better [J], of all times or of each.
+        unresolved: part of the work of drives that is not known better [J], of all times or of each.
         kinds: part of a mode in which both routes must agree.
-        pressed: contact forces by both routes [N], (times, contacts, 3).
-        sums: their sums by both routes [N], (times, sums, 3).
         until: last time asked for [s].
         cut: motion of the first route with rebounds cut early, and at which times it counts.
         left: errors that a difference of the routes leaves out, in each field at each time; None: those of ``cut``, and
@@ -185,13 +162,8 @@ def two_route_motion(
     """
     parted = min(_parted(*paths, kinds) * units.time, chaotic_from)
     determinate = analyse(mechanism).determinate
-    masked = replace(by_tree, wrench=np.where(determinate, by_tree.wrench, np.nan))
-    fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, by_bodies)
-    fields["work"], others["work"] = works
-    if pressed is not None:
-        fields["pressed"], others["pressed"] = pressed
-    if sums is not None:
-        fields["sums"], others["sums"] = sums
+    masked = _masked(routed[0], determinate)
+    fields, others = _fields(mechanism, routed[0], determinate), _fields(mechanism, routed[1], np.array(True))
     placed = masked.placed(mechanism)
     least, step = round_off(fields, placed), dict.fromkeys(fields, 0.0)
     alone = _FORCES if left is None else set()
@@ -200,7 +172,7 @@ def two_route_motion(
     apart = {field: differences_of(values, others[field]) for field, values in fields.items()}
     bars = {field: bar_of(apart[field], left[field] + least[field], alone=field in alone) for field in fields}
     bars = {field: bar + step[field] for field, bar in bars.items()}
-    differences = {field: float(apart[field][by_tree.time < parted].max(initial=0.0)) for field in fields}
+    differences = {field: float(apart[field][masked.time < parted].max(initial=0.0)) for field in fields}
     bars["work"] = bars["work"] + unresolved
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
@@ -213,7 +185,6 @@ def two_route_motion(
     if np.isfinite(horizon):
         certain = min(certain, horizon - np.sqrt(CLOSE) * max(units.time, horizon))
     happened = tuple(event for event in _events(*paths, units.time) if event.time < certain)
-    force = None if pressed is None else pressed[0]
     if np.isfinite(end):
         ended = units.text_in_seconds(ended) or f"from t = {units.time * end:.6g} s on {reason}"
     return TwoRouteMotion(
@@ -227,12 +198,25 @@ def two_route_motion(
         checked_by=None,
         events=happened,
         reason=reason,
-        pressed=force,
-        sums=None if sums is None else sums[0],
-        works=works[0],
+        pressed=routed[0].pressed,
+        sums=routed[0].sums,
+        works=routed[0].works,
         end=end * units.time,
         ended=ended,
     )
+
+
+def _masked(motion: Routed, determinate: NDArray[np.bool_]) -> Record:
+    """Record of a motion without components of wrenches that are not determinate."""
+    return replace(motion.record, wrench=np.where(determinate, motion.record.wrench, np.nan))
+
+
+def _fields(mechanism: Mechanism, motion: Routed, determinate: NDArray[np.bool_]) -> dict[str, Array]:
+    """Fields with an error bar of a motion."""
+    fields = fields_with_bars(mechanism, _masked(motion, determinate)) | {"work": motion.works}
+    if motion.pressed is None or motion.sums is None:
+        return fields
+    return fields | {"pressed": motion.pressed[..., :3], "turning": motion.pressed[..., 3:], "sums": motion.sums}
 
 
 def _left_by_a_cut(
@@ -246,10 +230,7 @@ def _left_by_a_cut(
     if cut is None:
         return left
     routed, counts = cut
-    record = replace(routed.record, wrench=np.where(determinate, routed.record.wrench, np.nan))
-    others = fields_with_bars(mechanism, record)
-    others |= {"work": routed.works}
-    others |= {"pressed": routed.pressed, "sums": routed.sums} if mechanism.contacts else {}
+    others = _fields(mechanism, routed, determinate)
     for name, values in fields.items():
         left[name] = np.where(counts, differences_of(values, others[name]), 0.0)
     return left
@@ -269,6 +250,7 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     sizes |= {
         "wrench": quadratic * sizes["wrench"],
         "pressed": quadratic * units.force,
+        "turning": quadratic * units.force * units.length,
         "sums": quadratic * units.force * max(1.0, units.length),  # forces and moments
         "links": quadratic * sizes["wrench"]
         + max((link.stiffest for link in mechanism.links), default=0.0) * units.length,

@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounces import with_bounces
+from proofroll.core.columns import Columns
 from proofroll.core.dataset import ENDED, ENDS, LAWS
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
@@ -25,7 +26,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import shared_pairs
 if TYPE_CHECKING:
     import xarray as xr
 
-    from proofroll.truth.error_bars import TwoRouteMotion
+    from proofroll.truth.error_bars import Routed, TwoRouteMotion
 
 # Error bar of the routes that a variable gets.
 _BARS = {
@@ -70,7 +71,8 @@ class MechanismTruth:
         dataset = MechanismTruth._dataset(element, motion, branching(motion.branches))
         if motion.tiles is None:
             return dataset
-        check = held_answer(element, dataset, motion.tiles, times)
+        between = None if motion.between is None else _columns(element, motion.between)
+        check = held_answer(element, dataset, motion.tiles, times, between)
         if text := check.residuals.broken("what the truth publishes"):
             assert check.residuals.first is not None  # as there is a text
             motion = cut_motion(motion, check.residuals.first.time, text)
@@ -82,24 +84,14 @@ class MechanismTruth:
     def _dataset(element: MechanismElement, motion: TwoRouteMotion, branches: str) -> xr.Dataset:
         """Dataset of a motion with its bars; ``branches``: note on singular poses along it."""
         record = motion.record
-        wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
-        pressed = np.zeros((len(record.time), 0, 3)) if motion.pressed is None else motion.pressed
-        dataset = columns(
-            element,
-            record.placed(element.mechanism),
-            wrench,
-            pressed,
-            record.named,
-            motion.sums,
-            UNDETERMINED,
-            motion.works,
-        ).dataset()
+        dataset = _columns(element, motion).dataset()
         points = [point.name for point in element.mechanism.points]
         fields_of = {
             f"{kind}.{contact.name}{axis}": field
             for contact in element.mechanism.contacts
             for kind, axes, field in (
                 ("force", (".x", ".y", ".z"), "pressed"),
+                ("torque", (".x", ".y", ".z"), "turning"),
                 ("gap", ("",), "gap"),
                 ("slip", ("",), "slip"),
             )
@@ -152,6 +144,16 @@ class MechanismTruth:
         if not element.mechanism.has_events:
             return dataset
         return with_bounces(with_events(dataset, motion.events), motion.bounces)
+
+
+def _columns(element: MechanismElement, motion: TwoRouteMotion | Routed) -> Columns:
+    """Variables of a motion."""
+    record, placed = motion.record, motion.record.placed(element.mechanism)
+    wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
+    borne = np.zeros((len(record.time), 0, 6)) if motion.pressed is None else motion.pressed
+    return columns(
+        element, placed, wrench, borne[..., :3], record.named, motion.sums, UNDETERMINED, motion.works, borne[..., 3:]
+    )
 
 
 def _unknown_from(element: MechanismElement, motion: TwoRouteMotion) -> tuple[float, str] | None:

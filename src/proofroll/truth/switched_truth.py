@@ -31,13 +31,12 @@ from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, tiles_of, work_along
+from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, work_along
 from proofroll.truth.early_end import cut_at
-from proofroll.truth.error_bars import ROUND_OFF, TwoRouteMotion, check_start, on_same_turns
+from proofroll.truth.error_bars import ROUND_OFF, Routed, TwoRouteMotion, check_start, on_same_turns
 from proofroll.truth.followed_paths import (
     CLOSE,
     TOLERANCES,
-    Routed,
     at_times,
     counterparts,
     cut_early,
@@ -110,55 +109,42 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     stretches = stretches_at(paths, times)
     others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
     states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
-    tiles = tiles_of(recorded[0], float(times[-1]) * (1 + CLOSE), outcome.pieces)
     for values in held_paths:
         values.finish()
     seconds, known_until = times * units.time, _works_known(tree, paths[0])
-    unknown, at_samples = times[:, None] > known_until, list(zip(outcome.works, (stretches, others), strict=True))
-    work_of_tree, work_of_bodies = (work.at(seconds, numbers) for work, numbers in at_samples)
-    works = np.where(unknown, np.nan, work_of_tree), work_of_bodies
-    unresolved = [work.unresolved(seconds, numbers)[:, np.isinf(known_until)] for work, numbers in at_samples]
-    tree_states = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
-    by_tree = tree_states.record
+    at_samples = zip(outcome.works, (stretches, others), strict=True)
+    (work_of_tree, *rest_of_tree), (work_of_bodies, *rest) = (work.at(seconds, numbers) for work, numbers in at_samples)
+    works = np.where(times[:, None] > known_until, np.nan, work_of_tree), work_of_bodies
+    unresolved = np.max([*rest_of_tree, *rest], axis=0)[:, np.isinf(known_until)].max(axis=1, initial=0.0)
+    by_tree = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
+    by_bodies = _by_the_bodies(bodies, second, paths[1], times, states[1], others, works[1])
+    by_bodies = by_bodies._replace(record=on_same_turns(scaled, by_tree.record, by_bodies.record))
     cut = None if held_paths else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
-    modes = [bodies.acting(paths[1].stretches[number], state) for number, state in zip(others, states[1], strict=True)]
-    applied = [bodies.forces(state, mode) for state, mode in zip(states[1], modes, strict=True)]
-    switched = [equations.switched(state, mode) for state, mode in zip(states[1], modes, strict=True)]
-    pushes, wrenches = zip(*applied, strict=True)
-    by_bodies = on_same_turns(scaled, by_tree, second.recorded(times, states[1][:, :-1], switched, wrenches))
-    forces_of_bodies = np.array(pushes) * units.force
-    # samples at instants are at the times that were asked for, to the last bit
-    by_tree, by_bodies = (units.record(mechanism, replace(record, time=asked)) for record in (by_tree, by_bodies))
-    forces_of_tree, sums_of_bodies = (
-        _in_si(mechanism, units, tree_states),
-        _sums_along(by_bodies.placed(mechanism), forces_of_bodies),
-    )
     left = None
     if cut is not None:
         earlier = at_times(cut[0], counterparts((paths[0], cut[0]), stretches, kinds), times, kinds)
-        early_works = work_along(mechanism, units, tree, cut[0]).at(seconds, earlier)
+        early_works = work_along(mechanism, units, tree, cut[0]).at(seconds, earlier)[0]
         early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier, early_works)
-        early = early._replace(record=on_same_turns(scaled, tree_states.record, early.record))
+        early = early._replace(record=on_same_turns(scaled, by_tree.record, early.record))
         left = _in_si(mechanism, units, early), cut[1]
+    middles = _between(tree, routes[0], paths[0])
     motion = replace(
         two_route_motion(
             mechanism,
             paths,
-            by_tree,
-            by_bodies,
+            # samples at instants are at the times that were asked for, to the last bit
+            (_in_si(mechanism, units, by_tree, asked), _in_si(mechanism, units, by_bodies, asked)),
             _names(tree, bodies),
             reason,
             units,
-            works,
-            unresolved=np.max([rest.max(axis=1, initial=0.0) for rest in unresolved], axis=0),
+            unresolved=unresolved,
             kinds=kinds,
-            pressed=(forces_of_tree.pressed, forces_of_bodies) if scaled.contacts else None,
-            sums=(forces_of_tree.sums, sums_of_bodies) if scaled.contacts else None,
             until=until * units.time,
             cut=left,
         ),
         laws=outcome.laws,
-        tiles=tiles,
+        tiles=outcome.tiles,
+        between=None if middles is None else _in_si(mechanism, units, middles),
     )
     if not scaled.contacts:
         return motion
@@ -265,20 +251,59 @@ def _by_the_tree(
         ),
         strict=True,
     )
-    return Routed(record_of(times, records), np.array(forces), np.array(sums), works)
+    touching = bool(dynamics.mechanism.contacts)
+    borne, summed = (np.array(values) if touching else None for values in (forces, sums))
+    return Routed(record_of(times, records), works, borne, summed)
+
+
+def _by_the_bodies(
+    bodies: ContactBodies,
+    second: MaximalCoordinates,
+    path: _Path,
+    times: Array,
+    states: Array,
+    stretches: Sequence[int],
+    works: Array,
+) -> Routed:
+    """Motion and forces of the second route along a path with these states, as those of the first, without sums."""
+    acting = [bodies.acting(path.stretches[number], state) for number, state in zip(stretches, states, strict=True)]
+    modes = list(zip(states, acting, strict=True))
+    pressed, wrenches = zip(*(bodies.forces(state, mode) for state, mode in modes), strict=True)
+    switched = [bodies.equations.switched(state, mode) for state, mode in modes]
+    record = second.recorded(times, states[:, :-1], switched, wrenches)
+    return Routed(record, works, np.array(pressed) if bodies.equations.mechanism.contacts else None)
+
+
+def _between(tree: ContactTree, route: HybridRoute[ContactMode], path: _Path) -> Routed | None:
+    """Motion and forces of the first route in the middle of each stretch of a path; None: it has none."""
+    lasting = [number for number, stretch in enumerate(path.stretches) if stretch.end > stretch.start]
+    if not lasting:
+        return None
+    times = np.array([path.stretches[k].middle for k in lasting])
+    works = np.full((len(times), len(working(tree.dynamics.mechanism))), np.nan)
+    return _by_the_tree(tree, path, times, states_of(route, path, times, lasting), lasting, works)
 
 
 def _sums_along(placed: Placed, pressed: Array) -> Array:
     """Sums of contact forces [N] and of their moments [N m] along a motion, (times, sums, 3)."""
-    sums = contact_sums(placed.mechanism.contacts) @ pressed
-    return np.concatenate([sums, moments_along(placed, follow_contacts(placed).place, pressed)], axis=1)
+    forces = pressed[..., :3]
+    sums = contact_sums(placed.mechanism.contacts) @ forces
+    return np.concatenate([sums, moments_along(placed, follow_contacts(placed).place, forces)], axis=1)
 
 
-def _in_si(mechanism: Mechanism, units: Units, states: Routed) -> Routed:
-    """Motion and forces in SI units."""
-    moment = np.arange(states.sums.shape[1]) >= len(contact_sums(mechanism.contacts))
-    sums = states.sums * (units.force * np.where(moment, units.length, 1.0))[:, None]
-    return Routed(units.record(mechanism, states.record), states.pressed * units.force, sums, states.works)
+def _in_si(mechanism: Mechanism, units: Units, routed: Routed, times: Array | None = None) -> Routed:
+    """Motion and forces in SI units; ``times``: its own in natural units, if these have more digits."""
+    natural = routed.record if times is None else replace(routed.record, time=times)
+    record, moment = units.record(mechanism, natural), units.force * units.length
+    if routed.pressed is None:
+        return routed._replace(record=record)
+    pressed, count = routed.pressed * np.repeat([units.force, moment], 3), len(contact_sums(mechanism.contacts))
+    if routed.sums is None:
+        return routed._replace(record=record, pressed=pressed, sums=_sums_along(record.placed(mechanism), pressed))
+    is_moment = np.arange(routed.sums.shape[1]) >= count
+    return routed._replace(
+        record=record, pressed=pressed, sums=routed.sums * np.where(is_moment, moment, units.force)[:, None]
+    )
 
 
 def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:

@@ -14,8 +14,9 @@ from numpy.polynomial import chebyshev
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES, integral, tail
-from proofroll.truth.check.laws.record import Array, Passage, Pieces
+from proofroll.truth.check.laws.record import Array, Passage
 from proofroll.truth.check.laws.scene import LawScene
+from proofroll.truth.check.laws.tiles import Tiles
 from proofroll.truth.numerics.hybrid import DenseStep
 
 if TYPE_CHECKING:
@@ -63,10 +64,11 @@ class WorkAlong:
         self._unresolved = np.zeros(len(self._drives))
         self._last: tuple[float, Array] | None = None  # time and power of the last point
 
-    def take(self, stretch: int, parts: Sequence[Pieces]) -> None:
-        """Adds pieces of a stretch, and the mean power between them and the last ones."""
-        for pieces in parts:
-            self.add(stretch, pieces.time, pieces.pace, self._power(pieces))
+    def take(self, tiles: Tiles) -> None:
+        """Adds the tiles of a stretch, and the mean power between them and the last ones."""
+        if tiles.drives.size:
+            rates = [self._scene.free(joint, tiles)[0].rate for joint in self._joints]
+            self.add(int(tiles.stretch[0]), tiles.time, tiles.pace, tiles.drives * np.stack(rates, -1))
 
     def add(self, stretch: int, time: Array, pace: Array, power: Array) -> None:
         """Adds powers [W], (pieces, points, drives), at points of pieces of a stretch."""
@@ -91,32 +93,22 @@ class WorkAlong:
 
     def passes(self, passage: Passage, impulses: Mapping[int, float]) -> None:
         """Adds the work of impulses of driven joints, by their numbers; an effort is finite and has none."""
-        pieces_before, pieces_after = passage.before, passage.after
-        self._over_a_gap(
-            self._parts[-1].stretch if self._parts else 0,
-            float(pieces_before.time[0, 0]),
-            self._power(pieces_before)[0, 0],
-        )
         for k, (drive, joint) in enumerate(zip(self._drives, self._joints, strict=True)):
             if drive.field == "drive" and joint in impulses:
-                rate = (self._rate(joint, pieces_before) + self._rate(joint, pieces_after))[0, 0] / 2
+                sides = (passage.before, passage.after)
+                rate = sum(float(self._scene.free(joint, side)[0].rate[0, 0]) for side in sides) / 2
                 # a joint that a motion holds at rest does no work, whatever its impulse
                 self._total[k] += impulses[joint] * rate if rate else 0.0
-        self._last = float(pieces_after.time[0, 0]), self._power(pieces_after)[0, 0]
 
-    def at(self, times: Array, stretches: Sequence[int]) -> Array:
-        """Work at times [s] in stretches, (times, drives)."""
-        parts = zip(times.tolist(), self._parts_at(times, stretches), strict=True)
-        works = [np.zeros(len(self._drives)) if part is None else part.at(time) for time, part in parts]
-        return np.array(works).reshape(len(times), len(self._drives))
+    def at(self, times: Array, stretches: Sequence[int]) -> tuple[Array, Array]:
+        """Work at times [s] in stretches, and the part of it that points of pieces do not resolve [J].
 
-    def unresolved(self, times: Array, stretches: Sequence[int]) -> Array:
-        """Part of the work at times [s] in stretches that the points of pieces do not resolve [J], (times, drives)."""
-        rests = [
-            np.zeros(len(self._drives)) if part is None else part.unresolved
-            for part in self._parts_at(times, stretches)
-        ]
-        return np.array(rests).reshape(len(times), len(self._drives))
+        Both have the shape (times, drives).
+        """
+        none, parts = np.zeros(len(self._drives)), zip(times.tolist(), self._parts_at(times, stretches), strict=True)
+        values = [(none, none) if part is None else (part.at(time), part.unresolved) for time, part in parts]
+        works, rests = np.array(values).reshape(len(times), 2, len(none)).swapaxes(0, 1)
+        return works, rests
 
     def _parts_at(self, times: Array, stretches: Sequence[int]) -> list[_Part | None]:
         """Part that holds each time [s] in a stretch, or the nearest; None: there is none."""
@@ -147,18 +139,6 @@ class WorkAlong:
             )
         )
         self._last = time, power
-
-    def _power(self, pieces: Pieces) -> Array:
-        """Power of each drive at the points of pieces [W]."""
-        powers = [
-            getattr(pieces, drive.field)[..., drive.number] * self._rate(joint, pieces)
-            for drive, joint in zip(self._drives, self._joints, strict=True)
-        ]
-        return np.stack(powers, -1) if powers else np.zeros((*pieces.time.shape, 0))
-
-    def _rate(self, joint: int, pieces: Pieces) -> Array:
-        """Rate of a joint with one coordinate at the points of pieces [m/s, rad/s]."""
-        return self._scene.free(joint, pieces)[0].rate
 
 
 class _Window(NamedTuple):
@@ -210,5 +190,4 @@ def works_of_steps(
         parts.sort(key=lambda part: float(part[0][0]))
         time, power = unit * np.array([moments for moments, _ in parts]), np.array([values for _, values in parts])
         works.add(0, time, np.broadcast_to((time[:, -1:] - time[:, :1]) / 2, time.shape), power)
-    stretches = [0] * len(times)
-    return works.at(times, stretches), works.unresolved(times, stretches)
+    return works.at(times, [0] * len(times))

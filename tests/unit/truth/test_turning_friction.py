@@ -11,6 +11,7 @@ import pytest
 from turned_scenes import turned_mechanism
 
 import proofroll
+from proofroll.core.dataset import ENDED, LAWS
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
@@ -19,6 +20,7 @@ from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.parts import Force
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.truth.plug_in import MechanismTruth
 from proofroll.truth.truth_of_mechanism import truth_of
 
 RADIUS, MASS, MOMENT, G = 0.05, 0.7, 0.0009, 9.81
@@ -111,9 +113,9 @@ def test_friction_against_spin_turns_with_the_normal_of_a_bore() -> None:
     pair = replace(law(0.1, spinning_friction=2e-3), geometries=("s", "wall"))
     joint = Joint("j", "free", "world", "ball", q0=(out, 0, 0, 1, 0, 0, 0), v0=(0.0, 2.0, 0.0, 30.0, 0.0, 2.0 / out))
     parts = Mechanism((Body("ball", MASS, inertia=(MOMENT,) * 3),), (joint,), geometries=shapes, pairs=(pair,))
-    found = truth_of(parts, np.array([0.0, 0.05]))
-    assert not found.ended
-    assert found.laws
+    found = MechanismTruth.truth(MechanismElement(parts), np.array([0.0, 0.05]), ()).attrs
+    assert ENDED not in found
+    assert LAWS in found
 
 
 @pytest.mark.arithmetic

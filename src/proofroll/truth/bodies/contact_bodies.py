@@ -407,7 +407,7 @@ class ContactBodies(ContactStretches):
         return min(normal / size_f, float(np.dot(acting.heading, solution.slide[k])) / size_s)
 
     def forces(self, state: Array, mode: ContactMode) -> tuple[Array, Array]:
-        """Contact forces [N], (contacts, 3), and wrenches on the bodies about their centres of mass, (bodies, 6)."""
+        """Forces and moments of contacts, and wrenches on the bodies; see :meth:`.ContactEquations.applied`."""
         bodies = self.equations.at(self.equations.equations.normalised(state), features_of(mode))
         return self.equations.applied(bodies, self.equations.accelerated(bodies, mode).force)
 

@@ -25,6 +25,7 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import (
     opposed_rates,
     standing,
     turning_frictions,
+    with_moments,
 )
 from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.dynamics.switches import HOLDING, STOPPED, switched_joints
@@ -341,7 +342,7 @@ class ContactEquations:
         )
 
     def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
-        """Forces of contacts between bodies, and wrenches on the bodies about their centres of mass, (bodies, 6)."""
+        """Forces and moments of contacts, (contacts, 6), and wrenches on bodies about centres of mass, (bodies, 6)."""
         moments = force[len(force) - len(self._turning) :]
         wrenches, force = np.zeros((len(self.mechanism.bodies) + 1, 6)), force[: len(self.pairs)]
         for pair, point, push in zip(self.pairs, state.touching, force, strict=False):
@@ -350,7 +351,7 @@ class ContactEquations:
         for friction, moment in zip(self._turning, moments, strict=True):
             for body, sign in zip(self.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
                 wrenches[body, 3:] += sign * moment
-        return force, wrenches[:-1]
+        return with_moments(force, self._turning, moments), wrenches[:-1]
 
     def rate(self, state: Array, mode: ContactMode) -> Array:
         """Time derivative of a state in a mode."""

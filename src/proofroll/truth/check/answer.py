@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,35 +17,54 @@ from proofroll.elements.mechanism.run.contacts.observables import follow_contact
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.truth.check.laws.answer import AnswerCheck
 from proofroll.truth.check.laws.integrals import of_quaternion
-from proofroll.truth.check.laws.record import Array, Modes, Pieces, PublishedEvent, PublishedValues
+from proofroll.truth.check.laws.record import Array, Modes, PublishedEvent, PublishedValues, stated
 from proofroll.truth.check.laws.tiles import Tiles
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from proofroll.core.columns import Columns
 
-def held_answer(element: MechanismElement, dataset: xr.Dataset, tiles: Tiles, asked: FloatArray) -> AnswerCheck:
-    """Check of a dataset, whose samples were asked for at these times [s], along the motion that was followed."""
+
+def held_answer(
+    element: MechanismElement, dataset: xr.Dataset, tiles: Tiles, asked: FloatArray, between: Columns | None = None
+) -> AnswerCheck:
+    """Check of a dataset along the motion that was followed.
+
+    Args:
+        element: whose truth it is.
+        dataset: published values.
+        tiles: poses and velocities of the motion.
+        asked: times of samples that were asked for [s].
+        between: the same variables in the middle of each stretch of the motion.
+    """
     mechanism = with_stops_at_start(element.mechanism)
     check = AnswerCheck(mechanism, element.length, element.speed / element.length)
     end, horizon = (float(dataset.attrs.get(name, np.inf)) for name in (ENDS, "horizon"))
+    published = _published(element, {str(name): np.asarray(item.values) for name, item in dataset.variables.items()})
+    bars = {str(name): float(item.attrs.get("error_bar", 0.0)) for name, item in dataset.data_vars.items()}
+    published = replace(published, bars=bars, changes=_changes(dataset))
+    rows = None
+    if between is not None:
+        rows = _published(element, {name: item.values for name, item in between.variables.items()})
+        rows = replace(rows, bars=bars, changes=published.changes)
     with np.errstate(all="ignore"):
-        check.take(_published(element, dataset), tiles, asked, end, horizon)
+        check.take(published, tiles, asked, end, horizon, rows)
     return check
 
 
-def _published(element: MechanismElement, dataset: xr.Dataset) -> PublishedValues:
-    """Values, forces and events of a dataset."""
+def _published(element: MechanismElement, values: Mapping[str, Array]) -> PublishedValues:
+    """Values and forces of variables, without bars and events."""
     m = element.mechanism
-    values = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
-    count, joints = len(values["time"]), len(m.joints)
+    count = len(values["time"])
 
     def along(field: str, names: list[str]) -> Array:
         columns = [values.get(f"{field}.{name}", np.zeros(count)) for name in names]
         return np.stack(columns, -1)[:, None] if columns else np.zeros((count, 1, 0))
 
-    def vectors(field: str, names: list[str]) -> Array:
-        rows = [np.stack([values[f"{field}.{name}.{axis}"] for axis in "xyz"], -1) for name in names]
+    def vectors(field: str, names: list[str], missing: float = np.nan) -> Array:
+        unknown = np.full(count, missing)
+        rows = [np.stack([values.get(f"{field}.{name}.{axis}", unknown) for axis in "xyz"], -1) for name in names]
         return np.stack(rows, 1)[:, None] if rows else np.zeros((count, 1, 0, 3))
 
     def world(of_bodies: Array, value: Array) -> Array:
@@ -55,8 +75,12 @@ def _published(element: MechanismElement, dataset: xr.Dataset) -> PublishedValue
     contacts, zero = [contact.name for contact in m.contacts], np.zeros(3)
     stop = along("stop", names)
     place, normal = _where_contacts_act(element, values)
-    pieces = Pieces(
-        time=values["time"][:, None],
+    moments = vectors("torque", contacts, missing=0.0)
+    about = np.sum(moments * normal[:, None], -1, keepdims=True) * normal[:, None]
+    pieces = stated(
+        m,
+        Modes(contacts=(), rolling=(), spinning=(), friction=(), stops=()),
+        values["time"][:, None],
         pace=np.ones((count, 1)),
         p=world(values["p_WB"], zero),
         R=world(of_quaternion(values["q_WB"]), np.eye(3)),
@@ -65,19 +89,22 @@ def _published(element: MechanismElement, dataset: xr.Dataset) -> PublishedValue
         effort=along("effort", [item.name for item in m.actuators]),
         coupling=along("coupling", [item.name for item in m.couplings]),
         drive=along("drive", names),
-        loop=np.concatenate([vectors(kind, connections[joints:]) for kind in ("force", "torque")], -1),
         friction=along("friction", names),
         # a force along the coordinate is that of the lower stop, one against it of the upper
         stops=np.stack([np.maximum(stop, 0.0), np.minimum(stop, 0.0)], -1),
         force=vectors("force", contacts),
         place=place[:, None],
         normal=normal[:, None],
-        rolling=_turning(m.contacts, count, "rolling_resistance"),
-        spinning=_turning(m.contacts, count, "spinning_friction"),
-        modes=Modes(contacts=(), rolling=(), spinning=(), friction=(), stops=()),
+        rolling=moments - about,
+        spinning=about,
     )
     reactions = np.concatenate([vectors(kind, connections) for kind in ("force", "torque")], -1)
-    changes = [
+    return PublishedValues(pieces=pieces, reactions=reactions, values=values, bars={}, changes=())
+
+
+def _changes(dataset: xr.Dataset) -> list[PublishedEvent]:
+    """Events of a dataset."""
+    return [
         PublishedEvent(
             name=event.name,
             time=event.time,
@@ -90,8 +117,6 @@ def _published(element: MechanismElement, dataset: xr.Dataset) -> PublishedValue
         )
         for event in events_of(dataset)
     ]
-    bars = {str(name): float(item.attrs.get("error_bar", 0.0)) for name, item in dataset.data_vars.items()}
-    return PublishedValues(pieces=pieces, reactions=reactions, values=values, bars=bars, changes=changes)
 
 
 def _where_contacts_act(element: MechanismElement, values: Mapping[str, Array]) -> tuple[Array, Array]:
@@ -102,9 +127,3 @@ def _where_contacts_act(element: MechanismElement, values: Mapping[str, Array]) 
     motion = (np.array(values[name], dtype=float) for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB"))
     followed = follow_contacts(Placed(m, *motion))
     return followed.place, followed.normal
-
-
-def _turning(contacts: tuple[object, ...], count: int, name: str) -> Array:
-    """Moments of contacts, (samples, 1, contacts, 3): NaN of those that have one."""
-    mask = np.array([bool(getattr(contact, name, 0.0)) for contact in contacts], dtype=bool).reshape(-1, 1)
-    return np.broadcast_to(np.where(mask, np.nan, 0.0), (count, 1, len(contacts), 3)).copy()

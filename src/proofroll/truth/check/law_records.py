@@ -1,31 +1,30 @@
-"""Records of the routes of a switching truth for the law check: states, forces and modes at points of their steps."""
+"""Record of a route of a switching truth for the checks: poses along its stretches, and both sides of transitions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.events import EventKind
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.modes import ContactMode, features_of
 from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
-from proofroll.elements.mechanism.dynamics.named_forces import named_forces
+from proofroll.elements.mechanism.dynamics.link_forces import working
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.contact_bodies import ContactBodies
-from proofroll.truth.check.law_states import stated_named
 from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES, of_quaternion
-from proofroll.truth.check.laws.record import Modes, Passage, Pieces
-from proofroll.truth.check.laws.tiles import Tiles, joined_tiles
+from proofroll.truth.check.laws.record import Modes, Passage, Pieces, stated
+from proofroll.truth.check.laws.tiles import Tiles
 from proofroll.truth.natural_units import Units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, states_inside
 from proofroll.truth.switching.contact_taylor import CompiledStretch
+from proofroll.truth.switching.held_route import HeldPath
 from proofroll.truth.switching.planar_slip import BegunSlip
 from proofroll.truth.switching.stopping_slip import StoppingSlip
 from proofroll.truth.tree.contact_tree import ContactTree
@@ -47,13 +46,14 @@ class _Piece(NamedTuple):
 
 
 class LawRecorder:
-    """Takes the record of one route for the law check, in SI units.
+    """Takes the record of one route for the checks, in SI units.
 
-    A record at a state is a flat array: of each body place, rotation by rows, velocity, angular velocity; of each
-    contact force, place, normal; efforts, drives, couplings; force and moment of each loop. Compiled modes give it by
-    :func:`.stated_symbols`; ``state_of`` gives it at a state in a mode, in numbers.
+    A compiled mode records at a state, by :func:`.stated_symbols`: of each body place, rotation by rows, velocity,
+    angular velocity; then the forces of drives. Other modes have both in numbers.
 
     Attributes:
+        path: in natural units.
+        held: held values along it; None: there are none.
         second: natural unit of time [s].
     """
 
@@ -62,56 +62,52 @@ class LawRecorder:
         mechanism: Mechanism,
         units: Units,
         route: ContactTree | ContactBodies,
-        state_of: Callable[[Array, ContactMode], Array],
+        path: HybridPath[Stretch[ContactMode]],
+        held_path: HeldPath | None,
+        named_at: Callable[[Array, ContactMode], Array],
     ) -> None:
-        self._mechanism, self._units, self._route, self._state_of = mechanism, units, route, state_of
-        self.second = units.time
-        named, moment = named_forces(mechanism), units.force * units.length
-        self._named_units = stated_named(
-            mechanism, np.array([units.force if item.unit == "N" else moment for item in named])
+        """Takes a mechanism in SI units; ``named_at``: named forces at a state of the route in a mode."""
+        self._mechanism, self._units, self._route, self._named_at = mechanism, units, route, named_at
+        self.path, self.held, self.second = path, held_path, units.time
+        self._moment = units.force * units.length
+        self._drives = [number for number, _ in working(mechanism)]
+        self._drive_units = np.array(
+            [units.force if item.unit == "N" else self._moment for _, item in working(mechanism)]
         )
 
-    def pieces(self, stretch: Stretch[ContactMode], *, numeric: bool) -> list[Pieces]:
-        """Pieces of a stretch: of steps and of dense output apart; ``numeric``: those with forces in numbers, too."""
-        numeric = numeric or isinstance(stretch, BegunSlip | StoppingSlip)  # a few pieces that no sample may lie on
-        cut, stated = [piece for piece in self._cut(stretch) if numeric or piece.record is not None], []
-        for coarse in (False, True):
-            pieces = [piece for piece in cut if piece.coarse is coarse]
-            if pieces:
-                records = [
-                    self._route.in_stretch(stretch, partial(self._in_numbers, stretch, piece.states))
-                    if piece.record is None
-                    else piece.record
-                    for piece in pieces
-                ]
-                time, pace = (np.array([getattr(piece, name) for piece in pieces]) for name in ("time", "pace"))
-                stated.append(self._stated(time, pace, np.array(records), stretch.mode, coarse=coarse))
-        return stated
-
-    def tiles(self, number: int, stretch: Stretch[ContactMode], pieces: Sequence[Pieces] | None) -> Tiles | None:
-        """Poses and velocities in all pieces of the stretch of a number; None: it has none.
-
-        ``pieces``: of :meth:`pieces`, which are all of a compiled stretch; None: not known.
-        """
-        if isinstance(stretch, CompiledStretch) and stretch.by is not None:
-            parts = self.pieces(stretch, numeric=False) if pieces is None else pieces
-            return joined_tiles([Tiles.of(part, number) for part in parts]) if parts else None
-        cut = list(self._cut(stretch, whole=True))
+    def tiles(self, number: int, *, drives: bool = False) -> Tiles | None:
+        """Poses and velocities in all pieces of a stretch, and forces of ``drives``; None: there are none."""
+        stretch = self.path.stretches[number]
+        cut = list(self._cut(stretch))
         if not cut:
             return None
         time, pace = (np.array([getattr(piece, name) for piece in cut]) for name in ("time", "pace"))
-        moving = self._moving(self._poses(np.concatenate([piece.states for piece in cut])).reshape(*time.shape, -1, 18))
+        begun = float(stretch.line[-1]) if isinstance(stretch, StoppingSlip) else stretch.start
+        wide, resolved = 18 * len(self._mechanism.bodies), time.mean(1) > begun
+        states = np.concatenate([piece.states for piece in cut])
+        record = [piece.record for piece in cut if piece.record is not None]
+        poses = np.concatenate(record)[:, :wide] if record else self._poses(states)
+        forces = np.zeros((len(states), 0))
+        if drives and resolved.all():
+            forces = np.concatenate(record)[:, wide:] if record else self._forces_of_drives(stretch, states)
         return Tiles(
             time=time * self._units.time,
             pace=pace * self._units.time,
-            p=moving["p"],
-            R=moving["R"],
-            v=moving["v"],
-            w=moving["w"],
+            **self._moving(poses.reshape(*time.shape, -1, 18)),
             stretch=np.full(len(time), number),
             modes=(self._modes(stretch.mode),) * len(time),
             coarse=any(piece.coarse for piece in cut),
-            resolved=np.full(len(time), not isinstance(stretch, StoppingSlip)),
+            resolved=resolved,
+            drives=forces.reshape(*time.shape, -1) * (self._drive_units if forces.size else 1.0),
+        )
+
+    def _forces_of_drives(self, stretch: Stretch[ContactMode], states: Array) -> Array:
+        """Forces of drives at states of a stretch, (states, drives), in natural units."""
+        acting = self._route.acting
+        return np.array(
+            self._route.in_stretch(
+                stretch, lambda: [self._named_at(state, acting(stretch, state))[self._drives] for state in states]
+            )
         )
 
     def _poses(self, states: Array) -> Array:
@@ -135,98 +131,45 @@ class LawRecorder:
             "w": of_bodies[..., 15:] / self._units.time,
         }
 
-    def start(self, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Pieces:
-        """First point of a stretch with these pieces, as exact as its steps."""
-        if pieces and self._reaches(pieces[0], 0, stretch.start):
-            return pieces[0].points(0, 0)
-        return self._at(stretch, stretch.start, stretch.first)
+    def ending(self, stretch: Stretch[ContactMode]) -> Pieces:
+        """End of a stretch, with all forces of contacts, stops and dry friction."""
+        mode, m, count = self._route.acting(stretch, stretch.last), self._mechanism, len(self._mechanism.contacts)
+        touching, forces = self._route.in_stretch(stretch, lambda: self._route.borne(stretch.last, mode))
+        fields, units = self._point(stretch.end, stretch.last), self._units
+        pieces = stated(m, self._modes(mode), **fields)
+        for contact, force in zip(self._route.contacts, forces, strict=True):
+            if isinstance(contact, TurningFriction):
+                moments = pieces.spinning if contact.spins else pieces.rolling
+                moments[0, 0, contact.pressed_by] = force * self._moment
+            elif isinstance(contact, JointContact):
+                joint = contact.joint.number
+                unit = units.force if m.joints[joint].kind == JointKind.PRISMATIC else self._moment
+                along = pieces.stops[0, 0, joint] if contact.side else pieces.friction[0, 0, joint : joint + 1]
+                along[1 if contact.side < 0 else 0] = unit * float(force @ contact.direction)
+        pieces.force[0, 0] = forces[:count] * units.force
+        for k, touch in enumerate(touching[:count]):
+            pieces.place[0, 0, k], pieces.normal[0, 0, k] = touch.place * units.length, touch.normal
+        return pieces
 
-    def end(self, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Pieces:
-        """Last point of a stretch with these pieces, as exact as its steps."""
-        if pieces and self._reaches(pieces[-1], -1, stretch.end):
-            return pieces[-1].points(-1, -1)
-        return self._at(stretch, stretch.end, stretch.last)
-
-    def _reaches(self, pieces: Pieces, point: int, time: float) -> bool:
-        """True if exact pieces begin or end at a time, but for its last digits: not where a slip fades away behind."""
-        apart = abs(float(pieces.time[point, point]) / self._units.time - time)
-        return not pieces.coarse and apart <= 4 * float(np.spacing(time))
-
-    def _at(self, stretch: Stretch[ContactMode], time: float, state: Array) -> Pieces:
-        record = self._route.in_stretch(stretch, partial(self._in_numbers, stretch, state[None]))
-        mode = self._route.acting(stretch, state)
-        return self._stated(np.full((1, 1), time), np.zeros((1, 1)), record[None], mode)
-
-    def _in_numbers(self, stretch: Stretch[ContactMode], states: Array) -> Array:
-        """Record of a stretch at states, (states, values)."""
-        return np.array([self._state_of(state, self._route.acting(stretch, state)) for state in states])
-
-    @staticmethod
-    def passage(path: HybridPath[Stretch[ContactMode]], number: int, before: Pieces, after: Pieces) -> Passage:
-        """Transition to a stretch of a path, from the end of the one before."""
-        sooner, later = path.stretches[number - 1], path.stretches[number]
-        change = path.transitions[number] if number < len(path.transitions) else None
+    def passage(self, number: int, ending: Pieces) -> Passage:
+        """Transition to a stretch, from the end of the one before."""
+        sooner, later = self.path.stretches[number - 1 : number + 1]
+        change = self.path.transitions[number] if number < len(self.path.transitions) else None
         happenings = () if change is None else change.happenings
         border = features_of(sooner.mode) != features_of(later.mode)
+        modes = self._modes(self._route.acting(later, later.first))
         return Passage(
-            before=before,
-            after=after,
+            before=ending,
+            after=stated(self._mechanism, modes, **self._point(later.start, later.first)),
             impacts=frozenset(name for kind, name in happenings if kind == EventKind.IMPACT),
             settles=frozenset(name for kind, name in happenings if kind == EventKind.SETTLE),
             decided=sooner.guard is not None and not border,
         )
 
-    def _stated(self, time: Array, pace: Array, record: Array, mode: ContactMode, *, coarse: bool = False) -> Pieces:
-        """Pieces from records (pieces, points, values)."""
-        m, units, shape, contacts = self._mechanism, self._units, time.shape, self._route.contacts
-        count, joints, bodies = len(m.contacts), len(m.joints), len(m.bodies)
-        sizes = [18 * bodies, 9 * len(contacts), len(m.actuators), len(m.prescribed), len(m.couplings)]
-        of_bodies, of_contacts, effort, drives, coupling, loops = np.split(record, np.cumsum(sizes), -1)
-        in_named = np.split(self._named_units, np.cumsum(sizes[2:4]))
-        of_bodies, of_contacts = of_bodies.reshape(*shape, bodies, 18), of_contacts.reshape(*shape, -1, 9)
-        length, force, moment = units.length, units.force, units.force * units.length
-        moving, forces = self._moving(of_bodies), of_contacts[..., :3]
-        drive = np.zeros((*shape, joints))
-        for k, (joint, _, _) in enumerate(m.prescribed):
-            drive[..., m.joint_index[joint.name]] = drives[..., k] * in_named[1][k]
-        friction, stops = np.zeros((*shape, joints)), np.zeros((*shape, joints, 2))
-        turning = {spins: np.zeros((*shape, count, 3)) for spins in (False, True)}
-        for k, contact in enumerate(contacts[count:], count):
-            if isinstance(contact, TurningFriction):
-                turning[contact.spins][..., contact.pressed_by, :] = forces[..., k, :] * moment
-                continue
-            assert isinstance(contact, JointContact)  # the only other kind
-            number = contact.joint.number
-            push = (
-                forces[..., k, :]
-                @ contact.direction
-                * (force if m.joints[number].kind == JointKind.PRISMATIC else moment)
-            )
-            if contact.side:
-                stops[..., number, 0 if contact.side > 0 else 1] = push
-            else:
-                friction[..., number] = push
-        return Pieces(
-            time=time * units.time,
-            pace=pace * units.time,
-            p=moving["p"],
-            R=moving["R"],
-            v=moving["v"],
-            w=moving["w"],
-            effort=effort * in_named[0],
-            coupling=coupling * in_named[2],
-            drive=drive,
-            loop=loops.reshape(*shape, len(m.loops), 6) * np.repeat([force, moment], 3),
-            friction=friction,
-            stops=stops,
-            force=forces[..., :count, :] * force,
-            place=of_contacts[..., :count, 3:6] * length,
-            normal=of_contacts[..., :count, 6:],
-            rolling=turning[False],
-            spinning=turning[True],
-            modes=self._modes(mode),
-            coarse=coarse,
-        )
+    def _point(self, time: float, state: Array) -> dict[str, Array]:
+        """Poses and velocities at a state, as those of a piece of one point."""
+        moving = self._moving(self._poses(state[None]).reshape(1, 1, -1, 18))
+        return {"time": np.full((1, 1), time * self._units.time), "pace": np.zeros((1, 1)), **moving}
 
     def _modes(self, mode: ContactMode) -> Modes:
         """Modes by their places in the record."""
@@ -249,18 +192,14 @@ class LawRecorder:
             stops=tuple((low, high) for low, high in stops),
         )
 
-    def _cut(self, stretch: Stretch[ContactMode], *, whole: bool = False) -> Iterator[_Piece]:
-        """Pieces of a stretch; ``whole``: with the steps before the line of a slip that stops."""
+    def _cut(self, stretch: Stretch[ContactMode]) -> Iterator[_Piece]:
+        """Pieces of a stretch."""
         if isinstance(stretch, BegunSlip):
             edges = np.linspace(stretch.start, stretch.end, _PARTS + 1)
             for start, end in pairwise(edges):
-                yield from self._parts(
-                    start, end, lambda times: stretch.at(times).T, stretch.recorded if stretch.compiled else None
-                )
+                yield from self._parts(start, end, lambda times: stretch.at(times).T, None)
         elif isinstance(stretch, StoppingSlip):
-            # In the steps before its line, a slip has a direction by round-off alone
-            begins = [stretch.start, *(step.time for step in stretch.steps)] if whole else [float(stretch.line[-1])]
-            for start, end in pairwise([*begins, stretch.end]):
+            for start, end in pairwise([stretch.start, *(step.time for step in stretch.steps), stretch.end]):
                 if end > start:
                     yield from self._parts(start, end, lambda times: stretch.at(times).T, None)
         elif isinstance(stretch, CompiledStretch) and stretch.by is not None:
@@ -284,25 +223,15 @@ class LawRecorder:
         """True if points do not resolve the states, (state, points), and turns of a piece, which takes a ``span``."""
         if _unresolved(states):
             return True
-        if record is not None and len(record):
-            moving = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, len(POINTS))
-            turning, spins = moving[:, 3:12], moving[:, 15:]
-        else:
-            turning, spins = self._turns(states)
-        if float(np.abs(spins).max(initial=0.0)) * span > _TURN:
-            return True
         # no state has a prescribed motion, which may turn bodies as no polynomial of the points does
-        return bool(self._mechanism.prescribed) and _unresolved(turning.reshape(-1, len(POINTS)))
-
-    def _turns(self, states: Array) -> tuple[Array, Array]:
-        """Rotations and angular velocities of the bodies [rad/s] at states of a piece, (state, points).
-
-        Where no motion is prescribed, which no state contains, those at both ends suffice.
-        """
-        rows = states.T if self._mechanism.prescribed else states.T[[0, -1]]
-        poses = [self._route.bodies(y) for y in rows]
-        turning = np.array([Rotation.from_quat(pose[2], scalar_first=True).as_matrix() for pose in poses]).T
-        return turning, np.array([pose[3] for pose in poses])
+        prescribed = bool(self._mechanism.prescribed)
+        if record is None or not len(record):
+            record = self._poses(states.T if prescribed else states.T[[0, -1]]).T
+        moving = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, record.shape[1])
+        turning, spins = moving[:, 3:12], moving[:, 15:]
+        # an angle whose rate changes needs more points
+        fastest = np.abs(spins).max(initial=0.0) + np.ptp(spins, axis=-1).max(initial=0.0)
+        return bool(fastest * span > _TURN) or (prescribed and _unresolved(turning.reshape(-1, len(POINTS))))
 
     def _parts(
         self,

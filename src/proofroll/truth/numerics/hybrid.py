@@ -120,6 +120,11 @@ class Stretch(Generic[ModeT]):
     dense: Sequence[DenseStep] = ()
     exact: bool = False
 
+    @property
+    def middle(self) -> float:
+        """Time in the middle of its last part [s]."""
+        return (self.start + self.end) / 2
+
 
 def states_inside(steps: Sequence[DenseStep], times: FloatArray) -> FloatArray:
     """States at rising times [s] within successive steps, (state, times)."""

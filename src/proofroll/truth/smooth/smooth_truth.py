@@ -32,6 +32,7 @@ from proofroll.truth.check.held_to_laws import of_bodies, of_tree, tiles_of
 from proofroll.truth.early_end import EarlyEnd
 from proofroll.truth.error_bars import (
     NUDGE,
+    Routed,
     TwoRouteMotion,
     check_start,
     differences_of,
@@ -163,12 +164,10 @@ class _SmoothTruth:
         motion = two_route_motion(
             self._mechanism,
             paths,
-            best,
-            by_tree,
+            (Routed(best, works), Routed(by_tree, works)),
             names,
             TwoRouteMotion.reason,
             units,
-            (works, works),
             unresolved=unresolved,
             left=left,
             chaotic_from=float(self._seconds[late[0]]) if len(late) else np.inf,
@@ -205,12 +204,10 @@ class _SmoothTruth:
         motion = two_route_motion(
             self._mechanism,
             (path, path),
-            exact,
-            witness,
+            (Routed(exact, unknown), Routed(witness, unknown)),
             (f"closed form: {form.title}", "joint coordinates, RK4"),
             TwoRouteMotion.reason,
             self._units,
-            (unknown, unknown),
             left=dict.fromkeys(_apart_in_fields(self._mechanism, exact, exact), np.zeros(count)),
         )
         tiles = tiles_of(of_tree(self._mechanism, self._units, self._tree, path), self._until)

@@ -8,11 +8,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.modes import FAINT, REST, Acting, ContactMode
-from proofroll.elements.mechanism.contact.touching import FLAT
+from proofroll.elements.mechanism.contact.touching import FLAT, Moving
+from proofroll.elements.mechanism.contact.touching import touch as touch_at
 from proofroll.elements.mechanism.scene.kinks import Sides
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.shapes.features import Border
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
+from proofroll.elements.mechanism.scene.shapes.shapes import CircleShape, EllipsoidShape, HalfSpace, SphereShape
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
 from proofroll.truth.numerics.scalars import Scalar, add, dot, is_zero, minus, mul, scaled, sub
 from proofroll.truth.switching.contact_guards import (
     LEAST_RESPONSE,
@@ -21,11 +29,60 @@ from proofroll.truth.switching.contact_guards import (
     ContactGuard,
     Touchable,
 )
-from proofroll.truth.switching.contact_scalars import ScalarTouch, floats
 
 Vector = Sequence[Scalar]
 _MOST_VELOCITIES = 10  # of one tree whose modes are compiled: 8 take a quarter of a second, 12 take eight seconds
 _NONE = (0.0, 0.0, 0.0)
+
+
+class ScalarTouch(NamedTuple):
+    """A contact at one instant, with plain zeros and ones; see :class:`.Touching`."""
+
+    gap: Scalar
+    normal: Vector
+    normal_rate: Vector
+    place: Vector
+    place_rate: Vector
+    slide: Vector
+    tilt: Scalar = 1.0
+    borders: Sequence[Border] = ()
+
+    def across(self, vector: Vector) -> list[Scalar]:
+        """Part of a vector along the surfaces."""
+        return minus(vector, scaled(dot(self.normal, vector), self.normal))
+
+
+def scalar_motion(p: Vector, R: Sequence[Vector], v: Vector, w: Vector) -> Moving:
+    """Motion of a body: place of its frame, rotation by rows, velocity of the origin, angular velocity; world axes."""
+    return Moving(*(np.array(part, dtype=object) for part in (p, R, v, w)))
+
+
+def touch_in_scalars(contact: BodyContact, a: Moving, b: Moving, feature: int) -> ScalarTouch:
+    """Contact at given motions of its bodies; ``feature``: of solids."""
+    touching = touch_at(contact, a, b, feature)
+    return ScalarTouch(
+        gap=touching.gap,
+        normal=touching.normal.tolist(),
+        normal_rate=touching.normal_rate.tolist(),
+        place=touching.place.tolist(),
+        place_rate=touching.place_rate.tolist(),
+        slide=touching.slide.tolist(),
+        tilt=touching.tilt,
+        borders=touching.borders,
+    )
+
+
+def floats(vector: Array) -> list[float]:
+    """Components as plain floats, so that zeros and ones fold."""
+    return [float(x) for x in vector]
+
+
+def known_shapes(contact: BodyContact) -> bool:
+    """True if both shapes have a rule for symbols."""
+    rules = SphereShape | EllipsoidShape | CircleShape | HalfSpace | CurvedWall
+    shapes = contact.shape_a, contact.shape_b
+    simple = all(isinstance(shape, rules) and getattr(shape, "has_formula", True) for shape in shapes)
+    return simple or contact.features is not None
 
 
 def worth_compiling(mechanism: Mechanism) -> bool:
@@ -194,24 +251,12 @@ def led_symbols(mode: ContactMode, solved: SolvedSymbols) -> list[Scalar]:
     return symbols
 
 
-def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
-    """Record of the law check at a state: poses, then forces of all contacts with places and normals, efforts, drives.
-
-    Empty: the route has no rule for a force.
-    """
+def stated_symbols(solved: SolvedSymbols) -> list[Scalar]:
+    """Record of the checks at a state: poses, then efforts and drives; empty: the route has no rule for a drive."""
     if solved.drives is None:
         return []
-    symbols: list[Scalar] = []
-    for p, R, v, w in solved.poses:
-        symbols += [*p, *(entry for row in R for entry in row), *v, *w]
-    for acting, contact, touch, line, force in zip(
-        mode, contacts, solved.touching, solved.lines, solved.forces, strict=True
-    ):
-        rubs = acting.kind == "slip" and contact.bound
-        rubbing = force if not rubs or line is None else scaled(-float(contact.bound), line)
-        location = (*touch.place, *touch.normal) if contact.pressed_by is None else (*_NONE, *_NONE)
-        symbols += [*(rubbing or _NONE), *location]
-    return [*symbols, *solved.efforts, *solved.drives]
+    poses = [entry for p, R, v, w in solved.poses for part in (p, *R, v, w) for entry in part]
+    return [*poses, *solved.efforts, *solved.drives]
 
 
 def turning_slip(acting: Acting, contact: Touchable) -> bool:

@@ -174,7 +174,7 @@ class CompiledMode:
             number for number, guard in enumerate(conditions) if guard.kind == "flat" and guard.contact in tips
         }
         guards = [*guard_symbols(conditions, contacts, solved, began, functions), *solved.within_limits]
-        stated, led = stated_symbols(mode, contacts, solved), led_symbols(mode, solved)
+        stated, led = stated_symbols(solved), led_symbols(mode, solved)
         values = [*guards, *slips, *led, *stated, *solved.rates, 1.0]
         self._stated, self._first_rate = len(stated), len(guards) + len(slips) + len(led) + len(stated)
         self._by_collocation = by_collocation
@@ -247,7 +247,6 @@ class CompiledMode:
                 slides=slides,
                 slide_rates=slide_rates,
                 guards=values[: self._count].T,
-                record=values[self._first_rate - self._stated : self._first_rate],
             )
 
         return led

@@ -45,6 +45,7 @@ from proofroll.truth.switching.contact_guards import (
     ContactGuard,
     SolvedContacts,
     Touchable,
+    borne_forces,
     faint_time,
     guard_value,
     guards_of,
@@ -140,6 +141,11 @@ class ContactWalks(ABC):
     @abstractmethod
     def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
         """Motion and forces at a state."""
+
+    def borne(self, state: Array, mode: ContactMode) -> tuple[Sequence[Touching], Array]:
+        """Geometry of all contacts at a state in a mode, and forces that they can bear, (contacts, 3)."""
+        solved = self._solution(state, mode)
+        return solved.touching, borne_forces(self.contacts, solved.touching, solved)
 
     @abstractmethod
     def _touching(self, state: Array, features: Features | None) -> Sequence[Touching]:

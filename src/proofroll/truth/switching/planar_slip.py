@@ -53,7 +53,6 @@ class LedValues(NamedTuple):
         slides: its velocities, (states, 3).
         slide_rates: rates of these, (states, 3).
         guards: (states, guards); empty: not compiled.
-        record: of the law check, (values, states); empty: not compiled.
     """
 
     rates: Array
@@ -61,7 +60,6 @@ class LedValues(NamedTuple):
     slides: Array
     slide_rates: Array
     guards: Array = _EMPTY
-    record: Array = _EMPTY
 
 
 # Values at states (states, state) with directions (states, 3) against which friction of all that leads acts.
@@ -98,11 +96,6 @@ class BegunSlip(Stretch[ContactMode]):
     def directions_at(self, times: Array) -> Array:
         """Directions against which friction acts at times [s], (times, 3)."""
         return self._of(self.ways, times)
-
-    def recorded(self, states: Array) -> tuple[Array, Array]:
-        """Record of the law check at states (state, places) of a compiled mode, and the rate of time, which is 1."""
-        assert self.compiled is not None  # else nothing is recorded
-        return self.compiled(states.T, self.directions_at(states[-1])).record, np.ones(states.shape[1])
 
 
 class _Nodes:

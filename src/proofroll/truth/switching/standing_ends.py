@@ -55,32 +55,42 @@ class StandingEnds:
         """Motion with the contacts of the mechanism with cylinders: forces of an end are the sum over its corners."""
         assert motion.pressed is not None  # of a mechanism with contacts
         assert motion.sums is not None
-        order, pressed = list(shared_pairs(self.mechanism.contacts)), []
-        for part in self.parts:
-            forces = motion.pressed[:, list(part)].sum(axis=1)
-            if len(part) > 1:
-                pair = self.mechanism.contacts[part[0]].pair
-                others = [k for k in shared_pairs(self.mechanism.contacts)[pair] if k not in part]
-                rest = motion.sums[:, order.index(pair)] - motion.pressed[:, others].sum(axis=1)
-                forces = np.where(np.isnan(forces), rest, forces)
-            pressed.append(forces)
-        contacts, count = self.mechanism.contacts, len(contact_sums(self.mechanism.contacts))
-        corners = [contacts[k] for part in self.parts if len(part) > 1 for k in part]
-        stands = {body for contact in corners for body in (contact.body_a, contact.body_b)}
-        kept = [count + k for k, body in enumerate(turned_bodies(contacts)) if body not in stands]
         bars = dict(motion.bars)
         bars["pressed"] = bars["sums"] + _CORNERS / 2 * bars["pressed"]
+        pressed, sums = self._of_ends(motion.pressed, motion.sums)
+        between = motion.between
+        if between is not None and between.pressed is not None and between.sums is not None:
+            borne, summed = self._of_ends(between.pressed, between.sums)
+            between = between._replace(pressed=borne, sums=summed)
         return replace(
             motion,
             bars=bars,
             tiles=None if motion.tiles is None else motion.tiles.of_contacts(self.parts),
-            pressed=np.stack(pressed, axis=1),
-            sums=motion.sums[:, [*range(count), *kept]],
+            between=between,
+            pressed=pressed,
+            sums=sums,
             events=self._once(motion.events),
             bounces=self._once(motion.bounces),
             reason=self._told(motion.reason),
             ended=self._told(motion.ended),
         )
+
+    def _of_ends(self, pressed: Array, sums: Array) -> tuple[Array, Array]:
+        """Forces and moments of contacts, and sums of the forces, with those of ends for those of corners."""
+        contacts, of_ends = self.mechanism.contacts, list[Array]()
+        order, count = list(shared_pairs(contacts)), len(contact_sums(contacts))
+        for part in self.parts:
+            borne = pressed[:, list(part)].sum(axis=1)
+            if len(part) > 1:
+                pair = contacts[part[0]].pair
+                others = [k for k in shared_pairs(contacts)[pair] if k not in part]
+                rest = sums[:, order.index(pair)] - pressed[:, others, :3].sum(axis=1)
+                borne[:, :3] = np.where(np.isnan(borne[:, :3]), rest, borne[:, :3])
+            of_ends.append(borne)
+        corners = [contacts[k] for part in self.parts if len(part) > 1 for k in part]
+        stands = {body for contact in corners for body in (contact.body_a, contact.body_b)}
+        kept = [count + k for k, body in enumerate(turned_bodies(contacts)) if body not in stands]
+        return np.stack(of_ends, axis=1), sums[:, [*range(count), *kept]]
 
     def _once(self, items: Sequence[Any]) -> tuple[Any, ...]:
         """Events or bounces by the names of ends, one of those of all corners of an end."""

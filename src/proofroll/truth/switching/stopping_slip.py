@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.elements.mechanism.contact.modes import ROUND_OFF, ContactMode
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -45,6 +46,11 @@ class StoppingSlip(Stretch[ContactMode]):
     steps: Sequence[_Step] = ()
     line: Any = None
     begun: Any = None
+
+    @property
+    @override
+    def middle(self) -> float:
+        return (float(self.line[-1]) + self.end) / 2
 
     def at(self, times: Array) -> Array:
         """States at times [s] within it, shape (times, state)."""

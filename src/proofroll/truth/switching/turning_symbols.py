@@ -9,7 +9,7 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFrictio
 from proofroll.truth.numerics.elimination import Row
 from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, minus, plus, scaled
 from proofroll.truth.switching.contact_guards import Touchable
-from proofroll.truth.switching.contact_scalars import ScalarTouch
+from proofroll.truth.switching.contact_symbols import ScalarTouch
 
 Vector = Sequence[Scalar]
 _NONE = (0.0, 0.0, 0.0)

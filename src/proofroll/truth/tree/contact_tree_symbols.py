@@ -31,20 +31,18 @@ from proofroll.truth.numerics.scalars import (
     turned,
     turned_back,
 )
-from proofroll.truth.switching.contact_scalars import (
-    ScalarTouch,
-    floats,
-    known_shapes,
-    scalar_motion,
-    touch_in_scalars,
-)
 from proofroll.truth.switching.contact_symbols import (
+    ScalarTouch,
     SolvedSymbols,
     Vector,
+    floats,
     kink_guards,
+    known_shapes,
     limited,
     of_joint,
     rows_of,
+    scalar_motion,
+    touch_in_scalars,
     worth_compiling,
 )
 from proofroll.truth.switching.turning_symbols import TurningMoments, of_turning, opposed_rates, resisted, resisted_rate

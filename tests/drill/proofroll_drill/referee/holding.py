@@ -154,7 +154,7 @@ def hold_contacts(seed: int) -> Held:
         "v_WB": (record.v_WB, [one["v_WB"] for one in seen]),
         "w_WB": (record.w_WB, [one["w_WB"] for one in seen]),
         "q_WB": (record.placed(mechanism).R_WB[:, :-1] / 4, [one["R_WB"] / 4 for one in seen]),
-        "pressed": (found.pressed, [one["pressed"] for one in seen]),
+        "pressed": ([] if found.pressed is None else found.pressed[..., :3], [one["pressed"] for one in seen]),
         "wrench": (record.wrench, [one["wrench"] for one in seen]),
     }
     for name, (given, true) in pairs.items():

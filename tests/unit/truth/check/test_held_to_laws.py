@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from proofroll.core.columns import Columns
-from proofroll.core.dataset import LAWS, truth_message
+from proofroll.core.dataset import ENDED, ENDS, LAWS, truth_message
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.dynamics.held_signals import Commands
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.control import Control
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.truth.plug_in import MechanismTruth
 from proofroll.truth.smooth import smooth_truth
 from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll_drill.law_faults import FAULTS, SCENES, planted
@@ -42,14 +44,15 @@ def test_a_fault_from_the_start_is_refused() -> None:
     """A truth of which nothing is known has no values."""
     ball, until = SCENES["grip"]
     with planted(_BY_WORDS["gravity"]), pytest.raises(Refused, match="please report it"):
-        truth_of(ball(), np.linspace(0.0, until, 3))
+        MechanismTruth.truth(MechanismElement(ball()), np.linspace(0.0, until, 3), ())
 
 
 def test_a_truth_says_that_it_holds_all_laws() -> None:
     """The motion and the line of a run have the outcome."""
     ball, until = SCENES["grip"]
-    laws = truth_of(ball(), np.linspace(0.0, until / 2, 3)).laws
-    assert laws.startswith("holds 11 laws at ")
+    laws = MechanismTruth.truth(MechanismElement(ball()), np.linspace(0.0, until, 3), ()).attrs[LAWS]
+    assert laws.startswith("holds 5 laws on both sides of 2 events; ")
+    assert laws.endswith("laws at 3 of 3 samples and in the middle of 3 stretches")
     line = truth_message(Columns({}, {"route": "one", "second_route": "two", LAWS: laws}))
     assert line == f"one, checked by two; {laws}"
 
@@ -66,17 +69,17 @@ def held_servo(held: str, delay: int) -> Mechanism:
 @pytest.mark.parametrize(("held", "delay"), [("target", 1), ("effort", 0)])
 def test_what_a_controller_sets_follows_its_law(held: str, delay: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values that are held between instants are those of the formula at the instant; a fault of a millionth is seen."""
-    times = np.linspace(0.0, 0.11, 3)
-    assert truth_of(held_servo(held, delay), times).laws
+    times, element = np.linspace(0.0, 0.11, 3), MechanismElement(held_servo(held, delay))
+    assert LAWS in MechanismTruth.truth(element, times, ()).attrs
     commanded = Commands._commanded
 
     def faulty(self: Any, time: float, sample: Any) -> Any:
         return commanded(self, time, sample) * (1.0 + 1e-6 * (time > 0.05))
 
     monkeypatch.setattr(Commands, "_commanded", faulty)
-    motion = truth_of(held_servo(held, delay), times)
-    assert motion.end == pytest.approx(0.06, abs=1e-3)
-    assert "effort = law of the actuator" in motion.ended
+    attributes = MechanismTruth.truth(element, times, ()).attrs
+    assert attributes[ENDS] == pytest.approx(0.07, abs=1e-3)  # in the middle of the interval that begins at 0.06 s
+    assert "effort = law of the actuator" in attributes[ENDED]
 
 
 def test_the_bars_hold_what_a_closed_form_misses(monkeypatch: pytest.MonkeyPatch) -> None:

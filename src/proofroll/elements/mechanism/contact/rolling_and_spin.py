@@ -139,6 +139,14 @@ def turning_frictions(contacts: Sequence[BodyContact]) -> tuple[TurningFriction,
     return tuple(laws)
 
 
+def with_moments(forces: Array, frictions: Sequence[TurningFriction], moments: Array) -> Array:
+    """Forces of contacts [N], (contacts, 3), and the sum of the moments of their frictions [N m], (contacts, 6)."""
+    borne = np.concatenate([forces, np.zeros_like(forces)], axis=1)
+    for friction, moment in zip(frictions, moments, strict=True):
+        borne[friction.pressed_by, 3:] += moment
+    return borne
+
+
 def opposed_rates(contacts: Sequence[Any], touching: Sequence[Touching], rates: Array) -> Array:
     """Rates of all slides, (contacts, 3), from these and the rates of turning that friction resists."""
     for k, contact in enumerate(contacts):

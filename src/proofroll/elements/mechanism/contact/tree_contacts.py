@@ -46,6 +46,7 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import (
     pressed_by,
     standing,
     turning_frictions,
+    with_moments,
 )
 from proofroll.elements.mechanism.contact.sequences import groups_of, left_by, ordered, refuse_spread, sequences
 from proofroll.elements.mechanism.contact.slide_rows import slide_row, turning_row
@@ -409,10 +410,10 @@ class ContactDynamics:
                     raise guided(self.mechanism.contacts[k].name, time)
 
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array, Array]:
-        """Fields of a record at one time [s], contact forces between bodies, and their sums.
+        """Fields of a record at one time [s], forces and moments of contacts between bodies, and sums of the forces.
 
-        Forces [N], (contacts, 3), and the :func:`contact_sums` [N] with the :func:`contact_moments` [N m], (sums, 3),
-        are NaN where they are not determinate.
+        Forces [N] and moments against turning [N m], (contacts, 6), and the :func:`contact_sums` [N] with the
+        :func:`contact_moments` [N m], (sums, 3), are NaN where they are not determinate.
         """
         solution, count = self.solve(q, v, mode, time), len(self._bodies)
         joints = mode_of_joints(self.equations.switched, self.contacts, mode)
@@ -438,7 +439,8 @@ class ContactDynamics:
 
         moved = np.abs(summed(np.moveaxis(solution.undetermined, 2, 0))).max(axis=0, initial=0.0)
         sums = np.where(moved <= RANK, summed(pressed), np.nan)
-        return fields, np.where(solution.determinate[:count], pressed, np.nan), sums
+        known = np.where(solution.determinate, solution.force, np.nan)
+        return fields, with_moments(known[:count], self.turning, known[count + len(self._of_joints) :]), sums
 
     def _borne(self, state: ContactsNow, shift: Array) -> Array:
         """Part of a change of all forces, (contacts, 3), that friction against turning can bear about its axes."""

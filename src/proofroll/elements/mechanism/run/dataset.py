@@ -136,6 +136,7 @@ def columns(
     sums: FloatArray | None = None,
     unsaid: str = UNSAID,
     work: FloatArray | None = None,
+    moments: FloatArray | None = None,
 ) -> Columns:
     """Variables of a run, from the motion of the bodies and the forces and moments on them.
 
@@ -143,7 +144,7 @@ def columns(
     ``sums``: of forces of contacts by :func:`.contact_sums`, then their moments by :func:`.moments_along`,
     (time, sums, 3), by default from ``pressed``;
     ``unsaid``: reason of what is NaN at the last time; ``work``: of drives [J], (time, drives), by default summed over
-    the samples;
+    the samples; ``moments``: against turning, of contacts on their first bodies [N m], (time, contacts, 3), if known;
     ``named``: see :func:`~proofroll.elements.mechanism.dynamics.named_forces.named_forces`, (time, forces).
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
@@ -152,9 +153,11 @@ def columns(
     determinate components of all; ``effort.<actuator>``, ``coupling.<name>``, ``friction.<joint>``, ``stop.<joint>``
     [N, N m] along coordinates; ``force.<spring>`` [N], ``force.<bushing>.x|y|z``, ``torque.<bushing>.x|y|z`` on its
     body_b, ``work.effort.<actuator>``, ``work.drive.<joint>`` [J]; ``force.<pair>.x|y|z`` [N] on the body of its first
-    geometry, the sum where a pair touches at several places, ``net_force.<body>.x|y|z`` [N], the sum of the contacts
-    of a body that touches in several pairs, ``net_torque.<body>.x|y|z`` [N m], the moment about its centre of mass of
-    the contacts of a body that touches at several places, ``gap.<pair>`` [m], ``slip.<pair>`` [m/s], and residuals
+    geometry, the sum where a pair touches at several places, ``torque.<pair>.x|y|z`` [N m], the moment of rolling
+    resistance and of friction against spin on that body, where it is known, ``net_force.<body>.x|y|z`` [N], the sum of
+    the contacts of a body that touches in several pairs, ``net_torque.<body>.x|y|z`` [N m], the moment about its centre
+    of mass of the contacts of a body that touches at several places, ``gap.<pair>`` [m], ``slip.<pair>`` [m/s], and
+    residuals
     of Coulomb's law, see
     :data:`~proofroll.elements.mechanism.run.contacts.observables.RESIDUALS`; ``energy`` [J], ``drift`` [m], and
     ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
@@ -195,7 +198,7 @@ def columns(
             meaning = f"determinate components of the {kind}s on children"
             put(f"{kind}s", values[:, mask], unit, meaning, f"{kind}_component")
     if mechanism.contacts:
-        _put_contacts(element, placed, pressed, sums, unsaid, put)
+        _put_contacts(element, placed, (pressed, moments), sums, unsaid, put)
     for values, item in zip(named.T, named_forces(mechanism), strict=True):
         put(item.name, values, str(item.unit), item.meaning, absent=unsaid if np.isnan(values[-1]) else "")
     put_links(placed, named, put, unsaid, work)
@@ -239,13 +242,16 @@ def _local(element: MechanismElement, placed: Placed, pressed: FloatArray) -> di
 def _put_contacts(
     element: MechanismElement,
     placed: Placed,
-    pressed: FloatArray,
+    borne: tuple[FloatArray, FloatArray | None],
     sums: FloatArray | None,
     unsaid: str,
     put: Callable[..., None],
 ) -> None:
-    """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact, pair and of all together."""
-    followed = follow_contacts(placed)
+    """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact, pair and of all together.
+
+    ``borne``: forces, and moments against turning if they are known.
+    """
+    followed, (pressed, moments) = follow_contacts(placed), borne
     contacts = placed.mechanism.contacts
     shared, carried, turned = shared_pairs(contacts), carried_bodies(contacts), turned_bodies(contacts)
     if sums is None:
@@ -274,11 +280,14 @@ def _put_contacts(
                 meaning = f"{'sum' if kind == 'force' else 'moment'} of the contact forces on {body}"
                 put(f"net_{kind}.{body}.{letter}", component, unit, meaning, absent=absent)
     for index, contact in enumerate(placed.mechanism.contacts):
-        for axis, letter in enumerate("xyz"):
-            component = pressed[:, index, axis]
-            absent = unsaid if np.isnan(component[-1]) else ""
-            meaning = f"force of {contact.name} on {contact.body_a}"
-            put(f"force.{contact.name}.{letter}", component, "N", meaning, absent=absent)
+        resists = contact.rolling_resistance or contact.spinning_friction
+        of_contact = [("force", "N", "force", pressed)]
+        of_contact += [("torque", "N m", "moment against turning", moments)] if resists and moments is not None else []
+        for kind, unit, what, values in of_contact:
+            for component, letter in zip(values[:, index].T, "xyz", strict=True):
+                absent = unsaid if np.isnan(component[-1]) else ""
+                meaning = f"{what} of {contact.name} on {contact.body_a}"
+                put(f"{kind}.{contact.name}.{letter}", component, unit, meaning, absent=absent)
         put(f"gap.{contact.name}", followed.gap[:, index], "m", f"distance of what {contact.name} may touch")
         put(f"slip.{contact.name}", followed.slip[:, index], "m/s", f"speed of slip of {contact.name}")
     put("gaps", followed.gap, "m", "distances between what may touch", "contact")

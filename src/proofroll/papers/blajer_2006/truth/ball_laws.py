@@ -12,9 +12,10 @@ from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.papers.blajer_2006.ball.mechanics import BallMotion
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.truth.check.laws.integrals import COUNT, POINTS, integral
-from proofroll.truth.check.laws.law_check import LawCheck
-from proofroll.truth.check.laws.record import Modes, Pieces
+from proofroll.truth.check.laws.motion import laws_of_pieces
+from proofroll.truth.check.laws.record import Modes, Pieces, stated
 from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.scene import LawScene
 
 # Pieces of a motion that are looked at, and the turn of the ball in each [rad], which their points resolve.
 _PIECES, _TURN = 8, 0.5
@@ -44,20 +45,22 @@ def checked_motion(
     Raises:
         Diverged: the route could not be integrated.
     """
-    residuals = LawCheck(element.mechanism, element.length, element.speed / element.length)
+    rate = element.speed / element.length
+    scene, residuals = LawScene(element.mechanism, element.length, rate), LawResiduals(rate=rate)
     start, end = float(times[0]), float(times[-1])
     fastest = float(np.linalg.norm(route(ball, times).w_WB, axis=-1).max())
     if not np.isfinite(fastest):
-        return route(ball, times), residuals.residuals
+        return route(ball, times), residuals
     length = min(_TURN / fastest, end - start) if fastest else end - start
     if not length:
-        return route(ball, times), residuals.residuals
+        return route(ball, times), residuals
     starts = np.linspace(start, min(end - length, start + length * _SPAN / _TURN), _PIECES)
     points = starts[:, None] + length * (POINTS + 1) / 2
     together = np.unique(np.concatenate([times, points.ravel()]))
     motion = route(ball, together)
-    residuals.take(_pieces(element, ball, _at(motion, np.searchsorted(together, points.ravel())), points, coarse))
-    return _at(motion, np.searchsorted(together, times)), residuals.residuals
+    at_points = _at(motion, np.searchsorted(together, points.ravel()))
+    laws_of_pieces(scene, _pieces(element, ball, at_points, points, coarse), residuals)
+    return _at(motion, np.searchsorted(together, times)), residuals
 
 
 def _at(motion: BallMotion, index: np.ndarray[tuple[int], np.dtype[np.int64]]) -> BallMotion:
@@ -75,7 +78,7 @@ def _pieces(element: MechanismElement, ball: RollingBall, motion: BallMotion, ti
     """Record of a motion at the points of pieces, whose times have the shape (pieces, points)."""
     assert element.on_wall is not None  # by ``covers``
     shape, sign, resistance = time.shape, element.on_wall.sign, ball.contact.rolling_resistance
-    joints, connections = len(element.mechanism.joints), np.zeros((*time.shape, 1, 3))
+    joints = len(element.mechanism.joints)
     outward = ball.surface.normal(motion.p_WB)
     pace = np.repeat((time[:, -1:] - time[:, :1]) / 2, COUNT, axis=1)
     w = motion.w_WB.reshape(*shape, 3)
@@ -94,31 +97,26 @@ def _pieces(element: MechanismElement, ball: RollingBall, motion: BallMotion, ti
         return values.reshape(*shape, 1, 3)
 
     turned = np.stack([_orientation(w, pace), np.broadcast_to(np.eye(3), (*shape, 3, 3))], axis=2)
-    return Pieces(
-        time=time,
+    modes = Modes(
+        contacts=("stick",),
+        rolling=("slip" if resistance else "open",),
+        spinning=("open",),
+        friction=("open",) * joints,
+        stops=(("open", "open"),) * joints,
+    )
+    return stated(
+        element.mechanism,
+        modes,
+        time,
         pace=pace,
         p=of_ball(motion.p_WB),
         R=turned,
         v=of_ball(motion.v_WB),
         w=of_ball(motion.w_WB),
-        effort=np.zeros((*shape, 0)),
-        coupling=np.zeros((*shape, 0)),
-        drive=np.zeros((*shape, joints)),
-        loop=np.zeros((*shape, 0, 6)),
-        friction=np.zeros((*shape, joints)),
-        stops=np.zeros((*shape, joints, 2)),
         force=of_contact(sign * motion.force),
         place=of_contact(motion.p_WB + ball.ball.radius * outward),
         normal=of_contact(-sign * outward),
         rolling=of_contact(sign * moment),
-        spinning=connections,
-        modes=Modes(
-            contacts=("stick",),
-            rolling=("slip" if resistance else "open",),
-            spinning=("open",),
-            friction=("open",) * joints,
-            stops=(("open", "open"),) * joints,
-        ),
         coarse=coarse,
     )
 

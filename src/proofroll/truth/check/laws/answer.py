@@ -16,7 +16,7 @@ from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiled import Turns, laws_at_all_times, start_of
 from proofroll.truth.check.laws.tiles import Places, Tiles
 from proofroll.truth.check.laws.values import values_follow
-from proofroll.truth.check.laws.works import works_follow
+from proofroll.truth.check.laws.works import held_efforts, works_follow
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism
@@ -33,14 +33,24 @@ class AnswerCheck:
     Attributes:
         residuals: remainders of the laws.
         samples, held: numbers of samples, and of those on a piece of the motion.
+        between: number of stretches in whose middle laws are held.
     """
 
     def __init__(self, mechanism: Mechanism, length: float, rate: float) -> None:
         """Takes a mechanism in SI units with its natural length [m] and rate [1/s]."""
         self._scene = LawScene(mechanism, length, rate)
         self.residuals, self.samples, self.held = LawResiduals(rate=rate, known_alone=True), 0, 0
+        self.between = 0
 
-    def take(self, published: PublishedValues, tiles: Tiles, asked: Array, end: float, horizon: float) -> None:
+    def take(
+        self,
+        published: PublishedValues,
+        tiles: Tiles,
+        asked: Array,
+        end: float,
+        horizon: float,
+        between: PublishedValues | None = None,
+    ) -> None:
         """Checks an answer.
 
         Args:
@@ -49,6 +59,7 @@ class AnswerCheck:
             asked: times that were asked for [s].
             end: time before which the truth ends, or inf [s].
             horizon: time from which the question is ill-posed, or inf [s]: from there on nothing is held.
+            between: motion and forces in the middle of each stretch.
         """
         scene, residuals, time = self._scene, self.residuals, published.pieces.time[:, 0]
         residuals.coarse = COARSE if tiles.coarse else 1.0
@@ -78,13 +89,33 @@ class AnswerCheck:
             late |= item.jumps & (item.low - _EXACT * (1 + time) <= time) & (time <= item.high + _EXACT * (1 + time))
         rows = np.flatnonzero(places.held & (time < sure) & ~late)
         self.held = len(rows)
-        if not rows.size:
-            return
+        if rows.size:
+            published, places = self._of(published, turns, places, rows)
+            works_follow(scene, tiles, turns, places, published, residuals)
+            values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
+            self._forces(published, tiles, places)
+        if between is not None:
+            time = between.pieces.time[:, 0]
+            places = tiles.holding(time)
+            apart = ~self._at_borders(between.pieces.time, tiles)
+            rows = np.flatnonzero(places.held & (time < min(sure, end * (1 - _BESIDE))) & apart)
+            self.between = len(rows)
+            if rows.size:
+                between, places = self._of(between, turns, places, rows)
+                held_efforts(scene, tiles, turns, places, between, residuals)
+                self._forces(between, tiles, places)
+
+    def _of(
+        self, published: PublishedValues, turns: Turns, places: Places, rows: NDArray[np.intp]
+    ) -> tuple[PublishedValues, Places]:
+        """Some samples with their whole turns, and their places."""
         published, places = published.of(rows), places.of(rows)
-        published = replace(published, pieces=replace(published.pieces, turns=self._turns(turns, places)))
+        return replace(published, pieces=replace(published.pieces, turns=self._turns(turns, places))), places
+
+    def _forces(self, published: PublishedValues, tiles: Tiles, places: Places) -> None:
+        """Checks that samples at places are on the motion, and their forces where these do not jump."""
+        scene, residuals = self._scene, self.residuals
         on_the_motion(scene, tiles, places, published, residuals)
-        works_follow(scene, tiles, turns, places, published, residuals)
-        values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
         modes = [tiles.modes[tile] for tile in places.tile]
         between = ~(
             self._at_instants(published.pieces.time[:, 0]) | self._at_borders(published.pieces.time, tiles, kinks=True)
@@ -99,7 +130,8 @@ class AnswerCheck:
     def sentence(self) -> str:
         """Clause on the samples that hold all laws."""
         laws = sum(law in self.residuals.largest for law in LAWS)
-        return f"what is published holds {laws} laws at {self.held} of {self.samples} samples"
+        middles = f" and in the middle of {self.between} stretches" if self.between else ""
+        return f"what is published holds {laws} laws at {self.held} of {self.samples} samples{middles}"
 
     def _times(self, time: Array, asked: Array, end: float) -> None:
         """Samples are those that were asked for, and none before the end is missing."""

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from proofroll.truth.check.laws.record import Modes, PublishedEvent, PublishedValues
-from proofroll.truth.check.laws.residuals import INSTANT, LawResiduals
+from proofroll.truth.check.laws.residuals import INSTANT, STRUCK, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiled import changed_velocity
 from proofroll.truth.check.laws.tiles import Tiles
 
-_STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
 _GROWTH = 1e3  # natural accelerations by which velocities may grow in the instant before a slip has a direction
 _ROOM = 1e-11  # accuracy of the time of an event, relative to it and to a second
 _LAST_REBOUNDS = 1e-4  # natural times that rebounds take which are summed, where their ratio is not known
@@ -35,7 +34,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
             and end <= item.high + room + (INSTANT / scene.rate if item.jumps else 0.0)  # a rebound that is none
         ]
         time = np.array([[begin]])
-        least = _STRUCK + _GROWTH * scene.rate * max(begin - end, 0.0)
+        least = STRUCK + _GROWTH * scene.rate * max(begin - end, 0.0)
         if jump > least and not any(item.jumps for item in near):
             residuals.note("change", "a jump of velocities", np.ones((1, 1)), 1.0, time)
         names = _changed(scene, tiles.modes[number], tiles.modes[number + 1])

@@ -6,6 +6,7 @@ Newton's and Coulomb's laws together may win energy (Kane's paradox), so that en
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.check.laws.contacts import gap_of, slide_of
 from proofroll.truth.check.laws.integrals import norm, turned
-from proofroll.truth.check.laws.joints import Coordinates
+from proofroll.truth.check.laws.joints import coordinate_of
 from proofroll.truth.check.laws.record import Array, Passage, Pieces
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import FREE, HELD_PLACES, HELD_TURNS, JointFrames, LawScene
@@ -52,9 +53,7 @@ class Stop(NamedTuple):
     rates: tuple[float, float]
 
 
-def impact(
-    scene: LawScene, passage: Passage, residuals: LawResiduals, coordinates: Coordinates, fastest: dict[str, float]
-) -> dict[int, float]:
+def impact(scene: LawScene, passage: Passage, residuals: LawResiduals, fastest: dict[str, float]) -> dict[int, float]:
     """Checks a jump of velocities; impulse along each driven joint, by its number [N s, N m s], NaN if not determinate.
 
     ``fastest``: largest speed of impact of each contact and stop so far.
@@ -66,7 +65,7 @@ def impact(
         columns += _held(scene, pieces_before, connection)
         if number < len(m.joints) and m.joints[number].nq == 1:
             moving[connection.name] = _coordinate(scene, passage, number)
-            reached = _reached(scene, pieces_before, coordinates, number, moving[connection.name])
+            reached = _reached(scene, pieces_before, number, moving[connection.name])
             if m.joints[number].motion is not None:
                 driven[number] = len(columns)
             if reached or number in driven:
@@ -141,22 +140,20 @@ def _coordinate(scene: LawScene, passage: Passage, number: int) -> Coordinate:
     return Coordinate(column, (rates[0], rates[1]), joint.armature)
 
 
-def _reached(
-    scene: LawScene, pieces_before: Pieces, coordinates: Coordinates, number: int, coordinate: Coordinate
-) -> list[Stop]:
-    """Stops of a joint at which it is just before the impact."""
+def _reached(scene: LawScene, pieces_before: Pieces, number: int, coordinate: Coordinate) -> list[Stop]:
+    """Stops of a joint at which it is just before the impact, but for whole turns."""
     joint, connection = scene.mechanism.joints[number], scene.connections[number]
     if joint.limits is None:
         return []
-    place = float(
-        coordinates.at(number, 0, pieces_before, scene.placed(connection, pieces_before), connection.kind)[0, 0]
-    )
+    placed, stops = scene.placed(connection, pieces_before), list[Stop]()
     length = 1.0 if joint.kind == JointKind.REVOLUTE else scene.length
-    return [
-        Stop(joint.name, joint.restitution, (sign * coordinate.rates[0], sign * coordinate.rates[1]))
-        for sign, stop in zip((1.0, -1.0), joint.limits, strict=True)
-        if abs(place - stop) < _CLOSED * (abs(stop) + length)
-    ]
+    for sign, stop in zip((1.0, -1.0), joint.limits, strict=True):
+        near = replace(pieces_before, turns=np.full((1, 1, len(scene.mechanism.joints), 1), stop))
+        place = float(coordinate_of(scene, number, 0, near, placed)[0, 0])
+        if abs(place - stop) < _CLOSED * (abs(stop) + length):
+            rates = sign * coordinate.rates[0], sign * coordinate.rates[1]
+            stops.append(Stop(joint.name, joint.restitution, rates))
+    return stops
 
 
 def _momentum(scene: LawScene, pieces_before: Pieces, pieces_after: Pieces) -> Array:

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from proofroll.elements.mechanism.scene.drives import Actuator
 
 _CERTAIN = 10.0  # allowances of a rate from which on its sign is certain
-_INSTANT = 1e-6  # part of an interval of a controller up to which a time is its instant
 _PART = 1e-6  # part of a scene's natural force that counts in the size of an effort
 
 
@@ -67,10 +66,12 @@ def _effort(
     k, data = motor
     length, fast, force = _sizes(scene, scene.mechanism.joint_index[data.joint])
     n, effort, control = data.gear, pieces.effort[..., k], scene.mechanism.control
-    if control is not None and data.name in control.actuators:
-        law = _controlled(control, data, pieces.time, effort, place, rate)
-    else:
+    if control is None or data.name not in control.actuators:
         law = law_of(data, value_of(data.target, pieces.time), place, rate)
+    elif control.held == "target" and control.policy is None:
+        law = law_of(data, target_of(control, data, pieces.time), place, rate)
+    else:  # the answer of a policy is not known; for efforts see :func:`.held_efforts`
+        law = effort
     size = np.abs(effort) + n * n * (data.kp * length + data.kd * fast) + _PART * force
     residuals.note("effort", data.name, effort - law, size, pieces.time)
 
@@ -86,25 +87,11 @@ def law_of(data: Actuator, target: Array, place: Array, rate: Array) -> Array:
     return np.clip(law, -limit, limit)
 
 
-def _controlled(control: Control, data: Actuator, time: Array, effort: Array, place: Array, rate: Array) -> Array:
-    """Effort under a controller that sets targets, or efforts, at its instants and holds them [N, N m].
-
-    The answer of a policy is not known here: what it has set is that of the first point of a piece.
-    """
-    instant = np.floor((time[:, :1] + time[:, -1:]) / 2 * control.rate)
-    sent, n = instant - control.delay, data.gear
-    if control.policy is None:
-        pose = control.pose[control.actuators.index(data.name)]
-        target = np.where(sent >= 0, value_of(data.target, sent / control.rate), pose)
-    else:
-        target = (effort[:, :1] / n + data.kd * n * rate[:, :1]) / data.kp + n * place[:, :1]
-    if control.held == "target":
-        law, limit = law_of(data, target, place, rate), np.inf if data.limit is None else data.limit
-        clamped = control.policy is not None and np.abs(effort).max() >= limit
-        return effort if clamped else law  # an effort at its limit does not tell the target
-    begins = np.abs(time[:, :1] - instant / control.rate) <= _INSTANT / control.rate
-    determinate = begins & (control.policy is None)
-    return np.where(determinate, law_of(data, target, place[:, :1], rate[:, :1]), effort[:, :1]) + 0.0 * effort
+def target_of(control: Control, data: Actuator, time: Array) -> Array:
+    """Target that a controller without a policy has set at the last of its instants before a time [s]."""
+    sent = np.floor(time * control.rate) - control.delay
+    pose = control.pose[control.actuators.index(data.name)]
+    return np.where(sent >= 0, value_of(data.target, sent / control.rate), pose)
 
 
 def _dry_friction(scene: LawScene, pieces: Pieces, residuals: LawResiduals, number: int, rate: Array) -> None:

@@ -11,7 +11,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.check.laws.integrals import dot, norm
 from proofroll.truth.check.laws.joint_forces import forces_along
 from proofroll.truth.check.laws.loads import BodyLoads
-from proofroll.truth.check.laws.record import Array, BodyPoses, Pieces
+from proofroll.truth.check.laws.record import Array, BodyPoses, Pieces, PublishedValues
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
 from proofroll.truth.check.laws.scene import (
     FREE,
@@ -30,10 +30,7 @@ class FreeDirection(NamedTuple):
     Attributes:
         joint: number of the joint.
         direction: unit vector, world axes.
-        carrier: body that it is fixed to.
         turns: True for an axis of rotation.
-        origin: place of the joint on its child [m].
-        speed: velocity of that place [m/s].
         rate: along the direction [m/s, rad/s].
         force: of all laws along it, on the child [N, N m].
         size: sum of the sizes of these.
@@ -42,45 +39,35 @@ class FreeDirection(NamedTuple):
 
     joint: int
     direction: Array
-    carrier: int
     turns: bool
-    origin: Array
-    speed: Array
     rate: Array
     force: Array
     size: Array
     digits: Array
 
 
-class Coordinates:
-    """Coordinates of joints with one or two of them, from poses; angles go on from those of the last point.
+def coordinate_of(scene: LawScene, number: int, k: int, pieces: BodyPoses, placed: PlacedFrames) -> Array:
+    """Coordinate k of a joint with one or two at the points of pieces [m, rad].
 
-    Between points an angle changes by the mean of its rates there, but for less than half a turn.
+    If the pieces do not tell whole turns, an angle goes on from that at time 0: between points it changes by the mean
+    of its rates there, but for less than half a turn.
     """
-
-    def __init__(self, scene: LawScene) -> None:
-        joints = enumerate(scene.mechanism.joints)
-        self._last = {(number, k): (0.0, float(q), 0.0) for number, joint in joints for k, q in enumerate(joint.q0)}
-
-    def at(self, number: int, k: int, pieces: BodyPoses, placed: PlacedFrames, kind: str) -> Array:
-        """Coordinate k of a joint at the points of pieces [m, rad]."""
-        axes, axis, turns = FREE[kind][k]
-        if not turns:
-            return dot(placed.origin_b - placed.origin_a, placed.A[..., axis])
-        R = placed.A.swapaxes(-1, -2) @ placed.B
-        angle = np.arctan2(R[..., 2, 1], R[..., 2, 2]) if axes == "B" else np.arctan2(R[..., 1, 0], R[..., 0, 0])
-        if pieces.turns is not None:
-            turn = pieces.turns[..., number, k] - angle
-        else:
-            last, start, last_rate = self._last[number, k]
-            rate = placed.free(kind)[k].rate.ravel()
-            times, rates = np.append(last, pieces.time.ravel()), np.append(last_rate, rate)
-            moved = np.diff(times) * (rates[1:] + rates[:-1]) / 2
-            apart = np.diff(np.append(start, angle.ravel())) - moved
-            path = start + np.cumsum(moved + apart - 2 * np.pi * np.round(apart / (2 * np.pi)))
-            turn = path.reshape(angle.shape) - angle
-            self._last[number, k] = float(times[-1]), float(path[-1]), float(rates[-1])
-        return np.asarray(angle + 2 * np.pi * np.round(turn / (2 * np.pi)))
+    kind, joint = scene.connections[number].kind, scene.mechanism.joints[number]
+    axes, axis, turns = FREE[kind][k]
+    if not turns:
+        return dot(placed.origin_b - placed.origin_a, placed.A[..., axis])
+    R = placed.A.swapaxes(-1, -2) @ placed.B
+    angle = np.arctan2(R[..., 2, 1], R[..., 2, 2]) if axes == "B" else np.arctan2(R[..., 1, 0], R[..., 0, 0])
+    if pieces.turns is not None:
+        turn = pieces.turns[..., number, k] - angle
+    else:
+        start = float(joint.q0[k]) if joint.q0 else 0.0
+        times, rates = np.append(0.0, pieces.time.ravel()), np.append(0.0, placed.free(kind)[k].rate.ravel())
+        moved = np.diff(times) * (rates[1:] + rates[:-1]) / 2
+        apart = np.diff(np.append(start, angle.ravel())) - moved
+        path = start + np.cumsum(moved + apart - 2 * np.pi * np.round(apart / (2 * np.pi)))
+        turn = path.reshape(angle.shape) - angle
+    return np.asarray(angle + 2 * np.pi * np.round(turn / (2 * np.pi)))
 
 
 class Sizes(NamedTuple):
@@ -91,19 +78,15 @@ class Sizes(NamedTuple):
     spin: Array
 
 
-def joint_laws(
-    scene: LawScene, pieces: Pieces, residuals: LawResiduals, coordinates: Coordinates, loads: BodyLoads
-) -> list[FreeDirection]:
-    """Checks joints, loops and couplings, adds the forces of loops to the loads; the free directions of the tree."""
+def joint_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: BodyLoads) -> list[FreeDirection]:
+    """Checks joints, loops and couplings, and adds their power to the loads; the free directions of the tree."""
     axes, moving, joints = list[FreeDirection](), dict[str, tuple[Array, Array]](), scene.mechanism.joints
     for number, connection in enumerate(scene.connections):
         placed = scene.placed(connection, pieces)
         sizes = sizes_of(scene, pieces, connection, placed)
         closure(pieces, residuals, connection, placed, sizes)
-        if number >= len(joints):
-            _loop_force(scene, pieces, residuals, loads, (number - len(joints), connection, placed))
-            continue
-        axes += _axes(scene, pieces, residuals, coordinates, (number, connection, placed, sizes), moving)
+        if number < len(joints):
+            axes += _axes(scene, pieces, residuals, (number, connection, placed, sizes), moving)
     for axis in axes:
         loads.works(axis.force * axis.rate, axis.size * (scene.rate if axis.turns else scene.speed))
     _couplings(scene, pieces, residuals, moving)
@@ -137,47 +120,38 @@ def closure(
         residuals.note("joint rate", name, dot(np.cross(B[..., k], A[..., i]), placed.spin), sizes.spin, time)
 
 
-def _loop_force(
-    scene: LawScene,
-    pieces: Pieces,
-    residuals: LawResiduals,
-    loads: BodyLoads,
-    loop: tuple[int, JointFrames, PlacedFrames],
-) -> None:
-    """Adds the stated force and moment of a loop to the loads; it has none along its free directions."""
-    number, connection, placed = loop
-    force, moment = pieces.loop[..., number, :3], pieces.loop[..., number, 3:]
-    loads.between(connection.b, connection.a, placed.origin_b, force, moment)
-    size = norm(moment) + (norm(force) + scene.faint) * scene.length
-    if connection.kind == DISTANCE:
-        apart = placed.origin_b - placed.origin_a
-        direction = apart / norm(apart)[..., None]
-        across = norm(force - dot(force, direction)[..., None] * direction) + norm(moment) / scene.length
-        residuals.note("loop force", connection.name, across, size / scene.length, pieces.time)
-        return
-    for direction, _, turns in placed.free(connection.kind):
-        part = dot(moment if turns else force, direction)
-        residuals.note("loop force", connection.name, part, size / (1.0 if turns else scene.length), pieces.time)
+def loop_forces(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
+    """Checks that loops have no force and moment along their free directions."""
+    pieces, joints = published.pieces, len(scene.mechanism.joints)
+    for number, connection in enumerate(scene.connections[joints:], joints):
+        placed, wrench = scene.placed(connection, pieces), published.reactions[..., number, :]
+        force, moment = wrench[..., :3], wrench[..., 3:]
+        size = norm(moment) + (norm(force) + scene.faint) * scene.length
+        if connection.kind == DISTANCE:
+            apart = placed.origin_b - placed.origin_a
+            direction = apart / norm(apart)[..., None]
+            across = norm(force - dot(force, direction)[..., None] * direction) + norm(moment) / scene.length
+            residuals.note("loop force", connection.name, across, size / scene.length, pieces.time)
+            continue
+        for direction, _, turns in placed.free(connection.kind):
+            part = dot(moment if turns else force, direction)
+            residuals.note("loop force", connection.name, part, size / (1.0 if turns else scene.length), pieces.time)
 
 
 def _axes(
     scene: LawScene,
     pieces: Pieces,
     residuals: LawResiduals,
-    coordinates: Coordinates,
     joint: tuple[int, JointFrames, PlacedFrames, Sizes],
     moving: dict[str, tuple[Array, Array]],
 ) -> list[FreeDirection]:
     """Free directions of a joint of the tree; ``moving`` takes place and rate of one with one coordinate."""
     number, connection, placed, sizes = joint
     data, time, axes = scene.mechanism.joints[number], pieces.time, []
-    speed = pieces.v[..., connection.b, :] + np.cross(
-        pieces.w[..., connection.b, :], placed.origin_b - pieces.p[..., connection.b, :]
-    )
     for k, (direction, rate, turns) in enumerate(placed.free(connection.kind)):
         force, size, digits = (np.zeros(time.shape) for _ in range(3))
         if data.nq in {1, 2}:
-            place = coordinates.at(number, k, pieces, placed, connection.kind)
+            place = coordinate_of(scene, number, k, pieces, placed)
             parts = [-data.stiffness * (place - data.rest), -data.damping * rate]
             digits = ROUND * data.stiffness * (np.abs(place) + (1.0 if turns else scene.length))
             if data.nq == 1:
@@ -187,20 +161,9 @@ def _axes(
         elif connection.kind == JointKind.SPHERICAL:
             force = -data.damping * rate
             size = np.abs(force)
-        carrier = connection.a if FREE[connection.kind][k][0] == "A" else connection.b
-        origin = placed.origin_b
         axes.append(
             FreeDirection(
-                joint=number,
-                direction=direction,
-                carrier=carrier,
-                turns=turns,
-                origin=origin,
-                speed=speed,
-                rate=rate,
-                force=force,
-                size=size,
-                digits=digits,
+                joint=number, direction=direction, turns=turns, rate=rate, force=force, size=size, digits=digits
             )
         )
     if data.motion is not None:

@@ -1,17 +1,16 @@
-"""Laws of motion as integrals over pieces: places, rotations, and momentum along each free direction."""
+"""Laws of motion as integrals over pieces: places, rotations, and momenta of free bodies."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.check.laws.integrals import dot, integral, norm, since_start, tail, turned
-from proofroll.truth.check.laws.joints import FreeDirection
+from proofroll.truth.check.laws.contacts import contact_laws
+from proofroll.truth.check.laws.integrals import integral, norm, since_start, tail, turned
+from proofroll.truth.check.laws.joints import joint_laws
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import Array, BodyPoses, Pieces
-from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.residuals import COARSE, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 
 _ARM = 1e-2  # part of the natural length that a body extends at least, for the size of its angular momentum
@@ -52,50 +51,44 @@ def jump(scene: LawScene, later: BodyPoses, sooner: BodyPoses, starts: slice, en
     return np.asarray(np.max(parts, 0))
 
 
-def momenta(
-    scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: BodyLoads, axes: Sequence[FreeDirection]
-) -> None:
-    """Momentum along each free direction of the tree, of all bodies beyond its joint, = integral of the loads.
-
-    Constraint forces of the joint have no part along it; the direction turns with its carrier. Together these are all
-    equations of motion of the tree.
-    """
-    centres, velocities = scene.centres(pieces)
+def momenta(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: BodyLoads) -> None:
+    """Momentum of each free body = integral of the forces, that about its centre of mass = integral of the moments."""
+    velocities, time, pace = scene.centres(pieces)[1], pieces.time, pieces.pace
     inertia = pieces.R @ scene.inertia @ pieces.R.swapaxes(-1, -2)
-    spin = turned(inertia, pieces.w)
-    inertia_size = np.trace(scene.inertia, axis1=-2, axis2=-1) + scene.mass * (_ARM * scene.length) ** 2
-    time, pace = pieces.time, pieces.pace
-    span = time[:, -1:] - time[:, :1]
-    fast, quick = scene.speed + norm(velocities), scene.rate + norm(pieces.w)
-    for axis in axes:
-        joint, body = scene.mechanism.joints[axis.joint], scene.subtrees[axis.joint]
-        linear = (scene.mass[body, None] * velocities[..., body, :]).sum(-2)
-        force = loads.force[..., body, :].sum(-2)
-        turning = np.cross(pieces.w[..., axis.carrier, :], axis.direction)
-        if axis.turns:
-            arm = centres[..., body, :] - axis.origin[..., None, :]
-            angular = np.cross(arm, scene.mass[body, None] * velocities[..., body, :]) + spin[..., body, :]
-            angular = angular.sum(-2)
-            moment = (loads.moment[..., body, :] + np.cross(arm, loads.force[..., body, :])).sum(-2)
-            rate = dot(moment - np.cross(axis.speed, linear), axis.direction) + dot(angular, turning)
-            value, reach = dot(angular, axis.direction), norm(arm)
-            size = (inertia_size[body] * quick[..., body] + scene.mass[body] * reach * fast[..., body]).sum(-1)
-            loaded = (loads.moment_size[..., body] + reach * loads.force_size[..., body]).sum(-1)
-            digits = (loads.moment_digits[..., body] + reach * loads.force_digits[..., body]).sum(-1)
-        else:
-            rate = dot(force, axis.direction) + dot(linear, turning)
-            value = dot(linear, axis.direction)
-            size = (scene.mass[body] * fast[..., body]).sum(-1)
-            loaded, digits = loads.force_size[..., body].sum(-1), loads.force_digits[..., body].sum(-1)
-        rate = rate + axis.force
-        value = value + joint.armature * axis.rate
-        size = size + joint.armature * ((scene.rate if axis.turns else scene.speed) + np.abs(axis.rate))
-        residuals.note(
-            "spin" if axis.turns else "momentum",
-            joint.child if joint.kind == JointKind.FREE else joint.name,
-            since_start(value) - integral(rate, pace),
-            size + span * (loaded + axis.size),
-            time,
-            span * (digits + axis.digits),
-            tail(rate, pace),
-        )
+    span, trace = time[:, -1:] - time[:, :1], np.trace(scene.inertia, axis1=-2, axis2=-1)
+    moments = turned(inertia, pieces.w)
+    for joint in scene.mechanism.joints:
+        if joint.kind != JointKind.FREE:
+            continue
+        k = scene.index[joint.child]
+        fast, quick = scene.speed + norm(velocities[..., k, :]), scene.rate + norm(pieces.w[..., k, :])
+        for law, value, rate, size, digits in (
+            (
+                "momentum",
+                scene.mass[k] * velocities[..., k, :],
+                loads.force[..., k, :],
+                scene.mass[k] * fast + span * loads.force_size[..., k],
+                loads.force_digits[..., k],
+            ),
+            (
+                "spin",
+                moments[..., k, :],
+                loads.moment[..., k, :],
+                (trace[k] + scene.mass[k] * (_ARM * scene.length) ** 2) * quick + span * loads.moment_size[..., k],
+                loads.moment_digits[..., k],
+            ),
+        ):
+            left, unresolved = norm(since_start(value) - integral(rate, pace)), norm(tail(rate, pace))
+            residuals.note(law, joint.child, left, size, time, span * digits, unresolved)
+
+
+def laws_of_pieces(scene: LawScene, pieces: Pieces, residuals: LawResiduals) -> None:
+    """Checks pieces of free bodies in one mode, whose record has all forces at their points, in order of time."""
+    residuals.coarse = COARSE if pieces.coarse else 1.0
+    residuals.points += pieces.time.size
+    kinematics(scene, pieces, residuals)
+    joined(scene, pieces, residuals)
+    loads = BodyLoads(scene, pieces)
+    joint_laws(scene, pieces, residuals, loads)
+    contact_laws(scene, pieces, residuals, loads)
+    momenta(scene, pieces, residuals, loads)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 
@@ -70,7 +73,6 @@ class Pieces(BodyPoses):
         effort: of each actuator along its joint [N, N m], (actuators).
         coupling: multiplier of each coupling: force along its first joint [N, N m], (couplings).
         drive: force that imposes the motion of each joint [N, N m], (joints); 0 where none is prescribed.
-        loop: force and moment of each loop on its second body, at its place there [N, N m], (loops, 6).
         friction: dry friction along each joint [N, N m], (joints).
         stops: force of each stop along its joint [N, N m], (joints, 2).
         force: on the first body of each contact [N], (contacts, 3).
@@ -83,7 +85,6 @@ class Pieces(BodyPoses):
     effort: Array
     coupling: Array
     drive: Array
-    loop: Array
     friction: Array
     stops: Array
     force: Array
@@ -93,19 +94,20 @@ class Pieces(BodyPoses):
     spinning: Array
     modes: Modes
 
-    def points(self, piece: int, point: int) -> Pieces:
-        """One point as pieces of one point."""
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        part = slice(piece, piece + 1 or None), slice(point, point + 1 or None)
-        arrays: dict[str, Any] = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
-        return replace(self, **arrays)
 
-
-def joined_pieces(parts: Sequence[Pieces]) -> Pieces:
-    """Pieces one after the other, of parts in one mode."""
-    names = [item.name for item in fields(Pieces) if isinstance(getattr(parts[0], item.name), np.ndarray)]
-    arrays: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return replace(parts[0], **arrays)
+def stated(mechanism: Mechanism, modes: Modes, time: Array, **stated_fields: Any) -> Pieces:
+    """Pieces of a motion with these times [s]; ``stated_fields``: of :class:`Pieces`; forces left out are zero."""
+    contacts, joints = len(mechanism.contacts), len(mechanism.joints)
+    sizes: dict[str, Sequence[int]] = {
+        "effort": (len(mechanism.actuators),),
+        "coupling": (len(mechanism.couplings),),
+        "drive": (joints,),
+        "friction": (joints,),
+        "stops": (joints, 2),
+        **dict.fromkeys(("force", "place", "normal", "rolling", "spinning"), (contacts, 3)),
+    }
+    forces: dict[str, Any] = {name: np.zeros((*time.shape, *size)) for name, size in sizes.items()}
+    return Pieces(time=time, modes=modes, **(forces | stated_fields))
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,8 @@ class Passage:
     """A transition between two stretches: what a route states just before and just after it.
 
     Attributes:
-        before, after: pieces of one point each.
+        before: one point, with all forces that its causes need.
+        after: one point, without forces.
         impacts: names of contacts and joints that were struck.
         settles: names of those whose rebounds are summed.
         decided: True if a guard ended the stretch; False for a break of a signal or a border of a surface.
@@ -124,11 +127,6 @@ class Passage:
     impacts: frozenset[str] = frozenset()
     settles: frozenset[str] = frozenset()
     decided: bool = True
-
-    @property
-    def happens(self) -> bool:
-        """True if modes change or velocities may jump."""
-        return bool(self.impacts or self.settles) or self.before.modes != self.after.modes
 
 
 @dataclass(frozen=True)

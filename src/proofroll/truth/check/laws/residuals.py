@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.truth.check.laws.record import Array
 
+STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
 INSTANT = 1e-6  # natural times beside an event of which what jumps may be on either side
 _HOLE = 1e-6  # natural times that steps may leave out
 # Law -> allowance of its residual, relative to its natural size, and the law as a clause. On honest records of all
@@ -149,12 +150,13 @@ class LawResiduals:
 
     def held(self) -> str:
         """Clause on the laws that hold; empty: nothing could be held to a law."""
-        if not self.points:
+        if not (self.points or self.events):
             return ""
         law, (part, time, _) = max(self.largest.items(), key=lambda item: item[1][0], default=("", (0.0, 0.0, "")))
-        events = f" and on both sides of {self.events} events" if self.events else ""
+        points = [f"at {self.points:,} points"] * bool(self.points)
+        events = [f"on both sides of {self.events} events"] * bool(self.events)
         return (
-            f"holds {len(self.largest)} laws at {self.points:,} points{events}; "
+            f"holds {len(self.largest)} laws {' and '.join(points + events)}; "
             f"largest residual {part:.2g} of its allowance ({law}, {time:.3g} s)"
         )
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from proofroll.truth.check.laws.contacts import contact_laws
 from proofroll.truth.check.laws.integrals import COUNT, dot, norm, turned
-from proofroll.truth.check.laws.joints import Coordinates, FreeDirection, joint_laws
+from proofroll.truth.check.laws.joints import FreeDirection, joint_laws, loop_forces
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, PublishedValues
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
@@ -45,7 +45,8 @@ def force_laws(
     pieces = published.pieces
     loads = BodyLoads(scene, pieces)
     _newton_and_euler(scene, tiles, places, published, residuals)
-    axes = joint_laws(scene, pieces, residuals, Coordinates(scene), loads)
+    axes = joint_laws(scene, pieces, residuals, loads)
+    loop_forces(scene, published, residuals)
     _along(scene, tiles, places, published, residuals, axes)
     contact_laws(scene, pieces, residuals, loads)
     _power(scene, tiles, places, published, residuals, loads)

@@ -95,7 +95,6 @@ class LawScene:
         connections: joints, then loops.
         contacts: in the order of pairs.
         mass, com, inertia: of all bodies and the world, which has none.
-        subtrees: bodies that each joint carries, (joints, bodies + 1).
     """
 
     def __init__(self, mechanism: Mechanism, length: float, rate: float) -> None:
@@ -110,14 +109,6 @@ class LawScene:
         self.index = {"world": len(mechanism.bodies)} | {body.name: k for k, body in enumerate(mechanism.bodies)}
         self.connections = self._connections()
         self.contacts: list[PairContact] = contacts_of(mechanism.geometries, mechanism.pairs, self.index)
-        self.subtrees = np.zeros((len(mechanism.joints), len(self.mass)), dtype=bool)
-        for number, joint in enumerate(mechanism.joints):
-            self.subtrees[number, self.index[joint.child]] = True
-            body = joint.parent
-            while body != "world":
-                above = next(k for k, upper in enumerate(mechanism.joints) if upper.child == body)
-                self.subtrees[above, self.index[joint.child]] = True
-                body = mechanism.joints[above].parent
 
     def _connections(self) -> list[JointFrames]:
         connections = []

@@ -7,7 +7,7 @@ import numpy as np
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.contacts import apart
 from proofroll.truth.check.laws.integrals import of_quaternion
-from proofroll.truth.check.laws.joints import Coordinates, closure, sizes_of
+from proofroll.truth.check.laws.joints import closure, coordinate_of, sizes_of
 from proofroll.truth.check.laws.motion import joined, jump, kinematics
 from proofroll.truth.check.laws.record import Array, BodyPoses
 from proofroll.truth.check.laws.residuals import LawResiduals
@@ -22,7 +22,7 @@ def laws_at_all_times(scene: LawScene, tiles: Tiles, residuals: LawResiduals, la
     _without_holes(scene, tiles, residuals, last)
     kinematics(scene, tiles, residuals)
     joined(scene, tiles, residuals, tiles.stretch[1:] == tiles.stretch[:-1])
-    followed, turns = Coordinates(scene), Turns()
+    turns = Turns()
     for number, connection in enumerate(scene.connections):
         placed = scene.placed(connection, tiles)
         closure(tiles, residuals, connection, placed, sizes_of(scene, tiles, connection, placed))
@@ -30,7 +30,7 @@ def laws_at_all_times(scene: LawScene, tiles: Tiles, residuals: LawResiduals, la
             continue
         joint = scene.mechanism.joints[number]
         for k in range(joint.nq if joint.nq < 3 else 0):
-            turns[number, k] = followed.at(number, k, tiles, placed, connection.kind)
+            turns[number, k] = coordinate_of(scene, number, k, tiles, placed)
         if joint.limits is not None:
             q, (low, high) = turns[number, 0], joint.limits
             passed = np.maximum(np.maximum(low - q, q - high), 0)

@@ -11,7 +11,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from proofroll.truth.check.laws.integrals import COUNT, TO_SERIES
-from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Modes, Pieces
+from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Modes
 
 _CORRECTIONS = 6  # of Newton's method for the place of a time in a tile, at most: it converges in three
 _OUTSIDE = 1.05  # place beyond the end of a tile, in which a time within the bracket of an event may lie
@@ -30,29 +30,14 @@ class Tiles(BodyPoses):
         modes: in each tile.
         borders: times at which stretches meet, those without a tile included [s].
         resolved: False of a tile in which no polynomial follows the states, as in the last instants of a slip.
+        drives: forces whose work is a result [N, N m], (tiles, points, drives); without any where none was asked for.
     """
 
     stretch: NDArray[np.intp]
     modes: tuple[Modes, ...]
     resolved: NDArray[np.bool_]
     borders: Array = field(default_factory=lambda: np.zeros(0))
-
-    @classmethod
-    def of(cls, pieces: Pieces, number: int) -> Tiles:
-        """Tiles of pieces of a stretch."""
-        count = len(pieces.time)
-        return cls(
-            time=pieces.time,
-            pace=pieces.pace,
-            p=pieces.p,
-            R=pieces.R,
-            v=pieces.v,
-            w=pieces.w,
-            stretch=np.full(count, number),
-            modes=(pieces.modes,) * count,
-            resolved=np.ones(count, dtype=bool),
-            coarse=pieces.coarse,
-        )
+    drives: Array = field(default_factory=lambda: np.zeros(0))
 
     def ordered(self, order: NDArray[np.intp]) -> Tiles:
         """Tiles in another order, or some of them."""
@@ -71,10 +56,6 @@ class Tiles(BodyPoses):
 
         known: dict[Modes, Modes] = {}
         return replace(self, modes=tuple(known.setdefault(item, folded(item)) for item in self.modes))
-
-    def one(self, number: int) -> Tiles:
-        """One tile."""
-        return self.ordered(np.array([number]))
 
     def holding(self, times: Array) -> Places:
         """Places of times [s] in the tiles that hold them; of two that meet there the later."""

@@ -10,33 +10,26 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.contacts import gap_of, rolling_of, slide_of
 from proofroll.truth.check.laws.impacts import impact
 from proofroll.truth.check.laws.integrals import dot, norm
-from proofroll.truth.check.laws.joints import Coordinates
 from proofroll.truth.check.laws.motion import jump
 from proofroll.truth.check.laws.record import Passage, Pieces
-from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.residuals import STRUCK, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
-
-_STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
 
 
 def transition(
-    scene: LawScene, passage: Passage, residuals: LawResiduals, coordinates: Coordinates, fastest: dict[str, float]
+    scene: LawScene, passage: Passage, residuals: LawResiduals, fastest: dict[str, float]
 ) -> dict[int, float]:
     """Checks a transition; impulse along each driven joint, by its number, if velocities jump [N s, N m s].
 
     ``fastest``: largest speed of impact of each contact and stop so far, kept up to date.
     """
     pieces_before, pieces_after = passage.before, passage.after
-    residuals.note(
-        "joined",
-        "",
-        jump(scene, pieces_after, pieces_before, slice(None), slice(None), rates=False),
-        1.0,
-        pieces_before.time[:, 0],
-    )
-    is_struck = bool(jump(scene, pieces_after, pieces_before, slice(None), slice(None))[0] > _STRUCK)
+    residuals.coarse, residuals.events = 1.0, residuals.events + 1
+    apart = jump(scene, pieces_after, pieces_before, slice(None), slice(None), rates=False)
+    residuals.note("joined", "", apart, 1.0, pieces_before.time[:, 0])
+    is_struck = bool(jump(scene, pieces_after, pieces_before, slice(None), slice(None))[0] > STRUCK)
     if is_struck:
-        return impact(scene, passage, residuals, coordinates, fastest)
+        return impact(scene, passage, residuals, fastest)
     if not passage.decided:
         return {}
     zeros = [*_of_contacts(scene, pieces_before, pieces_after), *_of_joints(scene, pieces_before, pieces_after)]

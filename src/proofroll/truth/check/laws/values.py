@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.truth.check.laws.contacts import gap_of, slide_of
 from proofroll.truth.check.laws.integrals import dot, norm, of_angles, of_quaternion, turned
-from proofroll.truth.check.laws.joints import Coordinates
+from proofroll.truth.check.laws.joints import coordinate_of
 from proofroll.truth.check.laws.loads import bushing_load, rotation_vector, spring_ends, spring_pull
 from proofroll.truth.check.laws.record import Array, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
@@ -36,14 +36,14 @@ def _vector(published: PublishedValues, name: str) -> Array:
 
 def _coordinates(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
     """Coordinates and rates of joints with one are those of the poses."""
-    pieces, followed = published.pieces, Coordinates(scene)
+    pieces = published.pieces
     for number, joint in enumerate(scene.mechanism.joints):
         if joint.nq != 1:
             continue
         connection = scene.connections[number]
         placed = scene.placed(connection, pieces)
         place, (_, rate, turns) = (
-            followed.at(number, 0, pieces, placed, connection.kind),
+            coordinate_of(scene, number, 0, pieces, placed),
             placed.free(connection.kind)[0],
         )
         unit = 1.0 if turns else scene.length

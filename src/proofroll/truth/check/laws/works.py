@@ -6,17 +6,15 @@ import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.integrals import integral
-from proofroll.truth.check.laws.joint_forces import law_of
+from proofroll.truth.check.laws.joint_forces import law_of, target_of
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, PublishedValues
-from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.residuals import STRUCK, LawResiduals
 from proofroll.truth.check.laws.samples import kinetic_energy
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.signals import value_of
 from proofroll.truth.check.laws.tiled import Turns, changed_velocity
 from proofroll.truth.check.laws.tiles import Places, Tiles
-
-_STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an impact
 
 
 def works_follow(
@@ -41,7 +39,7 @@ def works_follow(
         )
     if any({"slip", SPREAD} & {*mode.contacts, *mode.rolling, *mode.spinning} for mode in tiles.modes):
         return
-    if (changed_velocity(scene, tiles) > _STRUCK).any():
+    if (changed_velocity(scene, tiles) > STRUCK).any():
         return
     energy, parts = kinetic_energy(scene, tiles)
     loads = BodyLoads(scene, tiles)
@@ -53,6 +51,24 @@ def works_follow(
     sizes = natural + places.at(_summed(size, tiles) + parts) + float(parts[0, 0])
     value = np.sum([published.values[name] for name in names], axis=0)
     _note("all drives", (value, places.at(work), sizes), published, residuals, sum(bars[name] for name in names))
+
+
+def held_efforts(
+    scene: LawScene, tiles: Tiles, turns: Turns, places: Places, published: PublishedValues, residuals: LawResiduals
+) -> None:
+    """Checks efforts that a controller holds: they follow from the state at the instant at which it sets them."""
+    control, natural = scene.mechanism.control, scene.force * scene.length
+    if control is None or control.held != "effort" or control.policy is not None:
+        return
+    first = np.searchsorted(tiles.stretch, tiles.stretch[places.tile])  # tile with which the stretch begins
+    for k, data in enumerate(scene.mechanism.actuators):
+        if data.name not in control.actuators:
+            continue
+        number = scene.mechanism.joint_index[data.joint]
+        begun, effort = turns[number, 0][first, :1], published.pieces.effort[..., k]
+        rates = scene.free(number, tiles)[0].rate[first, :1]
+        law = law_of(data, target_of(control, data, published.pieces.time), begun, rates)
+        residuals.note("effort", data.name, effort - law, np.abs(effort) + natural, published.pieces.time)
 
 
 def _note(

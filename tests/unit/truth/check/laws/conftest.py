@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,9 +11,11 @@ import numpy as np
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.check.laws.integrals import POINTS
-from proofroll.truth.check.laws.law_check import LawCheck
-from proofroll.truth.check.laws.record import Array, Modes, Passage, Pieces
+from proofroll.truth.check.laws.motion import laws_of_pieces
+from proofroll.truth.check.laws.record import Array, Modes, Passage, Pieces, stated
 from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.scene import LawScene
+from proofroll.truth.check.laws.transitions import transition
 
 GRAVITY = 9.81
 
@@ -41,12 +43,12 @@ class HandMade:
 
     def residuals(self) -> LawResiduals:
         """Remainders of the laws."""
-        check = LawCheck(self.mechanism, 1.0, 3.0)
+        scene, residuals, fastest = LawScene(self.mechanism, 1.0, 3.0), LawResiduals(rate=3.0), dict[str, float]()
         for number, pieces in enumerate(self.pieces):
-            check.take(pieces)
+            laws_of_pieces(scene, pieces, residuals)
             if number < len(self.passages):
-                check.passes(self.passages[number])
-        return check.residuals
+                transition(scene, self.passages[number], residuals, fastest)
+        return residuals
 
     def broken(self) -> tuple[str, str]:
         """Law and part of the first violation; empty texts: there is none."""
@@ -54,30 +56,18 @@ class HandMade:
         return ("", "") if violation is None else (violation.law, violation.part)
 
 
-def without_contacts(mechanism: Mechanism, time: Array, **stated: Any) -> Pieces:
-    """Pieces of a motion without contacts, stops and dry friction; what is not stated is zero.
+def without_contacts(mechanism: Mechanism, time: Array, **known: Any) -> Pieces:
+    """Pieces of a motion whose joints neither rub nor stop; what is not known is zero, and no contact is closed."""
+    joints = len(mechanism.joints)
+    modes = known.pop("modes", Modes((), (), (), ("open",) * joints, (("open", "open"),) * joints))
+    return stated(mechanism, modes, time, **known)
 
-    ``stated``: fields of :class:`Pieces`.
-    """
-    shape, joints = time.shape, len(mechanism.joints)
-    sizes: dict[str, Sequence[int]] = {
-        "effort": (len(mechanism.actuators),),
-        "coupling": (len(mechanism.couplings),),
-        "drive": (joints,),
-        "loop": (len(mechanism.loops), 6),
-        "friction": (joints,),
-        "stops": (joints, 2),
-        **dict.fromkeys(("force", "place", "normal", "rolling", "spinning"), (0, 3)),
-    }
-    zeros = {name: np.zeros((*shape, *size)) for name, size in sizes.items()}
-    return Pieces(
-        **{
-            "time": time,
-            "modes": Modes((), (), (), ("open",) * joints, (("open", "open"),) * joints),
-            **zeros,
-            **stated,
-        }
-    )
+
+def point(pieces: Pieces, number: int) -> Pieces:
+    """First or last point as a piece of one point; ``number``: 0 or -1."""
+    part = slice(number, number + 1 or None)
+    arrays = {name: value[part, part] for name, value in vars(pieces).items() if isinstance(value, np.ndarray)}
+    return replace(pieces, **arrays)
 
 
 def times(start: float, end: float, count: int = 3) -> tuple[Array, Array]:
@@ -169,34 +159,22 @@ def contact(time: Array, force: Any, place: Any, count: int = 1) -> dict[str, An
     }
 
 
-def sliding() -> HandMade:
-    """A ball that slides on a floor with friction 0.2 from 2 m/s while friction makes it turn."""
+def sliding(until: float = 0.2) -> HandMade:
+    """A ball that slides on a floor with friction 0.2 from 2 m/s while friction makes it turn, and on as it reverses.
+
+    It would roll from 0.728 s on.
+    """
     mu, mass, radius, inertia = 0.2, 2.0, 0.1, 0.05
     mechanism = floor_under("free", friction=mu)
-    time, pace = times(0.0, 0.2)
+    time, pace = times(0.0, until)
     x, speed = 2.0 * time - mu * GRAVITY / 2 * time**2, 2.0 - mu * GRAVITY * time
     turning = mu * mass * GRAVITY * radius / inertia
     none, upright = 0 * time, radius + 0 * time
     p, v = np.stack([x, none, upright], -1), np.stack([speed, none, none], -1)
     R, w = about(1, turning / 2 * time**2), np.stack([none, turning * time, none], -1)
-    force = np.stack([none - mu * mass * GRAVITY, none, none + mass * GRAVITY], -1)
+    rubbing = -mu * mass * GRAVITY * np.sign(speed - radius * turning * time)
+    force = np.stack([rubbing, none, none + mass * GRAVITY], -1)
     fields = contact(time, force, np.stack([x, none, none], -1)) | poses(p, v, R, w)
-    pieces = without_contacts(mechanism, time, pace=pace, **fields, modes=touching("slip"))
-    return HandMade(mechanism, (pieces,))
-
-
-def guided(*, reverses: bool) -> HandMade:
-    """A ball on a rail that rubs on a floor with 4 N until it would stop at 0.05 s, and on; ``reverses``: the force."""
-    mass, normal, mu, speed = 2.0, 20.0, 0.2, 0.1
-    mechanism = floor_under("prismatic", friction=mu)
-    rail = Joint("rail", "prismatic", "world", "ball", axis=(1.0, 0.0, 0.0), position=(0.0, 0.0, 0.1))
-    mechanism = replace(mechanism, joints=(rail,))
-    time, pace = times(0.0, 0.08 if reverses else 0.04)
-    slip, none = speed - mu * normal / mass * time, 0 * time
-    p = np.stack([speed * time - mu * normal / mass / 2 * time**2, none, none + 0.1], -1)
-    v = np.stack([slip, none, none], -1)
-    force = np.stack([-mu * normal * np.sign(slip), none, none + normal], -1)
-    fields = contact(time, force, p - np.array([0.0, 0.0, 0.1])) | poses(p, v, about(2, none), 0 * p)
     pieces = without_contacts(mechanism, time, pace=pace, **fields, modes=touching("slip"))
     return HandMade(mechanism, (pieces,))
 
@@ -229,5 +207,5 @@ def bounce(restitution: float = 0.5, speed: float = 0.0, kinetic: float = 0.2, c
         fields = contact(time, 0 * p, np.stack([x, none, none], -1), count) | poses(p, v, about(1, turns * past), w)
         pieces.append(without_contacts(mechanism, time, pace=pace, **fields, modes=touching("open", count)))
     names = frozenset(each.name for each in mechanism.pairs)
-    passage = Passage(pieces[0].points(-1, -1), pieces[1].points(0, 0), impacts=names)
+    passage = Passage(point(pieces[0], -1), point(pieces[1], 0), impacts=names)
     return HandMade(mechanism, tuple(pieces), (passage,))
