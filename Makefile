@@ -8,7 +8,7 @@ OUT ?= out
 # A worker process that finds no bytecode compiles the package anew, which is a quarter of its start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install report test drills nightly check format readme docs gallery engines clean
+.PHONY: install report test drills nightly bench drill check format readme docs gallery engines clean
 
 install: $(VENV)/.installed
 
@@ -36,7 +36,16 @@ test drills: install
 nightly: install
 	$(BIN)/python -m pytest -n 2 -m drill
 	$(BIN)/proofroll report --out $(OUT)/nightly --budget 3600
-	$(BIN)/proofroll drill arithmetic --no-comparisons --tests nightly --kind haswell --kind prescott --jobs 2
+	$(BIN)/python -m proofroll_drill arithmetic --no-comparisons --tests nightly --kind haswell --kind prescott --jobs 2
+
+# Speed, and what proofroll itself costs; faults on purpose, other arithmetic, a referee. Each has more to offer:
+# make bench WHAT=--help; make drill WHAT="referee --count 150".
+bench: WHAT = adapters
+bench: install
+	$(BIN)/python -m proofroll_benchmarks $(WHAT)
+drill: WHAT = faults
+drill: install
+	$(BIN)/python -m proofroll_drill $(WHAT)
 
 check: install
 	$(BIN)/ruff check .

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from proofroll.cli.command_groups import GROUPS
 from proofroll.cli.options import require_pages
 from proofroll.core.errors import Missing
 from proofroll.files.scene_file import load_scene, scene_names
@@ -444,7 +445,7 @@ def test_a_name_that_a_scene_and_a_comparison_share(proofroll: Proofroll, tmp_pa
 
 # The paper's case, and one that slips early, in an engine that locates its events.
 PAPER = ["--set", "rolling_resistance=5e-4", "--set", "mu_static=0.35"]
-EARLY = ["onset", "sphere_in_cylinder", "--set", "mu_static=0.12", "--until", "0.2"]
+EARLY = ["paper", "onset", "sphere_in_cylinder", "--set", "mu_static=0.12", "--until", "0.2"]
 LOCATING = "pinocchio[formulation=impulses,preset=tuned]"  # in steps of 1e-3 s
 
 
@@ -520,7 +521,7 @@ def test_onset_where_nobody_was_asked_for(
 
 def test_onset_without_a_ball(proofroll: Proofroll) -> None:
     """A scene that has no ball on a surface is refused for that, and not for friction that it has not."""
-    code, out, err = proofroll("onset", "pendulum")
+    code, out, err = proofroll("paper", "onset", "pendulum")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "one ball that begins to roll in an upright cylinder" in err
     assert "mu_static" not in err
@@ -542,7 +543,7 @@ def test_onset_of_friction_that_makes_no_sense(
 ) -> None:
     """Friction without a bound, or with one that makes no sense, gives one line and the exit code of wrong usage."""
     given = [word for setting in settings for word in ("--set", setting)]
-    code, out, err = proofroll("onset", "sphere_in_cylinder", *given, "--out", str(tmp_path), "--json")
+    code, out, err = proofroll("paper", "onset", "sphere_in_cylinder", *given, "--out", str(tmp_path), "--json")
     assert (code, out) == (2, "")
     for word in words:
         assert word in err
@@ -566,7 +567,7 @@ mu_static = { low = 0.05, high = 0.8, count = 3 }
 def test_regimes(proofroll: Proofroll, tmp_path: Path) -> None:
     """A map of 3 x 3 runs is printed as one JSON document, the same that is written beside the picture."""
     (tmp_path / "map.toml").write_text(MAP)
-    arguments = ["regimes", str(tmp_path / "map.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    arguments = ["paper", "regimes", str(tmp_path / "map.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
     code, out, err = proofroll(*arguments, "--json")
     assert code == 0, err
     document = json.loads(out)
@@ -589,7 +590,9 @@ def test_regimes(proofroll: Proofroll, tmp_path: Path) -> None:
 def test_regimes_of_a_file_without_a_map(proofroll: Proofroll, tmp_path: Path) -> None:
     """A comparison asks for no map, which one line says."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
-    code, out, err = proofroll("regimes", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json")
+    code, out, err = proofroll(
+        "paper", "regimes", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json"
+    )
     assert (code, out) == (2, "")
     assert 'study = "regimes"' in err
     assert err.startswith("proofroll: ")
@@ -616,12 +619,13 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     """Help names every command; the version is that of the package; no command at all is wrong usage with help."""
     code, out, _ = proofroll("--help")
     assert code == 0
-    for command in ("scenes", "engines", "run", "compare", "report", "onset", "regimes", "stability"):
-        assert command in out
-    assert "..." not in out.partition("Ask:")[2]  # no summary is cut
-    heads = [line for line in out.splitlines() if line.endswith(":") and not line.startswith(" ")]
-    groups = ["Options", "Ask", "Bring", "Study", "Blajer's", "Maintain"]
-    assert [head.partition(" ")[0].strip(":") for head in heads[:6]] == groups
+    lines = out.splitlines()
+    assert len(lines) < 24  # with the line of the next command
+    assert max(map(len, lines)) <= 80
+    rows = [re.fullmatch(r"(\w*) +(\w+)  +([A-Z].*)", line) for line in lines[4:]]
+    assert [row[2] for row in rows if row] == [name for names in GROUPS.values() for name in names]
+    assert [row[1] for row in rows if row and row[1]] == list(GROUPS)
+    assert all(row[3].endswith(".") and "..." not in row[3] for row in rows if row)  # no summary is cut
     assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
     assert proofroll()[0] == 2
     code, out, err = proofroll("new")

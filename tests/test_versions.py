@@ -1,4 +1,4 @@
-"""``proofroll versions``: one engine in two versions, by real runs in two interpreters."""
+"""``proofroll diff`` of two versions of one engine, by real runs in two interpreters."""
 
 from __future__ import annotations
 
@@ -54,15 +54,15 @@ def versions(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> Callable[..., tuple[int, str, str]]:
-    """Runs ``proofroll versions aged OLD NEW`` on the claim."""
+    """Runs ``proofroll diff aged@OLD aged@NEW`` on the claim."""
     install_engines({"aged": "aged:Aged"})  # announced here, installed there alone
     monkeypatch.setenv("PROOFROLL_ENGINES", str(tmp_path / "engines"))
     claim = tmp_path / "balls.toml"
     claim.write_text(CLAIM, encoding="utf-8")
 
     def run(old: str, new: str, *more: str) -> tuple[int, str, str]:
-        places = [str(pythons.get(item, item)) for item in (old, new)]
-        return proofroll("versions", "aged", *places, str(claim), *more, "--out", str(tmp_path / "out"))
+        places = [f"aged@{pythons.get(item, item)}" for item in (old, new)]
+        return proofroll("diff", *places, str(claim), *more, "--out", str(tmp_path / "out"))
 
     return run
 
@@ -73,7 +73,9 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     code, out, err = versions("1.0", "2.0", "--rounds", "2", "--json")
     assert code == 1, err
     found = json.loads(out)
-    section = re.search(r"^## `versions --json`\n(.*?)(?=^## )", DOCUMENT, flags=re.DOTALL | re.MULTILINE)
+    section = re.search(
+        r"^## `diff --json` of two versions of an engine\n(.*?)(?=^## )", DOCUMENT, flags=re.DOTALL | re.MULTILINE
+    )
     assert section is not None
     assert set(found) == set(re.findall(r"^\| `(\w+)` \|", section[1], flags=re.MULTILINE))
     assert [found[side]["version"] for side in ("old", "new")] == ["1.0", "2.0"]
@@ -126,22 +128,35 @@ def test_versions_that_are_none(versions: Callable[..., tuple[int, str, str]], o
     assert err.count("\n") == 1
 
 
-@pytest.mark.drill
-def test_versions_are_understood_as_engines_are_written(
+def test_what_versions_are_asked_is_allowed(
     versions: Callable[..., tuple[int, str, str]], proofroll: Proofroll, pythons: dict[str, Path], tmp_path: Path
 ) -> None:
-    """NAME@OLD NAME@NEW SUBJECT is NAME OLD NEW SUBJECT, and a name alone is what is installed here."""
+    """A robot file stands alone, versions have no comment, and files no rounds: each is one line."""
     del versions  # it announces the engine
-    old, new = (str(pythons[version]) for version in ("2.0", "2.0.1"))
-    claim = str(tmp_path / "balls.toml")
-    more = (claim, "--rounds", "0", "--out", str(tmp_path / "out"))
-    code, out, err = proofroll("versions", f"aged@{old}", f"aged@{new}", *more)
-    assert code == 0, err
-    assert "2 cases: 2 with the same bits" in out
-    for words in ((f"aged@{old}", new, "2.0", claim), ("aged", "2.0")):
-        code, out, err = proofroll("versions", *words)
+    sides = [f"aged@{pythons[version]}" for version in ("2.0", "2.0.1")]
+    for words, says in (
+        ([*sides, "arm.urdf", str(tmp_path / "balls.toml")], "a robot file is compared alone"),
+        ([*sides, "--comment", "changes.md"], "it is for reports and runs"),
+        (["old.nc", "new.nc", "--rounds", "3"], "--rounds = 3: this is for two versions of an engine"),
+        (["old.nc", "new.nc", "pendulum"], "this is for two versions of an engine"),
+    ):
+        code, out, err = proofroll("diff", *words)
         assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "name two versions: proofroll versions aged 2.0 VERSION" in err
+        assert says in err
+
+
+@pytest.mark.drill
+def test_several_scenes_are_asked_at_once(
+    versions: Callable[..., tuple[int, str, str]], tmp_path: Path, proofroll: Proofroll, pythons: dict[str, Path]
+) -> None:
+    """Scenes and comparisons may be several; what is named twice is run once."""
+    del versions
+    (tmp_path / "more.toml").write_text(CLAIM.replace("0.002", "0.004"), encoding="utf-8")
+    claims = [str(tmp_path / name) for name in ("balls.toml", "more.toml", "balls.toml")]
+    sides = [f"aged@{pythons[version]}" for version in ("2.0", "2.0.1")]
+    code, out, err = proofroll("diff", *sides, *claims, "--rounds", "0", "--out", str(tmp_path / "out"))
+    assert code == 0, err
+    assert "4 cases: 4 with the same bits" in out
 
 
 def test_lower_bounds_are_those_of_the_adapters() -> None:

@@ -12,7 +12,7 @@ import typer
 from proofroll.cli import options
 from proofroll.core.errors import Missing, ProofrollError
 
-engines = typer.Typer(help="List the engines, and make environments of other versions.", rich_markup_mode=None)
+engines = typer.Typer(help="List engines, and make environments of other versions.", rich_markup_mode=None)
 
 
 @engines.callback(invoke_without_command=True)

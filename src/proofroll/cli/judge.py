@@ -56,7 +56,7 @@ def judge(
     ] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs.
+    """Hold a trajectory from anywhere against the truth. Exit 1 if it differs.
 
     With --robot and --control: test a record of a robot layer by layer, without a simulation: instants from the rate,
     observation from the state, action, target, effort, and in the air acceleration. Without --control: state and

@@ -17,7 +17,7 @@ from proofroll.core.errors import InputError
 if TYPE_CHECKING:
     from proofroll.core.scene import Scene
 
-new = typer.Typer(help="Write a working start: a scene, a comparison, an engine, or a probe.", no_args_is_help=True)
+new = typer.Typer(help="Write a working start: scene, comparison, engine or probe.", no_args_is_help=True)
 Name = Annotated[str, typer.Argument(help="Its name: letters, digits and _; the folder or file is named so.")]
 _TEMPLATES = Path(__file__).parent / "templates"
 _ANOTHER = "choose another name"
@@ -166,7 +166,7 @@ def _comparison(name: str, place: str, loaded: Scene) -> str:
         f"until = {until:g}\nevery = {every:g}\n\n"
         "# Every combination of these values is run: [vary], then parameter = [value, value].\n\n"
         "# How far an observable may be from the truth, and why.\n"
-        "# `proofroll vocabulary WORD` describes every key.\n"
+        "# `proofroll check --keys WORD` describes every key.\n"
         f'[tolerances.close]\nbecause = "a first look; say here why this is close enough"\n'
         f"{''.join(lines)}\n"
         '# What is expected of each engine: expect = "agrees" unless it says another verdict, and because.\n' + rows

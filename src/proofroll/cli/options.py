@@ -10,7 +10,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -266,6 +266,27 @@ def assignments(texts: list[str] | None, option: str = "--set") -> dict[str, str
             raise InputError(option, text, f"{name} is given twice; give it once")
         values[name] = value
     return values
+
+
+def require_only(
+    context: typer.Context, allowed: Container[str], advice: str, further: Mapping[str, str] | None = None
+) -> None:
+    """Raises InputError for the first given option or argument that is not allowed: it would be ignored.
+
+    Args:
+        context: of the command.
+        allowed: names of its parameters.
+        advice: end of the message.
+        further: name of a parameter -> more advice about it.
+    """
+    for parameter in context.command.params:
+        name = str(parameter.name)
+        source = context.get_parameter_source(name)
+        if source is None or source.name != "COMMANDLINE" or name in allowed:
+            continue
+        value = context.params[name]
+        shown = ", ".join(value) if isinstance(value, list) else value
+        raise InputError(parameter.opts[0], shown, advice + (further or {}).get(name, ""))
 
 
 def require_writable(path: Path, option: str = "--out") -> None:

@@ -25,7 +25,7 @@ def stability(
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,
 ) -> None:
-    """Map up to which step or tolerance each engine is stable, and right, along axes of extremes."""
+    """Map up to which step each engine is stable, and right. The map goes along axes of extremes."""
     from proofroll.report.page.html import templates
     from proofroll.report.pages import rendered
     from proofroll.report.stability.part import StabilityPart

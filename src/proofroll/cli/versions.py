@@ -1,14 +1,13 @@
-"""Command ``versions``: one engine in two versions."""
+"""Differences of two versions of an engine, for ``diff``; their environments are made."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from proofroll.cli import options
 from proofroll.core.entry_points import announced
@@ -19,50 +18,50 @@ if TYPE_CHECKING:
 
 # Group of entry points for other subjects than scenes and comparisons; the name is the ending of their files.
 SUBJECTS = "proofroll.version_subjects"
-# Default rounds of timing: with twelve, estimates varied by 5 %; with twenty the interval is some 4 % wide.
-_ROUNDS = 20
 
 
 def versions(
-    engine: Annotated[str, typer.Argument(help="Name of the engine, e.g. mujoco.")],
-    old: Annotated[str, typer.Argument(help="A version, a label of `proofroll engines`, or the path of a Python.")],
-    new: Annotated[str, typer.Argument(help="The version to which it is compared, likewise.")] = "",
-    subject: Annotated[
-        str,
-        typer.Argument(
-            help="A comparison, a scene or a robot file; by default all comparisons.", callback=options.own_first
-        ),
-    ] = "",
-    rounds: Annotated[int, typer.Option(min=0, help="Rounds of timing; 0: no speed.")] = _ROUNDS,
-    out: options.Out = Path("out"),
-    fresh: options.Fresh = False,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-) -> None:
-    """Run the same cases in two versions of an engine and show what changed; exit 1 if a verdict did.
+    old: str,
+    new: str,
+    subjects: Sequence[str],
+    *,
+    rounds: int,
+    out: Path,
+    fresh: bool,
+    jobs: int | None,
+    scheduler: str | None,
+) -> tuple[VersionsStudy, list[Any]]:
+    """Runs the same cases in two versions of an engine; returns the differences, as records and for a terminal.
 
-    Environments that are missing are made, as by `proofroll engines add`; workers of a cluster need their own. Speed is
-    measured here, and never decides the exit code.
+    The parameters are those of ``diff``. Page and JSON document are written to ``out``; a missing environment is made.
+
+    Raises:
+        InputError: a name is unknown, the engines are two, or both versions are one.
     """
+    from proofroll.core.plugins import place_of, plain_name
     from proofroll.report.versions import heading, lines, page, robot_table, table
 
-    engine, old, new, subject = _spelled(engine, old, new, subject)
+    engine = plain_name(old)
+    if engine != plain_name(new):
+        raise InputError("new", new, f"is no version of {engine}; name two of one engine, as {engine}@VERSION")
     readers = {point.name: point for point in announced(SUBJECTS)}
-    robot = readers.get(Path(subject).suffix.removeprefix("."))
-    if robot is not None and scheduler is not None:
+    robots = [name for name in subjects if Path(name).suffix.removeprefix(".") in readers]
+    if robots and len(subjects) > 1:
+        raise InputError("scene", robots[0], "a robot file is compared alone; leave the others out")
+    if robots and scheduler is not None:
         raise InputError("--scheduler", scheduler, "a robot file is checked here; leave the option out")
-    if robot is None:
+    if not robots:
         from proofroll.studies.versions.versions import comparisons_about
 
-        comparisons = comparisons_about(subject, engine)  # before minutes are spent on environments
+        comparisons = comparisons_about(subjects, engine)  # before minutes are spent on environments
     options.require_pages()
-    sides = _side(engine, old), _side(engine, new)
+    sides = _side(engine, place_of(old) or engine), _side(engine, place_of(new) or engine)
     if sides[0] == sides[1]:
         raise InputError("new", new, f"both are {sides[0]}; name two versions")
-    if robot is not None:
-        with options.spinner(f"{engine} {old} and {new}"):
-            content: VersionsStudy = robot.load()(subject, *sides)
+    if robots:
+        reader = readers[Path(robots[0]).suffix.removeprefix(".")]
+        with options.spinner(f"{old} and {new}"):
+            content: VersionsStudy = reader.load()(robots[0], *sides)
     else:
         from proofroll.studies.versions.versions import compare_versions
 
@@ -70,29 +69,8 @@ def versions(
         with options.progress_bar("cases") as advance:
             content = compare_versions(sides, comparisons, runner, rounds, advance)
     file = _keep(content, page(content), out)
-    made = table if robot is None else robot_table
-    place = f"The page is in {file}.html."
-    options.show(content, as_json, lambda: [heading(content), made(content), *lines(content), place], widest=80)
-    if content.lost:
-        raise typer.Exit(options.ENGINE)
-    raise typer.Exit(options.CONTRADICTED if content.changed else options.OK)
-
-
-def _spelled(engine: str, old: str, new: str, subject: str) -> tuple[str, str, str, str]:
-    """Engine, two versions and subject; also from arguments in the form NAME@OLD NAME@NEW SUBJECT."""
-    from proofroll.core.plugins import place_of, plain_name
-
-    name = plain_name(engine)
-    if place_of(engine):
-        if subject:
-            raise InputError(
-                "engine", engine, f"the version stands behind it: {name} {place_of(engine)} {new} {subject}"
-            )
-        old, new, subject = place_of(engine), old, new
-    if not new:
-        raise InputError("new", None, f"name two versions: proofroll versions {name} {old} VERSION")
-    old, new = (place_of(text) if plain_name(text) == name and "@" in text else text for text in (old, new))
-    return name, old, new, subject
+    made = robot_table if robots else table
+    return content, [heading(content), made(content), *lines(content), f"The page is in {file}.html."]
 
 
 def _keep(content: VersionsStudy, page: str, out: Path) -> Path:

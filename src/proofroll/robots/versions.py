@@ -32,7 +32,7 @@ class RobotVersions:
 
 
 def robot_versions(file: str, old: str, new: str) -> VersionsStudy:
-    """Content of `proofroll versions` for a robot file: two versions, given as ``NAME`` or ``NAME@PLACE``.
+    """Content of `proofroll diff` for a robot file: two versions, given as ``NAME`` or ``NAME@PLACE``.
 
     Raises:
         InputError, Missing: see :func:`proofroll.robots.check.check.check`.

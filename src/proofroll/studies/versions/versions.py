@@ -33,22 +33,28 @@ from proofroll.studies.versions.difference import (
 )
 
 
-def comparisons_about(subject: str, engine: str) -> list[Comparison]:
-    """Comparisons to run: the named one, those about a scene, or all that have rows of the engine.
+def comparisons_about(subjects: Sequence[str], engine: str) -> list[Comparison]:
+    """Comparisons to run: the named ones, those about scenes, or all that have rows of the engine.
 
     Args:
-        subject: name or path of a comparison, or of a scene; empty: all comparisons, each reduced to its brief part.
+        subjects: names or paths of comparisons or scenes; none: all comparisons, each reduced to its brief part.
         engine: plain name; for a scene without comparisons, all its formulations are run.
 
     Raises:
         InputError: there is no such comparison or scene, or it has no rows of this engine.
     """
-    if not subject:
+    if not subjects:
         comparisons = [load_comparison(name).briefly() for name in comparison_names()]
         comparisons = [item for item in comparisons if _rows_of(item, engine)]
         if not comparisons:
             raise InputError("engine", engine, "no comparison has rows of it; name a scene or a comparison")
         return comparisons
+    named = [item for subject in dict.fromkeys(subjects) for item in _about(subject, engine)]
+    return [item for place, item in enumerate(named) if item not in named[:place]]
+
+
+def _about(subject: str, engine: str) -> list[Comparison]:
+    """The comparison of a name, or those about a scene, that have rows of the engine. Raises InputError."""
     try:
         scene_folder(subject)
     except InputError:
