@@ -8,11 +8,13 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from proofroll import __version__ as proofroll_version
 from proofroll.cli.command_groups import GROUPS
 from proofroll.cli.options import require_pages
 from proofroll.core.errors import Missing
@@ -290,13 +292,28 @@ def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     assert found["absent"]["status"] == "missing"
     assert "no_such_module_anywhere" in found["absent"]["message"]
     assert found["misspelt"]["status"] == "broken"
-    code, out, err = proofroll("engines")
+    code, out, err = proofroll("engines", "--capabilities")
     assert (code, err) == (0, "")
     assert "no_such_module_anywhere" in " ".join(out.split())
     assert "a only (" in out
     rows = [line.split() for line in out.splitlines()]
     assert ["capability", "oracle"] in rows
     assert ["contact", "between", "bodies", "a"] in rows
+
+
+def test_engines_are_listed_by_their_packages(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without more the versions are those of the packages: no engine is loaded or started for them."""
+    monkeypatch.setattr("proofroll.running.engine_questions.describe", None)
+    monkeypatch.setattr("proofroll.core.plugins.load_engine", None)
+    code, out, err = proofroll("engines")
+    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines()[:-1]}
+    assert (code, err) == (0, "")
+    assert rows["mujoco"] == [version("mujoco"), "mujoco"]
+    assert rows["pinocchio"] == [version("pin"), "pin"]
+    assert rows["projection"] == [proofroll_version, "proofroll"]
+    monkeypatch.setattr("proofroll.core.plugins.package_of", lambda _: "no_such_package_anywhere")
+    words = proofroll("engines")[1].split()
+    assert words[words.index("mujoco") + 1 :][:3] == ["not", "installed", "no_such_package_anywhere"]
 
 
 COMPARISON = """

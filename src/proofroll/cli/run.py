@@ -119,7 +119,8 @@ def run(
             options.complain(f"{told.sentence}: {told.cause.remedy}")
     if as_json or done or content.final:
         judged = _comparison(question, engine, settings, control, until) if engine != "truth" else ""
-        parts = partial(run_lines, content, forces=forces, everything=everything, checked=judged)
+        how = {"engine": case.engine.title, "checked": judged}
+        parts = partial(run_lines, content, **how, forces=forces, everything=everything)
         options.show(content, as_json, parts, widest=WIDTH)
     if not done or content.ends is not None:
         raise typer.Exit(options.ENGINE)

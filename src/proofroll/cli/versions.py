@@ -106,7 +106,8 @@ def _side(engine: str, text: str) -> str:
 
 def _made(engine: str, version: str) -> str:
     """Makes the environment of a version; returns its engine ``NAME@VERSION``."""
-    from proofroll.running.make_environment import add, package_of
+    from proofroll.core.plugins import package_of
+    from proofroll.running.make_environment import add
 
     package = package_of(engine)
     by_hand = f"proofroll engines add {engine} --requirement {package or 'PACKAGE'}=={version}"

@@ -24,6 +24,8 @@ THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"),
     "1",
 )
+# A worker draws nothing; MuJoCo would look for a library of windows, which takes a tenth of a second.
+_NO_WINDOWS = {"MUJOCO_GL": "disable"}
 # Variables that redirect a Python's imports or start-up; they are meant for this Python, not for another interpreter.
 _OF_THIS_PYTHON = (
     "PYTHONPATH",
@@ -123,7 +125,7 @@ class Worker:
                 stdout=log,
                 stderr=log,
                 pass_fds=(writer, life),
-                env=(environment_of_another() if python else safe_environment()) | THREADS,
+                env=_NO_WINDOWS | (environment_of_another() if python else safe_environment()) | THREADS,
                 text=True,
                 start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
             )
