@@ -129,13 +129,12 @@ def test_versions_that_are_none(versions: Callable[..., tuple[int, str, str]], o
 
 
 def test_what_versions_are_asked_is_allowed(
-    versions: Callable[..., tuple[int, str, str]], proofroll: Proofroll, pythons: dict[str, Path], tmp_path: Path
+    versions: Callable[..., tuple[int, str, str]], proofroll: Proofroll, pythons: dict[str, Path]
 ) -> None:
-    """A robot file stands alone, versions have no comment, and files no rounds: each is one line."""
+    """Versions have no comment, and files neither rounds nor scenes: each is one line."""
     del versions  # it announces the engine
     sides = [f"aged@{pythons[version]}" for version in ("2.0", "2.0.1")]
     for words, says in (
-        ([*sides, "arm.urdf", str(tmp_path / "balls.toml")], "a robot file is compared alone"),
         ([*sides, "--comment", "changes.md"], "it is for reports and runs"),
         (["old.nc", "new.nc", "--rounds", "3"], "--rounds = 3: this is for two versions of an engine"),
         (["old.nc", "new.nc", "pendulum"], "this is for two versions of an engine"),

@@ -21,7 +21,7 @@ def diff(
     scenes: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Of versions: scenes, comparisons, or one robot file; by default all comparisons.",
+            help="Of versions: scenes and comparisons; by default all comparisons.",
             callback=options.own_first,
         ),
     ] = None,

@@ -10,14 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from proofroll.cli import options
-from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, ProofrollError
 
 if TYPE_CHECKING:
     from proofroll.studies.versions.versions import VersionsStudy
-
-# Group of entry points for other subjects than scenes and comparisons; the name is the ending of their files.
-SUBJECTS = "proofroll.version_subjects"
 
 
 def versions(
@@ -39,38 +35,22 @@ def versions(
         InputError: a name is unknown, the engines are two, or both versions are one.
     """
     from proofroll.core.plugins import place_of, plain_name
-    from proofroll.report.versions import heading, lines, page, robot_table, table
+    from proofroll.report.versions import heading, lines, page, table
+    from proofroll.studies.versions.versions import compare_versions, comparisons_about
 
     engine = plain_name(old)
     if engine != plain_name(new):
         raise InputError("new", new, f"is no version of {engine}; name two of one engine, as {engine}@VERSION")
-    readers = {point.name: point for point in announced(SUBJECTS)}
-    robots = [name for name in subjects if Path(name).suffix.removeprefix(".") in readers]
-    if robots and len(subjects) > 1:
-        raise InputError("scene", robots[0], "a robot file is compared alone; leave the others out")
-    if robots and scheduler is not None:
-        raise InputError("--scheduler", scheduler, "a robot file is checked here; leave the option out")
-    if not robots:
-        from proofroll.studies.versions.versions import comparisons_about
-
-        comparisons = comparisons_about(subjects, engine)  # before minutes are spent on environments
+    comparisons = comparisons_about(subjects, engine)  # before minutes are spent on environments
     options.require_pages()
     sides = _side(engine, place_of(old) or engine), _side(engine, place_of(new) or engine)
     if sides[0] == sides[1]:
         raise InputError("new", new, f"both are {sides[0]}; name two versions")
-    if robots:
-        reader = readers[Path(robots[0]).suffix.removeprefix(".")]
-        with options.spinner(f"{old} and {new}"):
-            content: VersionsStudy = reader.load()(robots[0], *sides)
-    else:
-        from proofroll.studies.versions.versions import compare_versions
-
-        runner = options.new_runner(out, fresh, jobs, scheduler)
-        with options.progress_bar("cases") as advance:
-            content = compare_versions(sides, comparisons, runner, rounds, advance)
+    runner = options.new_runner(out, fresh, jobs, scheduler)
+    with options.progress_bar("cases") as advance:
+        content = compare_versions(sides, comparisons, runner, rounds, advance)
     file = _keep(content, page(content), out)
-    made = robot_table if robots else table
-    return content, [heading(content), made(content), *lines(content), f"The page is in {file}.html."]
+    return content, [heading(content), table(content), *lines(content), f"The page is in {file}.html."]
 
 
 def _keep(content: VersionsStudy, page: str, out: Path) -> Path:

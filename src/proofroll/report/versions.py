@@ -24,9 +24,6 @@ def heading(content: VersionsStudy) -> str:
 
 def answer(content: VersionsStudy) -> str:
     """Summary of the changes, in one sentence."""
-    if content.robot is not None:
-        changes = f"{counted(len(content.changed), 'changes')} in how they hold {content.robot.file}"
-        return changes if content.changed else f"Both hold {content.robot.file} alike."
     cases = content.cases
     changed = sum(bool(case.changed) for case in cases)
     kinds = [case.numbers.kind for case in cases if case.numbers]
@@ -80,15 +77,6 @@ def table(content: VersionsStudy) -> Table:
     return made
 
 
-def robot_table(content: VersionsStudy) -> Table:
-    """Table with a line for each layer of a robot's check."""
-    made = plain_table(*map(Column, ("layer", content.old.version, content.new.version)))
-    for layer in content.robot.layers:
-        shown = ["–" if layer_text is None else layer_text for layer_text in (layer.old, layer.new)]
-        made.add_row(Text(layer.layer, style="red" if layer.changed else ""), *shown)
-    return made
-
-
 def short_setting(setting: str) -> str:
     """Short text of a setting: formulation and preset without their keys."""
     parts = (part.split("=", 1) for part in setting.split(", "))
@@ -117,8 +105,6 @@ def lines(content: VersionsStudy, most: int | None = _MOST) -> Iterator[str]:
 
 def _changes(content: VersionsStudy) -> list[str]:
     """Sentences on changed verdicts, each once with its points."""
-    if content.robot is not None:
-        return list(content.changed)
     points: dict[tuple[str, str, str], list[str]] = {}
     for case in content.cases:
         for sentence in case.changed:

@@ -12,7 +12,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine, plain_name
 from proofroll.files.comparison_file import comparison_names, load_comparison
 from proofroll.files.data_folders import study_folders
-from proofroll.files.scene_file import scene_folder
+from proofroll.files.scene_file import is_scene
 from proofroll.files.toml import study_of
 from proofroll.running.case import EngineDescription, Status, hosts
 from proofroll.running.engine_questions import describe
@@ -55,12 +55,10 @@ def comparisons_about(subjects: Sequence[str], engine: str) -> list[Comparison]:
 
 def _about(subject: str, engine: str) -> list[Comparison]:
     """The comparison of a name, or those about a scene, that have rows of the engine. Raises InputError."""
-    try:
-        scene_folder(subject)
-    except InputError:
+    if not is_scene(subject):
         loaded = load_comparison(subject)
         if not _rows_of(loaded, engine):
-            raise InputError("engine", engine, f"{loaded.name} has no rows of it") from None
+            raise InputError("engine", engine, f"{loaded.name} has no rows of it")
         return [loaded]
     files = [path for folder in study_folders() for path in sorted(folder.rglob("*.toml")) if study_of(path) is None]
     about = [item for path in files if (item := load_comparison(str(path))).scene == subject and _rows_of(item, engine)]
@@ -135,12 +133,11 @@ class VersionsStudy:
     Attributes:
         engine: its name.
         old, new: the versions.
-        comparisons: names of the comparisons that were run; for a robot its file.
+        comparisons: names of the comparisons that were run.
         rows: differences by comparison and setting.
         cases: differences by case.
         defaults: changed default values and capabilities.
         hosts: machine of a cluster -> number of results that it made.
-        robot: for a robot file its ``file``, ``layers``, and rows ``old`` and ``new``; else None.
         changed: sentences about verdicts that changed.
         lost: sentences about runs whose engine is missing.
     """
@@ -153,7 +150,6 @@ class VersionsStudy:
     cases: list[CaseDifference] = field(default_factory=list)
     defaults: list[ChangedDefault] = field(default_factory=list)
     hosts: dict[str, int] = field(default_factory=dict)
-    robot: Any = None
     changed: list[str]
     lost: list[str]
 
