@@ -48,6 +48,7 @@ def compare(
         ),
     ] = None,
     settings: options.Set = None,
+    _root: options.Root = None,
     control: options.Control = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,

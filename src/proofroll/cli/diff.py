@@ -25,6 +25,7 @@ def diff(
             callback=options.own_first,
         ),
     ] = None,
+    _root: options.Root = None,
     rounds: Annotated[int, typer.Option(min=0, help="Of versions: rounds of timing; 0: no speed.")] = _ROUNDS,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,

@@ -15,6 +15,7 @@ def export(
     file: Annotated[Path, typer.Argument(help="The file to write.")],
     engine: Annotated[str, typer.Option(help="name[key=value,…]; mujoco writes MJCF.")],
     settings: options.Set = None,
+    _root: options.Root = None,
 ) -> None:
     """Write the model that an engine builds of a scene. Its own tools read it."""
     from proofroll.running.engine_questions import model_file

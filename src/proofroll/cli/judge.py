@@ -36,6 +36,7 @@ def judge(
         ),
     ] = None,
     settings: options.Set = None,
+    _root: options.Root = None,
     tolerance: options.Tolerances = None,
     columns: Annotated[
         list[str] | None,
@@ -75,6 +76,7 @@ def judge(
     if layout:
         raise InputError("--as", layout, "it is for the record of a robot: give --robot, too")
     from proofroll.files.scene_file import load_scene
+    from proofroll.files.scene_sources import root_words
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.studies.judging import judge as judging
 
@@ -96,6 +98,7 @@ def judge(
                 *(word for text in settings or () for word in ("--set", text)),
                 *(word for text in tolerance or () for word in ("--tolerance", text)),
                 *(("--because", because) if because else ()),
+                *root_words(),
             ]
         )
         lines = _lines(judged, run.name, asked, _names(columns), everything=everything)

@@ -11,6 +11,7 @@ from proofroll.cli import options
 def ladder(
     scene: options.SceneName,
     settings: options.Set = None,
+    _root: options.Root = None,
     quantity: Annotated[
         str | None, typer.Option(help="Observable; by default the scene's deciding observable.")
     ] = None,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from proofroll.cli import options
 from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -84,6 +85,7 @@ def probe(
     robot: Annotated[Path, typer.Argument(help="The robot file: URDF, or MJCF for mujoco.")],
     program: Annotated[str, typer.Option("--for", help="Simulator that runs the script: mujoco or isaaclab.")],
     base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
+    _root: options.Root = None,
 ) -> None:
     """Write a script that records a tenth of a second of a robot in the air in your simulator, for `judge`."""
     from proofroll.core.errors import require_known

@@ -122,6 +122,29 @@ Set = Annotated[
 ]
 
 
+def _read_below(context: typer.Context, root: Path | None) -> Path | None:
+    """Sets the folder of robot files while a command runs, for this process and its workers, if one is given."""
+    if root is None:
+        return None
+    if not root.is_dir():
+        raise InputError("--root", root, "there is no such folder")
+    from proofroll.files.scene_sources import ROOT
+
+    os.environ[ROOT] = str(root.resolve())
+    context.call_on_close(lambda: os.environ.pop(ROOT))
+    return root
+
+
+Root = Annotated[
+    Path | None,
+    typer.Option(
+        "--root",
+        help="Folder of what a robot file includes and its meshes; by default its own.",
+        callback=_read_below,
+    ),
+]
+
+
 def controlled(scene: str, control: Path | None) -> str:
     """Name of a scene under the controller of ``--control``; without the option the name of the scene."""
     if control is None:

@@ -30,6 +30,7 @@ def recommend(
     ],
     tolerance: options.Tolerances = None,
     settings: options.Set = None,
+    _root: options.Root = None,
     control: options.Control = None,
     engine: Annotated[
         list[str] | None,

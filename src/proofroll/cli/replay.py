@@ -20,6 +20,7 @@ def replay(
         ),
     ] = None,
     control: options.Control = None,
+    _root: options.Root = None,
 ) -> None:
     """Show a stored run in motion beside the truth, as a page.
 

@@ -41,6 +41,7 @@ def report(
     ] = None,
     engine: options.Engines = None,
     settings: options.Set = None,
+    _root: options.Root = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,

@@ -28,6 +28,7 @@ def run(
         ),
     ],
     settings: options.Set = None,
+    _root: options.Root = None,
     control: options.Control = None,
     until: options.Until = None,
     every: Annotated[
@@ -128,10 +129,12 @@ def run(
 
 def _comparison(scene: str, engine: str, settings: list[str] | None, control: Path | None, until: float | None) -> str:
     """Command that compares the same run with the truth."""
+    from proofroll.files.scene_sources import root_words
+
     words = ["proofroll", "compare", scene, "--engine", engine]
     for text in settings or ():
         words += ["--set", text]
-    words += ["--control", str(control)] if control else []
+    words += [*(["--control", str(control)] if control else []), *root_words()]
     words += ["--until", f"{until:g}"] if until is not None else []
     return shlex.join(words)
 

@@ -16,6 +16,7 @@ def stability(
             callback=options.own_first,
         ),
     ],
+    _root: options.Root = None,
     engine: options.Engines = None,
     axis: Annotated[list[str] | None, typer.Option(help="Axis of the map, e.g. V0; repeat. All by default.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Three values per axis, and fewer steps per run.")] = False,

@@ -22,6 +22,7 @@ _FAINT = 1e-10  # relative to the largest value of its unit: what is shown as ze
 def balance(
     scene: options.SceneName,
     settings: options.Set = None,
+    _root: options.Root = None,
     engine: options.Engines = None,
     hold: Annotated[list[str] | None, typer.Option(help="Joint that is held where it starts; repeat.")] = None,
     control: options.Control = None,

@@ -20,10 +20,7 @@ def check(
     ] = None,
     engine: options.Engines = None,
     base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
-    root: Annotated[
-        Path | None,
-        typer.Option("--root", help="Folder of what a robot file includes and its meshes; by default its own."),
-    ] = None,
+    _root: options.Root = None,
     states: Annotated[int, typer.Option(min=1, max=1000, help="Random states that are compared.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
     out: Annotated[Path | None, typer.Option("--out", help="Write check.html and check.json to this folder.")] = None,
@@ -76,7 +73,7 @@ def check(
     from proofroll.robots.check.terminal import WIDTH, check_parts
     from proofroll.robots.files.meaning import CheckSettings
 
-    how = CheckSettings(base=base, root=root, states=states, seed=seed, time_limit=time_limit)
+    how = CheckSettings(base=base, states=states, seed=seed, time_limit=time_limit)
     if against is None:
         if names:
             raise InputError("--map", ", ".join(names), "this is for two files; name the other by --against FILE")
