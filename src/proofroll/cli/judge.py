@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
-from proofroll.core.limits import RUN_TIME_LIMIT
+from proofroll.core.limits import FOR_A_TRUTH, RUN_TIME_LIMIT
+from proofroll.core.pace import PACE
 
 if TYPE_CHECKING:
     from proofroll.studies.judging.judge import Judged
@@ -87,7 +88,8 @@ def judge(
         raise InputError("scene", scene or "", "name it once: proofroll judge FILE --scene SCENE")
     loaded = load_scene(scene or str(named), **{**written, **options.assignments(settings)})  # type: ignore[arg-type]  # text is checked there
     bounds = _bounds(tolerance, loaded.deciding) if tolerance else None
-    with options.spinner(f"the truth of {loaded.name}"), options.wall_limit(time_limit, f"the truth of {loaded.name}"):
+    what, soft = f"the truth of {loaded.name}", PACE.limited(FOR_A_TRUTH * time_limit)
+    with options.spinner(what), options.wall_limit(time_limit, what), soft:
         judged = judging.judge(run, loaded, bounds, because=because, columns=_names(columns))
     if as_json:
         options.write_json(judged.content())

@@ -263,11 +263,14 @@ def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
 
 
 def _waited_for() -> str:
-    """End of a line of progress with the engines that have not answered yet."""
+    """End of a line of progress: the engines that have not answered yet, or how far truths have come."""
     asking = sys.modules.get("proofroll.running.engine_questions")  # not imported: no engine was asked
     names = dict.fromkeys(asking.waited_for) if asking else ()
-    what = "what they are" if len(names) > 1 else "what it is"
-    return f": waiting for {', '.join(names)} to say {what}" if names else ""
+    if names:
+        what = "what they are" if len(names) > 1 else "what it is"
+        return f": waiting for {', '.join(names)} to say {what}"
+    running = sys.modules.get("proofroll.running.process")
+    return "".join(f": {text}" for text in running.truths_at()) if running else ""
 
 
 def _standard_error() -> tuple[Console, bool]:
@@ -327,10 +330,16 @@ def require_writable(path: Path, option: str = "--out") -> None:
 @contextmanager
 def spinner(text: str) -> Iterator[Callable[[str], None]]:
     """Context manager with a sign of activity on standard error; it yields a function that changes its text."""
+    from rich.text import Text
+
+    class Present:
+        def __rich__(self) -> Text:
+            return Text(f"{texts[-1]}{_waited_for()}")
+
     console, moves = _standard_error()
     texts = [text]
-    with console.status(text) if moves else _now_and_then(lambda: texts[-1]) as sign:
-        yield texts.append if sign is None else sign.update
+    with console.status(Present()) if moves else _now_and_then(lambda: texts[-1]):
+        yield texts.append
 
 
 @contextmanager

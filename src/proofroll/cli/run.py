@@ -42,7 +42,9 @@ def run(
         Path | None,
         typer.Option(help="Write the events to this csv file, with energy and height of each bounce."),
     ] = None,
-    time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = RUN_TIME_LIMIT,
+    time_limit: Annotated[
+        float, typer.Option(help="Seconds after which the run is ended; a truth keeps what it has found.")
+    ] = RUN_TIME_LIMIT,
     ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Draw the run to this file: html in motion beside the truth, or svg, png, pdf.")
