@@ -55,6 +55,7 @@ def test_a_limit_keeps_what_came_before(name: str, parameters: dict[str, float])
     assert same.max() <= max(bar, 1e-12)
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("ticking")
 def test_a_truth_that_was_cut_is_not_stored(tmp_path: Path) -> None:
     """A worker gives what the truth has found, and the next run does not take that for the whole."""
