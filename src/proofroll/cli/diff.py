@@ -10,9 +10,6 @@ import typer
 from proofroll.cli import options
 from proofroll.core.errors import InputError
 
-# Default rounds of timing: with twelve, estimates varied by 5 %; with twenty the interval is some 4 % wide.
-_ROUNDS = 20
-
 
 def diff(
     context: typer.Context,
@@ -26,7 +23,6 @@ def diff(
         ),
     ] = None,
     _root: options.Root = None,
-    rounds: Annotated[int, typer.Option(min=0, help="Of versions: rounds of timing; 0: no speed.")] = _ROUNDS,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,
@@ -41,33 +37,30 @@ def diff(
 
     Versions of an engine run the same cases: ENGINE@VERSION, ENGINE@LABEL of `proofroll engines`, ENGINE@PATH of a
     Python, or ENGINE, which is installed here. Environments that are missing are made, as by `proofroll engines add`;
-    workers of a cluster need their own. Speed is measured here, and never decides the exit code.
+    workers of a cluster need their own. They are compared as two reports are; errors and costs do not decide the exit
+    code.
     """
     from proofroll.core.plugins import place_of
     from proofroll.report.terminal.screen import WIDTH
 
+    if comment is not None:
+        options.require_writable(comment, "--comment")
+    shown: object
     if any(place_of(text) and not Path(text).exists() for text in (old, new)):
         from proofroll.cli.versions import versions
 
-        if comment is not None:
-            raise InputError("--comment", comment, "it is for reports and runs; versions have a page of their own")
-        content, parts = versions(
-            old, new, scenes or (), rounds=rounds, out=out, fresh=fresh, jobs=jobs, scheduler=scheduler
-        )
-        options.show(content, as_json, lambda: parts, widest=WIDTH)
-        if content.lost:
-            raise typer.Exit(options.ENGINE)
-        raise typer.Exit(options.CONTRADICTED if content.changed else options.OK)
-    options.require_only(context, {"old", "new", "comment", "as_json"}, "this is for two versions of an engine")
-    if comment is not None:
-        options.require_writable(comment, "--comment")
-    changed, lines, markdown, shown = _of_files(old, new)
+        against, lost = versions(old, new, scenes or (), options.new_runner(out, fresh, jobs, scheduler))
+        changed = any(item.kind in {"verdict", "gone"} for item in against.changes)
+        lines, markdown, shown = against.lines, against.markdown, against
+    else:
+        options.require_only(context, {"old", "new", "comment", "as_json"}, "this is for two versions of an engine")
+        (changed, lines, markdown, shown), lost = _of_files(old, new), False
     if comment is not None:
         from proofroll.running.store import write_text
 
         write_text(comment, markdown)
     options.show(shown, as_json, lambda: lines, widest=WIDTH)
-    raise typer.Exit(options.CONTRADICTED if changed else options.OK)
+    raise typer.Exit(options.ENGINE if lost else options.CONTRADICTED if changed else options.OK)
 
 
 def _of_files(old: str, new: str) -> tuple[bool, list[str], str, object]:

@@ -6,63 +6,70 @@ import contextlib
 import os
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from proofroll.cli import options
 from proofroll.core.errors import InputError, ProofrollError
 
 if TYPE_CHECKING:
-    from proofroll.studies.versions.versions import VersionsStudy
+    from proofroll.report.changes import Against, EarlierReport
+    from proofroll.running.runner import Runner
+    from proofroll.studies.comparison.outcome import Outcome
 
 
-def versions(
-    old: str,
-    new: str,
-    subjects: Sequence[str],
-    *,
-    rounds: int,
-    out: Path,
-    fresh: bool,
-    jobs: int | None,
-    scheduler: str | None,
-) -> tuple[VersionsStudy, list[Any]]:
-    """Runs the same cases in two versions of an engine; returns the differences, as records and for a terminal.
+def versions(old: str, new: str, subjects: Sequence[str], runner: Runner) -> tuple[Against, bool]:
+    """Changes between the same comparisons in two versions of an engine; an environment that is missing is made.
 
-    The parameters are those of ``diff``. Page and JSON document are written to ``out``; a missing environment is made.
+    Args:
+        old: the first version, ``NAME`` or ``NAME@PLACE``.
+        new: the second version.
+        subjects: scenes and comparisons; none: all comparisons.
+        runner: runs the cases.
+
+    Returns:
+        The changes, and True if an engine was missing.
 
     Raises:
         InputError: a name is unknown, the engines are two, or both versions are one.
     """
     from proofroll.core.plugins import place_of, plain_name
-    from proofroll.report.versions import heading, lines, page, table
-    from proofroll.studies.versions.versions import compare_versions, comparisons_about
+    from proofroll.studies.versions.versions import comparisons_about, outcomes_of_versions
 
     engine = plain_name(old)
     if engine != plain_name(new):
         raise InputError("new", new, f"is no version of {engine}; name two of one engine, as {engine}@VERSION")
     comparisons = comparisons_about(subjects, engine)  # before minutes are spent on environments
-    options.require_pages()
     sides = _side(engine, place_of(old) or engine), _side(engine, place_of(new) or engine)
     if sides[0] == sides[1]:
         raise InputError("new", new, f"both are {sides[0]}; name two versions")
-    runner = options.new_runner(out, fresh, jobs, scheduler)
     with options.progress_bar("cases") as advance:
-        content = compare_versions(sides, comparisons, runner, rounds, advance)
-    file = _keep(content, page(content), out)
-    return content, [heading(content), table(content), *lines(content), f"The page is in {file}.html."]
+        outcomes = outcomes_of_versions(sides, comparisons, runner, advance)
+    earlier, later = (_as_report(side, found, runner) for side, found in zip(sides, outcomes, strict=True))
+    return later.against(earlier), any(line.status == "missing" for line in (*earlier.lines, *later.lines))
 
 
-def _keep(content: VersionsStudy, page: str, out: Path) -> Path:
-    """Writes page and JSON document; returns their path without ending."""
-    from proofroll.running.store import write_text
+def _as_report(engine: str, outcomes: Sequence[Outcome], runner: Runner) -> EarlierReport:
+    """Report of one version, by the engine's plain name; its defaults stand beside its version."""
+    from datetime import UTC, datetime
 
-    out.mkdir(parents=True, exist_ok=True)
-    words = ["versions", content.engine, content.old.version, content.new.version]
-    file = out / re.sub(r"[^\w.+-]", "_", "-".join(map(str, words)))
-    write_text(file.with_name(f"{file.name}.html"), page)
-    write_text(file.with_name(f"{file.name}.json"), options.json_text(content))
-    return file
+    from proofroll.core.plugins import plain_name
+    from proofroll.report.changes import EarlierReport
+    from proofroll.report.comparison.lines import lines_of
+    from proofroll.running.engine_questions import describe
+    from proofroll.running.timing import machine
+
+    told, name = describe(engine, runner.workers), plain_name(engine)
+    lines = [replace(line, engine=name) for outcome in outcomes for line in lines_of(outcome)]
+    versions = {name: told.version} | {f"default {key}": str(value) for key, value in told.defaults.items()}
+    return EarlierReport(
+        path=Path(engine),
+        date=datetime.now(UTC).isoformat(),
+        machine=machine()["processor"],
+        versions=versions,
+        lines=lines,
+    )
 
 
 def _side(engine: str, text: str) -> str:
