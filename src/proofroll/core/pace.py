@@ -46,6 +46,7 @@ class Pace:
         finally:
             self._limit = math.inf
             self.leave()
+            self._tell("")  # what was told before is over
 
     def follow(self, route: str, end: float) -> None:
         """Begins the ``first`` or ``second`` route to an end in its own unit of time."""
