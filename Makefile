@@ -8,7 +8,7 @@ OUT ?= out
 # A worker process that finds no bytecode compiles the package anew, which is a quarter of its start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install report test drills nightly check format readme docs gallery engines clean
+.PHONY: install report test drills nightly bench drill check format readme docs gallery engines clean
 
 install: $(VENV)/.installed
 
@@ -32,11 +32,23 @@ test drills: install
 	PROOFROLL_NO_DEAR=1 $(BIN)/python -m pytest -n 2 -m "$(MARK)"
 
 # All drills, with the longest, and with those that .ci/run takes only where what they hold has changed; every comparison
-# with all its rows; tests near round-off as two other kinds of processors compute. It prints what each search found.
+# with all its rows; tests near round-off as two other kinds of processors compute. Each runs whatever another found, and a
+# table of the searches ends it: how many examples each drew, and each finding with its seed.
 nightly: install
-	$(BIN)/python -m pytest -n 2 -m drill
-	$(BIN)/proofroll report --out $(OUT)/nightly --budget 3600
-	$(BIN)/proofroll drill arithmetic --no-comparisons --tests nightly --kind haswell --kind prescott --jobs 2
+	@failed=0; \
+	$(BIN)/proofroll report --out $(OUT)/nightly --budget 3600 || failed=1; \
+	$(BIN)/python -m proofroll_drill arithmetic --no-comparisons --tests nightly --kind haswell --kind prescott --jobs 2 || failed=1; \
+	$(BIN)/python -m pytest -n 2 -m drill || failed=1; \
+	exit $$failed
+
+# Speed, and what proofroll itself costs; faults on purpose, other arithmetic, a referee. Each has more to offer:
+# make bench WHAT=--help; make drill WHAT="referee --count 150".
+bench: WHAT = adapters
+bench: install
+	$(BIN)/python -m proofroll_benchmarks $(WHAT)
+drill: WHAT = faults
+drill: install
+	$(BIN)/python -m proofroll_drill $(WHAT)
 
 check: install
 	$(BIN)/ruff check .

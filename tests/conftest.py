@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import dear
+import found
 import numpy as np
 import pytest
 from ball_scenes import scene  # noqa: F401 -- a fixture, which pytest finds here
@@ -70,6 +71,7 @@ gc.disable()
 def pytest_configure(config: pytest.Config) -> None:
     """Registers hooks that fixtures of a whole session call, too, which they do not in this file."""
     config.pluginmanager.register(dear, "dear")
+    config.pluginmanager.register(found, "found")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -8,11 +8,14 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from proofroll import __version__ as proofroll_version
+from proofroll.cli.command_groups import GROUPS
 from proofroll.cli.options import require_pages
 from proofroll.core.errors import Missing
 from proofroll.files.scene_file import load_scene, scene_names
@@ -289,13 +292,28 @@ def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     assert found["absent"]["status"] == "missing"
     assert "no_such_module_anywhere" in found["absent"]["message"]
     assert found["misspelt"]["status"] == "broken"
-    code, out, err = proofroll("engines")
+    code, out, err = proofroll("engines", "--capabilities")
     assert (code, err) == (0, "")
     assert "no_such_module_anywhere" in " ".join(out.split())
     assert "a only (" in out
     rows = [line.split() for line in out.splitlines()]
     assert ["capability", "oracle"] in rows
     assert ["contact", "between", "bodies", "a"] in rows
+
+
+def test_engines_are_listed_by_their_packages(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without more the versions are those of the packages: no engine is loaded or started for them."""
+    monkeypatch.setattr("proofroll.running.engine_questions.describe", None)
+    monkeypatch.setattr("proofroll.core.plugins.load_engine", None)
+    code, out, err = proofroll("engines")
+    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines()[:-1]}
+    assert (code, err) == (0, "")
+    assert rows["mujoco"] == [version("mujoco"), "mujoco"]
+    assert rows["pinocchio"] == [version("pin"), "pin"]
+    assert rows["projection"] == [proofroll_version, "proofroll"]
+    monkeypatch.setattr("proofroll.core.plugins.package_of", lambda _: "no_such_package_anywhere")
+    words = proofroll("engines")[1].split()
+    assert words[words.index("mujoco") + 1 :][:3] == ["not", "installed", "no_such_package_anywhere"]
 
 
 COMPARISON = """
@@ -444,7 +462,7 @@ def test_a_name_that_a_scene_and_a_comparison_share(proofroll: Proofroll, tmp_pa
 
 # The paper's case, and one that slips early, in an engine that locates its events.
 PAPER = ["--set", "rolling_resistance=5e-4", "--set", "mu_static=0.35"]
-EARLY = ["onset", "sphere_in_cylinder", "--set", "mu_static=0.12", "--until", "0.2"]
+EARLY = ["paper", "onset", "sphere_in_cylinder", "--set", "mu_static=0.12", "--until", "0.2"]
 LOCATING = "pinocchio[formulation=impulses,preset=tuned]"  # in steps of 1e-3 s
 
 
@@ -520,7 +538,7 @@ def test_onset_where_nobody_was_asked_for(
 
 def test_onset_without_a_ball(proofroll: Proofroll) -> None:
     """A scene that has no ball on a surface is refused for that, and not for friction that it has not."""
-    code, out, err = proofroll("onset", "pendulum")
+    code, out, err = proofroll("paper", "onset", "pendulum")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "one ball that begins to roll in an upright cylinder" in err
     assert "mu_static" not in err
@@ -542,7 +560,7 @@ def test_onset_of_friction_that_makes_no_sense(
 ) -> None:
     """Friction without a bound, or with one that makes no sense, gives one line and the exit code of wrong usage."""
     given = [word for setting in settings for word in ("--set", setting)]
-    code, out, err = proofroll("onset", "sphere_in_cylinder", *given, "--out", str(tmp_path), "--json")
+    code, out, err = proofroll("paper", "onset", "sphere_in_cylinder", *given, "--out", str(tmp_path), "--json")
     assert (code, out) == (2, "")
     for word in words:
         assert word in err
@@ -566,7 +584,7 @@ mu_static = { low = 0.05, high = 0.8, count = 3 }
 def test_regimes(proofroll: Proofroll, tmp_path: Path) -> None:
     """A map of 3 x 3 runs is printed as one JSON document, the same that is written beside the picture."""
     (tmp_path / "map.toml").write_text(MAP)
-    arguments = ["regimes", str(tmp_path / "map.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    arguments = ["paper", "regimes", str(tmp_path / "map.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
     code, out, err = proofroll(*arguments, "--json")
     assert code == 0, err
     document = json.loads(out)
@@ -589,7 +607,9 @@ def test_regimes(proofroll: Proofroll, tmp_path: Path) -> None:
 def test_regimes_of_a_file_without_a_map(proofroll: Proofroll, tmp_path: Path) -> None:
     """A comparison asks for no map, which one line says."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
-    code, out, err = proofroll("regimes", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json")
+    code, out, err = proofroll(
+        "paper", "regimes", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json"
+    )
     assert (code, out) == (2, "")
     assert 'study = "regimes"' in err
     assert err.startswith("proofroll: ")
@@ -616,12 +636,13 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     """Help names every command; the version is that of the package; no command at all is wrong usage with help."""
     code, out, _ = proofroll("--help")
     assert code == 0
-    for command in ("scenes", "engines", "run", "compare", "report", "onset", "regimes", "stability"):
-        assert command in out
-    assert "..." not in out.partition("Ask:")[2]  # no summary is cut
-    heads = [line for line in out.splitlines() if line.endswith(":") and not line.startswith(" ")]
-    groups = ["Options", "Ask", "Bring", "Study", "Blajer's", "Maintain"]
-    assert [head.partition(" ")[0].strip(":") for head in heads[:6]] == groups
+    lines = out.splitlines()
+    assert len(lines) < 24  # with the line of the next command
+    assert max(map(len, lines)) <= 80
+    rows = [re.fullmatch(r"(\w*) +(\w+)  +([A-Z].*)", line) for line in lines[4:]]
+    assert [row[2] for row in rows if row] == [name for names in GROUPS.values() for name in names]
+    assert [row[1] for row in rows if row and row[1]] == list(GROUPS)
+    assert all(row[3].endswith(".") and "..." not in row[3] for row in rows if row)  # no summary is cut
     assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
     assert proofroll()[0] == 2
     code, out, err = proofroll("new")

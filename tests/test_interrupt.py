@@ -73,7 +73,7 @@ def test_while_an_engine_is_asked(
 def test_while_the_map_is_drawn(tmp_path: Path) -> None:
     """Processes that compute for the truth end with Ctrl-C as well, and none of them says anything."""
     code, out, err = interrupted(
-        ["regimes", "--jobs", "2", "--out", str(tmp_path)], lambda process: len(descendants(process)) > 1
+        ["paper", "regimes", "--jobs", "2", "--out", str(tmp_path)], lambda process: len(descendants(process)) > 1
     )
     assert (code, out) == (130, "")
     (line,) = [line for line in err.splitlines() if " of 10082, " not in line]  # how far it is, on a slow machine

@@ -57,14 +57,16 @@ STEPS: dict[str, tuple[str, set[str]]] = {
         "\n".join(_command(words) for words in ("--help", "--version", "run --help", "compare --help")),
         _ARRAYS - {"pydantic"},
     ),
+    "list engines": (_command("engines"), {*_ARRAYS - {"numpy", "pydantic"}, "rich.table"}),
     "no such file": (_command("judge nofile.nc", 2), {*_WRONG_NAME, "proofroll.files.scene_file"}),
     "neither scene nor file": (_command("judge nosuch nofile.csv", 2), {*_WRONG_NAME, "proofroll.files.scene_file"}),
     "no such scene": (_command("run nosuch --engine mujoco --set length=1", 2), {*_WRONG_NAME, "scipy"}),
+    "no such parameter": (_command("run pendulum --engine mujoco --set lenth=1", 2), _WRONG_NAME),
+    "check": (_command("check pendulum"), {"scipy", "xarray", "pandas", "matplotlib", "sympy"}),
     "describe engines": (
         f"from proofroll.running.identity import describe\nfor name in {ENGINES}:\n    describe(name)",
         {"xarray", "pandas", "scipy.integrate", "scipy.spatial", "scipy.optimize"},
     ),
-    "no such parameter": (_command("run pendulum --engine mujoco --set lenth=1", 2), _WRONG_NAME),
     "a function that no module of its name takes over": (
         "import proofroll; first = proofroll.simulate; from proofroll import simulate\n"
         "assert callable(first) and callable(simulate) and callable(proofroll.simulate)",

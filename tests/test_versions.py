@@ -1,12 +1,12 @@
-"""``proofroll versions``: one engine in two versions, by real runs in two interpreters."""
+"""``proofroll diff`` of two versions of one engine, by real runs in two interpreters."""
 
 from __future__ import annotations
 
 import json
 import re
-import socket
 import tomllib
 from collections.abc import Callable
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 
@@ -15,13 +15,10 @@ import pytest
 from other_pythons import seeing
 
 from proofroll.core.plugins import load_engine, release
-from proofroll.files.json_data import record
-from proofroll.report.versions import answer, lines, page, table
-from proofroll.studies.versions.versions import VersionsStudy
+from proofroll.report.changes import Against
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENT = (ROOT / "docs" / "json.md").read_text(encoding="utf-8")
 CLAIM = """title = "Balls"
 question = "Does it agree?"
 scene = "sphere_in_cylinder"
@@ -54,59 +51,55 @@ def versions(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> Callable[..., tuple[int, str, str]]:
-    """Runs ``proofroll versions aged OLD NEW`` on the claim."""
+    """Runs ``proofroll diff aged@OLD aged@NEW`` on the claim."""
     install_engines({"aged": "aged:Aged"})  # announced here, installed there alone
     monkeypatch.setenv("PROOFROLL_ENGINES", str(tmp_path / "engines"))
     claim = tmp_path / "balls.toml"
     claim.write_text(CLAIM, encoding="utf-8")
 
     def run(old: str, new: str, *more: str) -> tuple[int, str, str]:
-        places = [str(pythons.get(item, item)) for item in (old, new)]
-        return proofroll("versions", "aged", *places, str(claim), *more, "--out", str(tmp_path / "out"))
+        places = [f"aged@{pythons.get(item, item)}" for item in (old, new)]
+        return proofroll("diff", *places, str(claim), *more, "--out", str(tmp_path / "out"))
 
     return run
 
 
 @pytest.mark.drill
 def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
-    """Verdicts, refusals, orders, defaults, numbers and speed; a verdict that changed is exit code 1."""
-    code, out, err = versions("1.0", "2.0", "--rounds", "2", "--json")
+    """Verdicts, refusals, orders and defaults, as between two reports; a verdict that changed is exit code 1."""
+    comment = tmp_path / "changes.md"
+    code, out, err = versions("1.0", "2.0", "--json", "--comment", str(comment))
     assert code == 1, err
     found = json.loads(out)
-    section = re.search(r"^## `versions --json`\n(.*?)(?=^## )", DOCUMENT, flags=re.DOTALL | re.MULTILINE)
-    assert section is not None
-    assert set(found) == set(re.findall(r"^\| `(\w+)` \|", section[1], flags=re.MULTILINE))
-    assert [found[side]["version"] for side in ("old", "new")] == ["1.0", "2.0"]
-    midpoint, walls = found["rows"]
-    assert midpoint["declared_order"] == {"old": [1], "new": [2]}
-    assert midpoint["verdicts"]["new"] == {"agrees": 1} != midpoint["verdicts"]["old"]
-    assert midpoint["numbers"]["kind"] == "changed"
-    assert midpoint["speed"]["low"] <= midpoint["speed"]["value"] <= midpoint["speed"]["high"]
-    assert walls["numbers"] is None
-    assert any("refused (walls came with version 2) → agrees" in sentence for sentence in found["changed"])
-    assert {"name": "iterations", "old": 50, "new": 100} in found["defaults"]
-    kept = json.loads((tmp_path / "out" / "versions-aged-1.0-2.0.json").read_text(encoding="utf-8"))
-    assert kept == found
-    study = record(VersionsStudy, found)
-    html = page(study)
-    assert (tmp_path / "out" / "versions-aged-1.0-2.0.html").read_text(encoding="utf-8") == html
-    assert answer(study).split("; ")[-1] in html
-    assert any(line.startswith("default iterations: 50 → 100") for line in lines(study))
-    assert table(study).row_count == 2
+    assert set(found) == {item.name for item in fields(Against)}
+    assert found["versions"] == {"aged": ["1.0", "2.0"], "default iterations": ["50", "100"]}
+    changes = {change["run"]: change for change in found["changes"]}
+    midpoint, walls = (changes[f"aged {name} matched dt 2e-3 s"] for name in ("midpoint", "walls"))
+    assert midpoint["kind"] == walls["kind"] == "verdict"
+    assert [re.sub(r"\d\S*", "N", text) for text in midpoint["says"]] == [
+        "z converges → agrees", "observed order of z N → N", "error of z N → N m",
+    ]  # fmt: skip
+    assert walls["says"] == ["refused (walls came with version 2) → done"]
+    assert {changes[f"aged {name} matched dt 4e-3 s"]["kind"] for name in ("midpoint", "walls")} == {"value", "new"}
+    code, out, _ = versions("1.0", "2.0")
+    lines = out.splitlines()
+    assert code == 1
+    assert lines[0].startswith("Against aged@")
+    assert "Other versions: aged 1.0 → 2.0, default iterations 50 → 100." in " ".join(lines)
+    assert max(map(len, lines)) <= 80
+    assert "| change | run |" in comment.read_text(encoding="utf-8")
 
 
 @pytest.mark.drill
 def test_versions_that_do_the_same(
     versions: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The same bits are said to be the same, on a cluster as at home, within 80 columns, and nothing is exit code 0."""
+    """Where nothing changed that is said, on a cluster as at home, and is exit code 0."""
     # Its worker is a thread here: test_cluster.py has processes, which cost seconds.
     monkeypatch.setattr(distributed, "LocalCluster", partial(distributed.LocalCluster, processes=False))
-    code, out, err = versions("2.0", "2.0.1", "--rounds", "0", "--scheduler", "local:1")
+    code, out, err = versions("2.0", "2.0.1", "--scheduler", "local:1")
     assert code == 0, err
-    assert "2 cases: 2 with the same bits; no verdict changed." in out
-    assert f"Made on machines of a cluster: 4 on {socket.gethostname()}." in " ".join(out.split())
-    assert max(map(len, out.splitlines()[:-1])) <= 80
+    assert "changed: nothing" in out
 
 
 @pytest.mark.parametrize(
@@ -126,22 +119,34 @@ def test_versions_that_are_none(versions: Callable[..., tuple[int, str, str]], o
     assert err.count("\n") == 1
 
 
-@pytest.mark.drill
-def test_versions_are_understood_as_engines_are_written(
-    versions: Callable[..., tuple[int, str, str]], proofroll: Proofroll, pythons: dict[str, Path], tmp_path: Path
+def test_what_versions_are_asked_is_allowed(
+    versions: Callable[..., tuple[int, str, str]], proofroll: Proofroll, pythons: dict[str, Path]
 ) -> None:
-    """NAME@OLD NAME@NEW SUBJECT is NAME OLD NEW SUBJECT, and a name alone is what is installed here."""
+    """Versions are of one engine, and files have neither jobs nor scenes: each is one line."""
     del versions  # it announces the engine
-    old, new = (str(pythons[version]) for version in ("2.0", "2.0.1"))
-    claim = str(tmp_path / "balls.toml")
-    more = (claim, "--rounds", "0", "--out", str(tmp_path / "out"))
-    code, out, err = proofroll("versions", f"aged@{old}", f"aged@{new}", *more)
-    assert code == 0, err
-    assert "2 cases: 2 with the same bits" in out
-    for words in ((f"aged@{old}", new, "2.0", claim), ("aged", "2.0")):
-        code, out, err = proofroll("versions", *words)
+    sides = [f"aged@{pythons[version]}" for version in ("2.0", "2.0.1")]
+    for words, says in (
+        ([sides[0], "projection@1.0"], "is no version of aged; name two of one engine"),
+        (["old.nc", "new.nc", "--jobs", "3"], "--jobs = 3: this is for two versions of an engine"),
+        (["old.nc", "new.nc", "pendulum"], "this is for two versions of an engine"),
+    ):
+        code, out, err = proofroll("diff", *words)
         assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "name two versions: proofroll versions aged 2.0 VERSION" in err
+        assert says in err
+
+
+@pytest.mark.drill
+def test_several_scenes_are_asked_at_once(
+    versions: Callable[..., tuple[int, str, str]], tmp_path: Path, proofroll: Proofroll, pythons: dict[str, Path]
+) -> None:
+    """Scenes and comparisons may be several; what is named twice is run once."""
+    del versions
+    (tmp_path / "more.toml").write_text(CLAIM.replace("0.002", "0.004"), encoding="utf-8")
+    claims = [str(tmp_path / name) for name in ("balls.toml", "more.toml", "balls.toml")]
+    sides = [f"aged@{pythons[version]}" for version in ("2.0", "2.0.1")]
+    code, out, err = proofroll("diff", *sides, *claims, "--out", str(tmp_path / "out"))
+    assert code == 0, err
+    assert re.search(r"Of \d+ runs in both reports, changed: nothing", " ".join(out.split()))
 
 
 def test_lower_bounds_are_those_of_the_adapters() -> None:

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
-from typer.testing import CliRunner
 
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import load_element_kinds
 from proofroll.files.toml import read_toml
 from proofroll.vocabulary import document as vocabulary
 from proofroll.vocabulary.command import all_entries, entries_about, lines_of
-from proofroll.vocabulary.command import vocabulary as command
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = vocabulary.document()
-APP = typer.Typer()
-APP.command()(command)
 # Below these a key is the user's own: the name of a parameter, of an observable, of a tolerance.
 OWN = {"vary", "brief", "points", "over", "parameters", "tolerances", "limit", "bound", "order", "only", "where",
        "expect_for", "published", "repeat"}  # fmt: skip
@@ -82,11 +77,13 @@ def test_a_word_is_answered() -> None:
         entries_about("dampng", entries)
 
 
-def test_the_command_has_every_key_of_the_page() -> None:
+def test_the_command_has_every_key_of_the_page(proofroll: Callable[..., tuple[int, str, str]]) -> None:
     """Without a word all keys are printed, and what is described in words."""
-    asked = CliRunner().invoke(APP, ["--json"])
-    printed = json.loads(asked.stdout)["keys"]
+    code, out, _ = proofroll("check", "--keys", "--json")
+    printed = json.loads(out)["keys"]
     lines = [line for line in TEXT.splitlines() if line.startswith("| `")]
-    assert (asked.exit_code, len([entry for entry in printed if entry["key"]])) == (0, len(lines))
+    assert (code, len([entry for entry in printed if entry["key"]])) == (0, len(lines))
     assert "[[repeat]]" in {entry["table"] for entry in printed}
-    assert "mu_static" in CliRunner().invoke(APP, []).stdout
+    assert "mu_static" in proofroll("check", "--keys")[1]
+    assert proofroll("check", "--keys", "damping", "--engine", "mujoco")[0] == 2
+    assert proofroll("check")[2].count("\n") == 1

@@ -17,7 +17,6 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from proofroll.cli import app
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import load_comparison
@@ -32,6 +31,7 @@ from proofroll_drill.arithmetic.kinds import PYTHONS, REPOSITORY, Arithmetic, ki
 from proofroll_drill.arithmetic.matrix import Tried, comparison_files, matrix
 from proofroll_drill.arithmetic.record import WRONG, decided, unhurried, until_wrong
 from proofroll_drill.arithmetic.studies import decided_by, is_study
+from proofroll_drill.command import drill
 from proofroll_drill.table import arithmetic_lines
 
 # A ball that rolls, one that slips and sticks, one on a curved wall; a body in space, a tree, a loop.
@@ -217,7 +217,7 @@ def test_a_study_that_nothing_compares_is_told_in_a_line(tmp_path: Path) -> None
     """A study of another kind is refused before any process starts."""
     (tmp_path / "drawn.toml").write_text('study = "figures"\n', encoding="utf-8")
     with pytest.raises(InputError, match="compared are"):
-        CliRunner().invoke(app, ["drill", "arithmetic", str(tmp_path / "drawn.toml")], catch_exceptions=False)
+        CliRunner().invoke(drill, ["arithmetic", str(tmp_path / "drawn.toml")], catch_exceptions=False)
 
 
 def test_a_run_that_is_lacking_is_told(tmp_path: Path) -> None:
@@ -282,7 +282,7 @@ def test_what_a_machine_cannot_is_named_as_not_tried(tmp_path: Path) -> None:
 def test_a_comparison_that_is_not_there_is_told_in_a_line() -> None:
     """A misspelt name is refused before any process starts."""
     with pytest.raises(InputError, match="there is no such comparison"):
-        CliRunner().invoke(app, ["drill", "arithmetic", "no_such_rod"], catch_exceptions=False)
+        CliRunner().invoke(drill, ["arithmetic", "no_such_rod"], catch_exceptions=False)
 
 
 def baseline() -> str:

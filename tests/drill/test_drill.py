@@ -46,7 +46,7 @@ TRIED = {
 @pytest.mark.timeout(900)  # 20 s of processor time, on a machine that may have much else to do
 def test_every_fault_is_contained() -> None:
     """Each fault costs its own case alone and says so in a sentence; the next run makes only what is missing."""
-    command = [sys.executable, "-m", "proofroll", "drill", "faults", "--json"]
+    command = [sys.executable, "-m", "proofroll_drill", "faults", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     found = json.loads(done.stdout)
     rows = {row["fault"]: row for row in found["faults"]}

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from proofroll.cli import app
 from proofroll.conformance import run_check
 from proofroll.core.diagnosis import CLOSES, METHOD, Cause, Evidence, diagnose, hypotheses_of
 from proofroll.core.diagnosis.fitting import change_by
@@ -21,6 +20,7 @@ from proofroll.core.plugins import load_element_kinds
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
+from proofroll_drill.command import drill
 from proofroll_drill.mutants import balls, contact_models, joint_laws, mechanism_samples
 from proofroll_drill.mutants.base import Mutant
 from proofroll_drill.mutants.drilling import ENOUGH, judged_without_fault, mutant, mutants, tried, without_fault
@@ -28,7 +28,7 @@ from proofroll_drill.mutants.drilling import ENOUGH, judged_without_fault, mutan
 
 @functools.cache
 def _drilled() -> dict[str, object]:
-    done = CliRunner().invoke(app, ["drill", "mutants", "--json"])
+    done = CliRunner().invoke(drill, ["mutants", "--json"])
     assert done.exit_code == 0, done.output
     return dict(json.loads(done.stdout))
 

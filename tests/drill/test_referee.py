@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from proofroll.cli import app
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.dynamics.analysis import analyse
@@ -20,6 +19,7 @@ from proofroll.truth.bodies import maximal_taylor
 from proofroll.truth.bodies.maximal_bodies import Planar, made_bodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.truth_of_mechanism import truth_of
+from proofroll_drill.command import drill
 from proofroll_drill.referee import holding
 from proofroll_drill.referee.balls import BallReferee
 from proofroll_drill.referee.holding import as_body, errors, hold, hold_ball, hold_contacts
@@ -61,7 +61,7 @@ def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
 @pytest.mark.drill_of("5", "10")
 @pytest.mark.parametrize("seed", [5, 10, 3060])
 def test_no_error_of_a_truth_lies_beyond_its_bar(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A loop in space, a planar tree and a free body, every quantity; `drill referee` has any number."""
+    """A loop in space, a planar tree and a free body, every quantity; `proofroll_drill referee` has any number."""
     monkeypatch.setattr(maximal_taylor, "heyoka", None)
     held = hold(seed, until=0.02)
     assert held.sound, held.text
@@ -80,7 +80,7 @@ def test_an_interrupted_referee_has_told_what_it_held(
         return holding.Held(seed, "tree", "revolute", "", {"q": 0.5}, 3)
 
     monkeypatch.setattr(holding, "hold", held)
-    done = CliRunner().invoke(app, ["drill", "referee", "--first", "5", "--count", "3", *options])
+    done = CliRunner().invoke(drill, ["referee", "--first", "5", "--count", "3", *options])
     lines = (done.stderr if options else done.stdout).splitlines()
     assert [line.removeprefix("proofroll: ") for line in lines] == [
         f"{seed} tree (revolute): largest error 0.5 of its bar, q" for seed in (5, 6)
@@ -123,7 +123,7 @@ def test_a_ball_starts_where_the_coordinates_of_its_wall_say(seed: int) -> None:
     "seed", [9, 60, *(pytest.param(seed, marks=pytest.mark.drill) for seed in (17, 45, 119, 144, 7017, 7092))]
 )
 def test_no_error_of_the_truth_of_a_ball_lies_beyond_its_bar(seed: int) -> None:
-    """States, forces and events of short motions; `drill referee --balls` has any number."""
+    """States, forces and events of short motions; `python -m proofroll_drill referee --balls` has any number."""
     held = hold_ball(seed)
     assert held.sound, held.text
     assert {"p_WB", "v_WB", "w_WB", "N"} <= set(held.worst)
@@ -148,7 +148,7 @@ def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPa
 # An ellipsoid that lands, spheres that pass each other, a rod that lands and whose slip stops.
 @pytest.mark.parametrize("seed", [41, 52, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (27, 20018))])
 def test_no_error_of_the_truth_of_contacts_lies_beyond_its_bar(seed: int) -> None:
-    """States, contact forces and events of short motions; `drill referee --contacts` has any number."""
+    """States, contact forces and events of short motions; `proofroll_drill referee --contacts` has any number."""
     held = hold_contacts(seed)
     assert held.sound, held.text
     assert {"p_WB", "v_WB", "w_WB", "q_WB", "pressed", "event"} <= set(held.worst)

@@ -38,7 +38,7 @@ MAY: dict[str, set[str]] = {
     "papers": HARNESS | {"elements", "truth", "mechanism_studies", "engines", "papers"},
     "vocabulary": HARNESS | {"elements", "vocabulary"},
     # A plug-in: scenes of mechanisms to be run, and the engines' own importers of robot files.
-    "robots": {"core", "files", "running", "studies", "report", "cli", "robots", "elements", "engines"},
+    "robots": {"core", "files", "running", "studies", "report", "cli", "robots", "elements", "engines", "vocabulary"},
 }
 # A module of names for adapters, from their homes.
 NAMES_OF_ADAPTERS = {"adapter": {"core", "elements", "papers"}}

@@ -17,7 +17,7 @@ import typer
 
 import proofroll
 from proofroll.cli.cite import cite
-from proofroll.cli.command_groups import GroupedCommands, origin
+from proofroll.cli.command_groups import NOW, GroupedCommands
 from proofroll.cli.comparing import compare
 from proofroll.cli.diff import diff
 from proofroll.cli.engines import engines
@@ -29,12 +29,11 @@ from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import scenes
 from proofroll.cli.new import new
 from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
-from proofroll.cli.plot import plot, replay
 from proofroll.cli.recommend import recommend
+from proofroll.cli.replay import replay
 from proofroll.cli.report import report
 from proofroll.cli.run import run
 from proofroll.cli.stability import stability
-from proofroll.cli.versions import versions
 from proofroll.core.entry_points import broken, leave_out, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, choices
 from proofroll.report.terminal.printable import spelled_out
@@ -47,8 +46,8 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _ALIKE = 0.7  # least likeness, of 1, of an option that a wrong one may mean
-_STUDIES = (compare, report, recommend, ladder, stability, fuzz, diff, versions)
-for _command in (scenes, run, judge, plot, replay, export, findings, cite, *_STUDIES):
+_STUDIES = (compare, report, recommend, ladder, stability, fuzz, diff)
+for _command in (scenes, run, judge, replay, export, findings, cite, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")
 app.add_typer(engines, name="engines")
@@ -103,7 +102,7 @@ def _usage_message(error: typer.TyperException) -> str:
         names = [item.value for item in lacking.param.shell_complete(lacking.ctx, "")]
         return f"{message} Choose one of {choices(names)}." if names else message
     if unknown := re.match(r"No such command '([^']+)'", message):
-        return origin(unknown[1]) or message
+        return f"{unknown[1]} is now {NOW[unknown[1]]}" if unknown[1] in NOW else message
     context = getattr(error, "ctx", None)
     options_here = [name for item in (context.command.params if context else ()) for name in item.opts]
     if unknown := re.match(r"No such option: --([\w-]+)", message):
@@ -159,18 +158,23 @@ def _prepare_output() -> None:
 
 # Cached: a call of ``app`` would make all commands again, which takes longer than many of them.
 @cache
-def _commands() -> Any:
-    made: Any = typer.main.get_command(app)
+def _made(commands: typer.Typer) -> Any:
+    made: Any = typer.main.get_command(commands)
     groups = [made]
     for group in groups:  # the list grows meanwhile
         for command in group.commands.values():
-            command.short_help = (command.help or "").partition("\n\n")[0]  # or typer cuts it
+            sentence = (command.help or "").partition("\n\n")[0].partition(". ")[0]
+            command.short_help = f"{sentence.removesuffix('.')}."  # or typer cuts it
             groups += [command] if hasattr(command, "commands") else []
     return made
 
 
-def main() -> None:
-    """Entry point: every problem is one line on standard error and an exit code."""
+def main(commands: typer.Typer = app) -> None:
+    """Entry point: every problem is one line on standard error and an exit code.
+
+    Args:
+        commands: by default those of proofroll; a package for maintainers has its own.
+    """
     _prepare_output()
     for number in INTERRUPTS:  # a time limit from outside and the end of the terminal also end the workers
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell or nohup may have set it to be ignored
@@ -180,7 +184,7 @@ def main() -> None:
     try:
         if not all(map(str.strip, sys.argv[1:])):
             raise InputError("argument", "", "this is empty; give a value, or leave the option out")
-        code = _commands()(standalone_mode=False)
+        code = _made(commands)(standalone_mode=False)
         sys.stdout.flush()  # raises here if the disk is full
     except BaseException as error:  # an import that a signal broke off raises what it likes
         code = INTERRUPTED if _signals else _reported(error)

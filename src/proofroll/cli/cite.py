@@ -15,7 +15,7 @@ def cite(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Print the references behind a result in BibTeX: engines with their versions, scene, truth, proofroll itself."""
+    """Print the references behind a result in BibTeX. They are of engines, scene, truth and proofroll."""
     from dataclasses import asdict
 
     from proofroll.studies.citing import citations

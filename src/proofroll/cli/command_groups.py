@@ -8,43 +8,46 @@ from typer.core import TyperGroup
 
 # Title -> commands in their order. Commands of other packages that are not named here come last.
 GROUPS = {
-    "Ask": ("scenes", "run", "plot", "replay", "compare", "recommend", "report", "diff"),
-    "Bring your own scene, engine or trajectory": ("new", "vocabulary", "check", "judge", "export"),
-    "Study": ("stability", "ladder", "fuzz", "balance"),
-    "Blajer's article (2006)": ("onset", "regimes", "figures"),
-    "Maintain": ("engines", "versions", "findings", "cite", "bench", "drill"),
+    "Ask": ("scenes", "run", "replay", "compare", "recommend", "report", "diff"),
+    "Bring": ("new", "check", "judge", "export"),
+    "Study": ("stability", "ladder", "fuzz", "balance", "paper"),
+    "Maintain": ("engines", "findings", "cite"),
 }
 _OTHERS = "Others"
-# Command of earlier versions -> what does the same now.
-_NOW = {"tradeoff": "recommend SCENE --plot FILE.svg"}
-# Command -> folder of the package that brings it; the wheel does not contain these.
-_OF_THE_REPOSITORY = {"bench": "benchmarks", "drill": "tests/drill"}
+_WIDE = 80  # columns of a screen
+# Command of earlier versions -> command that does the same now. The last two come with a clone, not with the wheel.
+NOW = {
+    "tradeoff": "proofroll recommend SCENE --plot FILE.svg",
+    "plot": "proofroll run SCENE --engine NAME --plot FILE, and of a stored run proofroll replay RUN",
+    "versions": "proofroll diff ENGINE@OLD ENGINE@NEW [SCENE]...",
+    "onset": "proofroll paper onset",
+    "regimes": "proofroll paper regimes",
+    "figures": "proofroll paper figures",
+    "vocabulary": "proofroll check --keys [WORD]",
+    "bench": "python -m proofroll_benchmarks; in a clone of the repository, pip install ./benchmarks",
+    "drill": "python -m proofroll_drill; in a clone of the repository, pip install ./tests/drill",
+}
 
 
 class GroupedCommands(TyperGroup):
-    """The commands, listed by :data:`GROUPS`."""
+    """The commands, listed by :data:`GROUPS`: a line for each, on one screen."""
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Writes a section of the help for each group of commands."""
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:  # noqa: ARG002 -- of the base
+        """Words behind the program's name; the options are among them, as they have no list."""
+        return ["[--version]", "COMMAND", "[ARGS]...", "[--help]"]
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Writes a line for each command, with the title of its group beside the first."""
         left = dict.fromkeys(self.list_commands(ctx))
         widest = max(map(len, left), default=0)
-        for title, names in (*GROUPS.items(), (_OTHERS, tuple(left))):
-            rows = []
+        margin = max(map(len, (*GROUPS, _OTHERS)))
+        formatter.write_paragraph()
+        for group, names in (*GROUPS.items(), (_OTHERS, tuple(left))):
+            title = group
             for name in (name for name in names if name in left):
                 del left[name]
                 command = self.get_command(ctx, name)
                 if command is not None and not command.hidden:
-                    rows.append((name.ljust(widest), command.get_short_help_str(10_000)))
-            if rows:
-                with formatter.section(title):
-                    formatter.write_dl(rows)
-
-
-def origin(name: str) -> str:
-    """Sentence on where a command comes from that the wheel does not contain, or what it became; empty for others."""
-    if name in _NOW:
-        return f"{name} is now proofroll {_NOW[name]}"
-    if name not in _OF_THE_REPOSITORY:
-        return ""
-    folder = _OF_THE_REPOSITORY[name]
-    return f"{name} is a package of the repository: in a clone of it, pip install ./{folder}"
+                    words = command.get_short_help_str(_WIDE - margin - widest - 4)
+                    formatter.write(f"{title:{margin}}  {name:{widest}}  {words}\n")
+                    title = ""

@@ -48,6 +48,7 @@ def compare(
         ),
     ] = None,
     settings: options.Set = None,
+    _root: options.Root = None,
     control: options.Control = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
@@ -71,7 +72,7 @@ def compare(
     ] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file.
+    """Hold engines against the truth of a scene or comparison. Exit 1 if a verdict contradicts the file.
 
     Exit 3 if an engine is missing or failed, or if nothing could be judged.
 

@@ -12,53 +12,74 @@ from proofroll.core.errors import InputError
 
 
 def diff(
-    old: Annotated[str, typer.Argument(help="A report.json or its folder, a run (.nc, .npz), or NAME@VERSION.")],
+    context: typer.Context,
+    old: Annotated[str, typer.Argument(help="A report.json or its folder, a run (.nc, .npz), or ENGINE@VERSION.")],
     new: Annotated[str, typer.Argument(help="What it is compared with, of the same kind.")],
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Of versions: scenes and comparisons; by default all comparisons.",
+            callback=options.own_first,
+        ),
+    ] = None,
+    _root: options.Root = None,
+    out: options.Out = Path("out"),
+    fresh: options.Fresh = False,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
     comment: options.Comment = None,
     as_json: options.Json = False,
 ) -> None:
-    """Show what changed between two reports, two runs of a scene, or two versions of an engine; exit 1 if anything did.
+    """Show what changed between two runs, reports or versions. Exit 1 if anything did, of versions if a verdict did.
 
     Of reports: verdicts, errors beyond both error bars, costs beyond both intervals, runs that are gone. Of runs that
-    `proofroll run --out` wrote: every quantity, at the instants that both have. Versions of an engine run the same
-    cases, as `proofroll versions` does, which has more options.
+    `proofroll run --out` wrote: every quantity, at the instants that both have.
+
+    Versions of an engine run the same cases: ENGINE@VERSION, ENGINE@LABEL of `proofroll engines`, ENGINE@PATH of a
+    Python, or ENGINE, which is installed here. Environments that are missing are made, as by `proofroll engines add`;
+    workers of a cluster need their own. They are compared as two reports are; errors and costs do not decide the exit
+    code.
     """
-    from proofroll.core.plugins import place_of, plain_name
-    from proofroll.files.trajectory_file import CSV, NETCDF, STORED
-    from proofroll.report.changes import EarlierReport
+    from proofroll.core.plugins import place_of
     from proofroll.report.terminal.screen import WIDTH
 
+    if comment is not None:
+        options.require_writable(comment, "--comment")
+    shown: object
     if any(place_of(text) and not Path(text).exists() for text in (old, new)):
         from proofroll.cli.versions import versions
 
-        engine = plain_name(old)
-        if engine != plain_name(new):
-            raise InputError("new", new, f"is no version of {engine}; name two of one engine, as {engine}@VERSION")
-        if comment is not None:
-            raise InputError("--comment", comment, "it is for reports and runs; versions have a page of their own")
-        versions(engine, place_of(old) or engine, place_of(new) or engine, as_json=as_json)
+        against, lost = versions(old, new, scenes or (), options.new_runner(out, fresh, jobs, scheduler))
+        changed = any(item.kind in {"verdict", "gone"} for item in against.changes)
+        lines, markdown, shown = against.lines, against.markdown, against
+    else:
+        options.require_only(context, {"old", "new", "comment", "as_json"}, "this is for two versions of an engine")
+        (changed, lines, markdown, shown), lost = _of_files(old, new), False
+    if comment is not None:
+        from proofroll.running.store import write_text
+
+        write_text(comment, markdown)
+    options.show(shown, as_json, lambda: lines, widest=WIDTH)
+    raise typer.Exit(options.ENGINE if lost else options.CONTRADICTED if changed else options.OK)
+
+
+def _of_files(old: str, new: str) -> tuple[bool, list[str], str, object]:
+    """Changes between two runs or two reports: if there are any, their lines, Markdown and records."""
+    from proofroll.files.trajectory_file import CSV, NETCDF, STORED
+
     are_runs = [Path(text).suffix in (NETCDF, STORED) for text in (old, new)]
     for text in (old, new):
         if Path(text).suffix == CSV:
             raise InputError("run", text, f"names no scene; write it as {NETCDF} or {STORED}, or judge it")
     if any(are_runs) != all(are_runs):
         raise InputError("new", new, f"is of another kind than {old}; name two reports or two runs")
-    if comment is not None:
-        options.require_writable(comment, "--comment")
     if all(are_runs):
         from proofroll.studies.versions.two_runs import two_runs
 
         runs = two_runs(Path(old), Path(new))
-        changed, lines, markdown = runs.changed, [runs.sentence, *runs.lines], runs.markdown
-        content: object = runs
-    else:
-        earlier, later = (EarlierReport.read(Path(text), name) for name, text in (("old", old), ("new", new)))
-        reports = later.against(earlier)
-        changed, lines, markdown = reports.changed, reports.lines, reports.markdown
-        content = reports
-    if comment is not None:
-        from proofroll.running.store import write_text
+        return runs.changed, [runs.sentence, *runs.lines], runs.markdown, runs
+    from proofroll.report.changes import EarlierReport
 
-        write_text(comment, markdown)
-    options.show(content, as_json, lambda: lines, widest=WIDTH)
-    raise typer.Exit(options.CONTRADICTED if changed else options.OK)
+    earlier, later = (EarlierReport.read(Path(text), name) for name, text in (("old", old), ("new", new)))
+    reports = later.against(earlier)
+    return reports.changed, reports.lines, reports.markdown, reports

@@ -12,21 +12,37 @@ import typer
 from proofroll.cli import options
 from proofroll.core.errors import Missing, ProofrollError
 
-engines = typer.Typer(help="List the engines, and make environments of other versions.", rich_markup_mode=None)
+engines = typer.Typer(help="List engines, and make environments of other versions.", rich_markup_mode=None)
 
 
 @engines.callback(invoke_without_command=True)
-def listed(context: typer.Context, as_json: options.Json = False) -> None:
-    """List the engines: what is installed, what each provides, and why one is missing.
+def listed(
+    context: typer.Context,
+    capabilities: Annotated[
+        bool, typer.Option("--capabilities", help="Start each engine, and show what its formulations provide.")
+    ] = False,
+    as_json: options.Json = False,
+) -> None:
+    """List the engines with the versions of their packages.
 
     Environments made by ``add`` are among them, as ``NAME@LABEL``; any command that takes ``--engine`` takes these.
+    ``--capabilities`` and ``--json`` start each engine, and say why one does not start.
     """
     if context.invoked_subcommand is not None:
         return
-    from proofroll.core.plugins import engine_names
+    from proofroll.core.plugins import engine_names, installed_package
     from proofroll.running.environments import remembered, root
 
     others = {f"{item.name}@{item.label}": f"in Python {item.interpreter} of its own" for item in remembered()}
+    if not capabilities and not as_json:
+        packages = {name: installed_package(name) for name in engine_names()}
+        rows = [(name, version or "not installed", package) for name, (package, version) in packages.items()]
+        rows += [(f"{item.name}@{item.label}", item.version, str(item.folder)) for item in remembered()]
+        name_width, version_width = (max(len(row[column]) for row in rows) for column in (0, 1))
+        for name, version, package in rows:
+            sys.stdout.write(f"{name:{name_width}}  {version:{version_width}}  {package}\n")
+        sys.stdout.write("proofroll engines --capabilities starts each, and shows what it can represent.\n")
+        return
     with options.spinner("engines"), ThreadPoolExecutor() as pool:
         described = list(pool.map(_described, [*engine_names(), *others]))
     if as_json:

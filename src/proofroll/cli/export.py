@@ -15,8 +15,9 @@ def export(
     file: Annotated[Path, typer.Argument(help="The file to write.")],
     engine: Annotated[str, typer.Option(help="name[key=value,…]; mujoco writes MJCF.")],
     settings: options.Set = None,
+    _root: options.Root = None,
 ) -> None:
-    """Write the model that an engine builds of a scene, as its own tools read it."""
+    """Write the model that an engine builds of a scene. Its own tools read it."""
     from proofroll.running.engine_questions import model_file
     from proofroll.running.store import write_text
     from proofroll.studies.cases import single_case

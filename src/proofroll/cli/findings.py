@@ -18,7 +18,7 @@ def findings(
     ] = PROGRAM_TIME_LIMIT,
     as_json: options.Json = False,
 ) -> None:
-    """Run the programs of the findings with the installed engines: which still show, and which are gone."""
+    """Run the programs of the findings: which still show. They run with the installed engines."""
     import dataclasses
 
     from proofroll.report.terminal.findings import findings_list, findings_table

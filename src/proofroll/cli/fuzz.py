@@ -58,7 +58,7 @@ def fuzz(
     jobs: options.Jobs = None,
     as_json: options.Json = False,
 ) -> None:
-    """Run random scenes in an engine, hold them against the truth, and list the kinds of surprises.
+    """Run random scenes in an engine, and list the surprises. Each is held against the truth.
 
     Exits with 1 if a kind is new in this folder.
     """

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
-from proofroll.core.limits import RUN_TIME_LIMIT
+from proofroll.core.limits import FOR_A_TRUTH, RUN_TIME_LIMIT
+from proofroll.core.pace import PACE
 
 if TYPE_CHECKING:
     from proofroll.studies.judging.judge import Judged
@@ -36,6 +37,7 @@ def judge(
         ),
     ] = None,
     settings: options.Set = None,
+    _root: options.Root = None,
     tolerance: options.Tolerances = None,
     columns: Annotated[
         list[str] | None,
@@ -56,7 +58,7 @@ def judge(
     ] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs.
+    """Hold a trajectory from anywhere against the truth. Exit 1 if it differs.
 
     With --robot and --control: test a record of a robot layer by layer, without a simulation: instants from the rate,
     observation from the state, action, target, effort, and in the air acceleration. Without --control: state and
@@ -75,6 +77,7 @@ def judge(
     if layout:
         raise InputError("--as", layout, "it is for the record of a robot: give --robot, too")
     from proofroll.files.scene_file import load_scene
+    from proofroll.files.scene_sources import root_words
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.studies.judging import judge as judging
 
@@ -85,7 +88,8 @@ def judge(
         raise InputError("scene", scene or "", "name it once: proofroll judge FILE --scene SCENE")
     loaded = load_scene(scene or str(named), **{**written, **options.assignments(settings)})  # type: ignore[arg-type]  # text is checked there
     bounds = _bounds(tolerance, loaded.deciding) if tolerance else None
-    with options.spinner(f"the truth of {loaded.name}"), options.wall_limit(time_limit, f"the truth of {loaded.name}"):
+    what, soft = f"the truth of {loaded.name}", PACE.limited(FOR_A_TRUTH * time_limit)
+    with options.spinner(what), options.wall_limit(time_limit, what), soft:
         judged = judging.judge(run, loaded, bounds, because=because, columns=_names(columns))
     if as_json:
         options.write_json(judged.content())
@@ -96,6 +100,7 @@ def judge(
                 *(word for text in settings or () for word in ("--set", text)),
                 *(word for text in tolerance or () for word in ("--tolerance", text)),
                 *(("--because", because) if because else ()),
+                *root_words(),
             ]
         )
         lines = _lines(judged, run.name, asked, _names(columns), everything=everything)

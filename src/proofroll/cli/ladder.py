@@ -11,6 +11,7 @@ from proofroll.cli import options
 def ladder(
     scene: options.SceneName,
     settings: options.Set = None,
+    _root: options.Root = None,
     quantity: Annotated[
         str | None, typer.Option(help="Observable; by default the scene's deciding observable.")
     ] = None,
@@ -27,7 +28,7 @@ def ladder(
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,
 ) -> None:
-    """Compare one quantity across models of increasing detail, then with each optional term off and on."""
+    """Compare one quantity across models of increasing detail. Each optional term is then off and on."""
     from proofroll.report.ladder.ladder import ladder_content
     from proofroll.report.ladder.tables import ladder_parts
     from proofroll.studies.ladder.ladder import Ladder

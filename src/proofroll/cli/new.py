@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from proofroll.cli import options
 from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
     from proofroll.core.scene import Scene
 
-new = typer.Typer(help="Write a working start: a scene, a comparison, an engine, or a probe.", no_args_is_help=True)
+new = typer.Typer(help="Write a working start: scene, comparison, engine or probe.", no_args_is_help=True)
 Name = Annotated[str, typer.Argument(help="Its name: letters, digits and _; the folder or file is named so.")]
 _TEMPLATES = Path(__file__).parent / "templates"
 _ANOTHER = "choose another name"
@@ -84,6 +85,7 @@ def probe(
     robot: Annotated[Path, typer.Argument(help="The robot file: URDF, or MJCF for mujoco.")],
     program: Annotated[str, typer.Option("--for", help="Simulator that runs the script: mujoco or isaaclab.")],
     base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
+    _root: options.Root = None,
 ) -> None:
     """Write a script that records a tenth of a second of a robot in the air in your simulator, for `judge`."""
     from proofroll.core.errors import require_known
@@ -166,7 +168,7 @@ def _comparison(name: str, place: str, loaded: Scene) -> str:
         f"until = {until:g}\nevery = {every:g}\n\n"
         "# Every combination of these values is run: [vary], then parameter = [value, value].\n\n"
         "# How far an observable may be from the truth, and why.\n"
-        "# `proofroll vocabulary WORD` describes every key.\n"
+        "# `proofroll check --keys WORD` describes every key.\n"
         f'[tolerances.close]\nbecause = "a first look; say here why this is close enough"\n'
         f"{''.join(lines)}\n"
         '# What is expected of each engine: expect = "agrees" unless it says another verdict, and because.\n' + rows

@@ -10,7 +10,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -119,6 +119,29 @@ Control = Annotated[
 ]
 Set = Annotated[
     list[str] | None, typer.Option("--set", help="parameter=value, in SI units or as '30 deg', '2 mm'; repeat.")
+]
+
+
+def _read_below(context: typer.Context, root: Path | None) -> Path | None:
+    """Sets the folder of robot files while a command runs, for this process and its workers, if one is given."""
+    if root is None:
+        return None
+    if not root.is_dir():
+        raise InputError("--root", root, "there is no such folder")
+    from proofroll.files.scene_sources import ROOT
+
+    os.environ[ROOT] = str(root.resolve())
+    context.call_on_close(lambda: os.environ.pop(ROOT))
+    return root
+
+
+Root = Annotated[
+    Path | None,
+    typer.Option(
+        "--root",
+        help="Folder of what a robot file includes and its meshes; by default its own.",
+        callback=_read_below,
+    ),
 ]
 
 
@@ -240,11 +263,14 @@ def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
 
 
 def _waited_for() -> str:
-    """End of a line of progress with the engines that have not answered yet."""
+    """End of a line of progress: the engines that have not answered yet, or how far truths have come."""
     asking = sys.modules.get("proofroll.running.engine_questions")  # not imported: no engine was asked
     names = dict.fromkeys(asking.waited_for) if asking else ()
-    what = "what they are" if len(names) > 1 else "what it is"
-    return f": waiting for {', '.join(names)} to say {what}" if names else ""
+    if names:
+        what = "what they are" if len(names) > 1 else "what it is"
+        return f": waiting for {', '.join(names)} to say {what}"
+    running = sys.modules.get("proofroll.running.process")
+    return "".join(f": {text}" for text in running.truths_at()) if running else ""
 
 
 def _standard_error() -> tuple[Console, bool]:
@@ -268,6 +294,27 @@ def assignments(texts: list[str] | None, option: str = "--set") -> dict[str, str
     return values
 
 
+def require_only(
+    context: typer.Context, allowed: Container[str], advice: str, further: Mapping[str, str] | None = None
+) -> None:
+    """Raises InputError for the first given option or argument that is not allowed: it would be ignored.
+
+    Args:
+        context: of the command.
+        allowed: names of its parameters.
+        advice: end of the message.
+        further: name of a parameter -> more advice about it.
+    """
+    for parameter in context.command.params:
+        name = str(parameter.name)
+        source = context.get_parameter_source(name)
+        if source is None or source.name != "COMMANDLINE" or name in allowed:
+            continue
+        value = context.params[name]
+        shown = ", ".join(value) if isinstance(value, list) else value
+        raise InputError(parameter.opts[0], shown, advice + (further or {}).get(name, ""))
+
+
 def require_writable(path: Path, option: str = "--out") -> None:
     """Raises InputError before the run if a file cannot be written."""
     from proofroll.running.store import Store
@@ -283,10 +330,16 @@ def require_writable(path: Path, option: str = "--out") -> None:
 @contextmanager
 def spinner(text: str) -> Iterator[Callable[[str], None]]:
     """Context manager with a sign of activity on standard error; it yields a function that changes its text."""
+    from rich.text import Text
+
+    class Present:
+        def __rich__(self) -> Text:
+            return Text(f"{texts[-1]}{_waited_for()}")
+
     console, moves = _standard_error()
     texts = [text]
-    with console.status(text) if moves else _now_and_then(lambda: texts[-1]) as sign:
-        yield texts.append if sign is None else sign.update
+    with console.status(Present()) if moves else _now_and_then(lambda: texts[-1]):
+        yield texts.append
 
 
 @contextmanager

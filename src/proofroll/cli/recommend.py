@@ -30,6 +30,7 @@ def recommend(
     ],
     tolerance: options.Tolerances = None,
     settings: options.Set = None,
+    _root: options.Root = None,
     control: options.Control = None,
     engine: Annotated[
         list[str] | None,
@@ -51,7 +52,7 @@ def recommend(
     jobs: options.Jobs = None,
     as_json: options.Json = False,
 ) -> None:
-    """Name the cheapest engine, formulation and step that holds a tolerance over the scene's own duration, and why.
+    """Name the cheapest engine and step that holds a tolerance. It is held over the scene's own duration.
 
     Each engine is searched over all its settings and steps until no other can be cheaper. A step is advised if half of
     it holds, too, and a third more does not break down. A run takes at most 8 s of processor time and an engine 30 s;

@@ -41,6 +41,7 @@ def report(
     ] = None,
     engine: options.Engines = None,
     settings: options.Set = None,
+    _root: options.Root = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,
@@ -70,7 +71,7 @@ def report(
     ] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Run the comparisons and the further studies, and write report.html and report.json.
+    """Run the comparisons and studies, and write a page of them. It is report.html, beside report.json.
 
     Without names it makes the main comparisons, which lie in the folder of studies itself, and all further studies but
     those on request. Comparisons in folders inside, as mechanisms/pendulum, are left out and named. The files are

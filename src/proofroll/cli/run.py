@@ -28,6 +28,7 @@ def run(
         ),
     ],
     settings: options.Set = None,
+    _root: options.Root = None,
     control: options.Control = None,
     until: options.Until = None,
     every: Annotated[
@@ -41,7 +42,9 @@ def run(
         Path | None,
         typer.Option(help="Write the events to this csv file, with energy and height of each bounce."),
     ] = None,
-    time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = RUN_TIME_LIMIT,
+    time_limit: Annotated[
+        float, typer.Option(help="Seconds after which the run is ended; a truth keeps what it has found.")
+    ] = RUN_TIME_LIMIT,
     ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Draw the run to this file: html in motion beside the truth, or svg, png, pdf.")
@@ -119,7 +122,8 @@ def run(
             options.complain(f"{told.sentence}: {told.cause.remedy}")
     if as_json or done or content.final:
         judged = _comparison(question, engine, settings, control, until) if engine != "truth" else ""
-        parts = partial(run_lines, content, forces=forces, everything=everything, checked=judged)
+        how = {"engine": case.engine.title, "checked": judged}
+        parts = partial(run_lines, content, **how, forces=forces, everything=everything)
         options.show(content, as_json, parts, widest=WIDTH)
     if not done or content.ends is not None:
         raise typer.Exit(options.ENGINE)
@@ -127,10 +131,12 @@ def run(
 
 def _comparison(scene: str, engine: str, settings: list[str] | None, control: Path | None, until: float | None) -> str:
     """Command that compares the same run with the truth."""
+    from proofroll.files.scene_sources import root_words
+
     words = ["proofroll", "compare", scene, "--engine", engine]
     for text in settings or ():
         words += ["--set", text]
-    words += ["--control", str(control)] if control else []
+    words += [*(["--control", str(control)] if control else []), *root_words()]
     words += ["--until", f"{until:g}"] if until is not None else []
     return shlex.join(words)
 

@@ -16,6 +16,7 @@ def stability(
             callback=options.own_first,
         ),
     ],
+    _root: options.Root = None,
     engine: options.Engines = None,
     axis: Annotated[list[str] | None, typer.Option(help="Axis of the map, e.g. V0; repeat. All by default.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Three values per axis, and fewer steps per run.")] = False,
@@ -25,7 +26,7 @@ def stability(
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,
 ) -> None:
-    """Map up to which step or tolerance each engine is stable, and right, along axes of extremes."""
+    """Map up to which step each engine is stable, and right. The map goes along axes of extremes."""
     from proofroll.report.page.html import templates
     from proofroll.report.pages import rendered
     from proofroll.report.stability.part import StabilityPart

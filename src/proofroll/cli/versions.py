@@ -1,110 +1,75 @@
-"""Command ``versions``: one engine in two versions."""
+"""Differences of two versions of an engine, for ``diff``; their environments are made."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from proofroll.cli import options
-from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, ProofrollError
 
 if TYPE_CHECKING:
-    from proofroll.studies.versions.versions import VersionsStudy
-
-# Group of entry points for other subjects than scenes and comparisons; the name is the ending of their files.
-SUBJECTS = "proofroll.version_subjects"
-# Default rounds of timing: with twelve, estimates varied by 5 %; with twenty the interval is some 4 % wide.
-_ROUNDS = 20
+    from proofroll.report.changes import Against, EarlierReport
+    from proofroll.running.runner import Runner
+    from proofroll.studies.comparison.outcome import Outcome
 
 
-def versions(
-    engine: Annotated[str, typer.Argument(help="Name of the engine, e.g. mujoco.")],
-    old: Annotated[str, typer.Argument(help="A version, a label of `proofroll engines`, or the path of a Python.")],
-    new: Annotated[str, typer.Argument(help="The version to which it is compared, likewise.")] = "",
-    subject: Annotated[
-        str,
-        typer.Argument(
-            help="A comparison, a scene or a robot file; by default all comparisons.", callback=options.own_first
-        ),
-    ] = "",
-    rounds: Annotated[int, typer.Option(min=0, help="Rounds of timing; 0: no speed.")] = _ROUNDS,
-    out: options.Out = Path("out"),
-    fresh: options.Fresh = False,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-) -> None:
-    """Run the same cases in two versions of an engine and show what changed; exit 1 if a verdict did.
+def versions(old: str, new: str, subjects: Sequence[str], runner: Runner) -> tuple[Against, bool]:
+    """Changes between the same comparisons in two versions of an engine; an environment that is missing is made.
 
-    Environments that are missing are made, as by `proofroll engines add`; workers of a cluster need their own. Speed is
-    measured here, and never decides the exit code.
+    Args:
+        old: the first version, ``NAME`` or ``NAME@PLACE``.
+        new: the second version.
+        subjects: scenes and comparisons; none: all comparisons.
+        runner: runs the cases.
+
+    Returns:
+        The changes, and True if an engine was missing.
+
+    Raises:
+        InputError: a name is unknown, the engines are two, or both versions are one.
     """
-    from proofroll.report.versions import heading, lines, page, robot_table, table
+    from proofroll.core.plugins import place_of, plain_name
+    from proofroll.studies.versions.versions import comparisons_about, outcomes_of_versions
 
-    engine, old, new, subject = _spelled(engine, old, new, subject)
-    readers = {point.name: point for point in announced(SUBJECTS)}
-    robot = readers.get(Path(subject).suffix.removeprefix("."))
-    if robot is not None and scheduler is not None:
-        raise InputError("--scheduler", scheduler, "a robot file is checked here; leave the option out")
-    if robot is None:
-        from proofroll.studies.versions.versions import comparisons_about
-
-        comparisons = comparisons_about(subject, engine)  # before minutes are spent on environments
-    options.require_pages()
-    sides = _side(engine, old), _side(engine, new)
+    engine = plain_name(old)
+    if engine != plain_name(new):
+        raise InputError("new", new, f"is no version of {engine}; name two of one engine, as {engine}@VERSION")
+    comparisons = comparisons_about(subjects, engine)  # before minutes are spent on environments
+    sides = _side(engine, place_of(old) or engine), _side(engine, place_of(new) or engine)
     if sides[0] == sides[1]:
         raise InputError("new", new, f"both are {sides[0]}; name two versions")
-    if robot is not None:
-        with options.spinner(f"{engine} {old} and {new}"):
-            content: VersionsStudy = robot.load()(subject, *sides)
-    else:
-        from proofroll.studies.versions.versions import compare_versions
-
-        runner = options.new_runner(out, fresh, jobs, scheduler)
-        with options.progress_bar("cases") as advance:
-            content = compare_versions(sides, comparisons, runner, rounds, advance)
-    file = _keep(content, page(content), out)
-    made = table if robot is None else robot_table
-    place = f"The page is in {file}.html."
-    options.show(content, as_json, lambda: [heading(content), made(content), *lines(content), place], widest=80)
-    if content.lost:
-        raise typer.Exit(options.ENGINE)
-    raise typer.Exit(options.CONTRADICTED if content.changed else options.OK)
+    with options.progress_bar("cases") as advance:
+        outcomes = outcomes_of_versions(sides, comparisons, runner, advance)
+    earlier, later = (_as_report(side, found, runner) for side, found in zip(sides, outcomes, strict=True))
+    return later.against(earlier), any(line.status == "missing" for line in (*earlier.lines, *later.lines))
 
 
-def _spelled(engine: str, old: str, new: str, subject: str) -> tuple[str, str, str, str]:
-    """Engine, two versions and subject; also from arguments in the form NAME@OLD NAME@NEW SUBJECT."""
-    from proofroll.core.plugins import place_of, plain_name
+def _as_report(engine: str, outcomes: Sequence[Outcome], runner: Runner) -> EarlierReport:
+    """Report of one version, by the engine's plain name; its defaults stand beside its version."""
+    from datetime import UTC, datetime
 
-    name = plain_name(engine)
-    if place_of(engine):
-        if subject:
-            raise InputError(
-                "engine", engine, f"the version stands behind it: {name} {place_of(engine)} {new} {subject}"
-            )
-        old, new, subject = place_of(engine), old, new
-    if not new:
-        raise InputError("new", None, f"name two versions: proofroll versions {name} {old} VERSION")
-    old, new = (place_of(text) if plain_name(text) == name and "@" in text else text for text in (old, new))
-    return name, old, new, subject
+    from proofroll.core.plugins import plain_name
+    from proofroll.report.changes import EarlierReport
+    from proofroll.report.comparison.lines import lines_of
+    from proofroll.running.engine_questions import describe
+    from proofroll.running.timing import machine
 
-
-def _keep(content: VersionsStudy, page: str, out: Path) -> Path:
-    """Writes page and JSON document; returns their path without ending."""
-    from proofroll.running.store import write_text
-
-    out.mkdir(parents=True, exist_ok=True)
-    words = ["versions", content.engine, content.old.version, content.new.version]
-    file = out / re.sub(r"[^\w.+-]", "_", "-".join(map(str, words)))
-    write_text(file.with_name(f"{file.name}.html"), page)
-    write_text(file.with_name(f"{file.name}.json"), options.json_text(content))
-    return file
+    told, name = describe(engine, runner.workers), plain_name(engine)
+    lines = [replace(line, engine=name) for outcome in outcomes for line in lines_of(outcome)]
+    versions = {name: told.version} | {f"default {key}": str(value) for key, value in told.defaults.items()}
+    return EarlierReport(
+        path=Path(engine),
+        date=datetime.now(UTC).isoformat(),
+        machine=machine()["processor"],
+        versions=versions,
+        lines=lines,
+    )
 
 
 def _side(engine: str, text: str) -> str:
@@ -128,7 +93,8 @@ def _side(engine: str, text: str) -> str:
 
 def _made(engine: str, version: str) -> str:
     """Makes the environment of a version; returns its engine ``NAME@VERSION``."""
-    from proofroll.running.make_environment import add, package_of
+    from proofroll.core.plugins import package_of
+    from proofroll.running.make_environment import add
 
     package = package_of(engine)
     by_hand = f"proofroll engines add {engine} --requirement {package or 'PACKAGE'}=={version}"

@@ -4,6 +4,8 @@
 TIME_LIMIT = 120.0
 # A single run from the command line, whose user may stop it by hand.
 RUN_TIME_LIMIT = 600.0
+# Part of a run's limit that the two routes of a truth may take, as processor time; what they found is then sampled.
+FOR_A_TRUTH = 0.8
 # One of the many runs of a study.
 STUDY_TIME_LIMIT = 60.0
 # The program of a finding, or the writing of an engine's model file.

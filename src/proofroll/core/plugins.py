@@ -5,7 +5,7 @@ import re
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from functools import cache
-from importlib.metadata import EntryPoint, PackageNotFoundError, version
+from importlib.metadata import Distribution, EntryPoint, PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
 
@@ -104,6 +104,28 @@ def _not_found(point: EntryPoint, error: ModuleNotFoundError) -> ProofrollError:
 def distribution_of(requirement: str) -> str:
     """Name of the distribution in a requirement, ``mujoco`` of ``mujoco>=3.2; extra == 'mujoco'``."""
     return re.split(r"[\s;<>=!~\[(]", requirement, maxsplit=1)[0]
+
+
+def package_of(engine: str) -> str:
+    """Package that brings an engine: of the extra with its name in the adapter's package; empty if there is none."""
+    for text in getattr(_adapters_package(engine), "requires", None) or ():
+        if re.search(rf"extra\s*==\s*['\"]{re.escape(engine)}['\"]", text):
+            return distribution_of(text)
+    return ""
+
+
+def _adapters_package(engine: str) -> Distribution | None:
+    """Installed package that announces an engine."""
+    return next((point.dist for point in announced(GROUP) if point.name == engine), None)
+
+
+def installed_package(engine: str) -> tuple[str, str]:
+    """Package of an engine, or that of its adapter, and its version as packages tell it; empty: not installed."""
+    name = package_of(engine) or getattr(_adapters_package(engine), "name", "")
+    try:
+        return name, version(name)
+    except PackageNotFoundError:
+        return name, ""
 
 
 def _installed(requirement: str) -> bool:

@@ -14,6 +14,7 @@ from proofroll.core.dataset import ENDED, ENDS, LAWS, ended_early, joined, off_g
 from proofroll.core.element import Element
 from proofroll.core.entry_points import loaded
 from proofroll.core.errors import InputError, Refused
+from proofroll.core.pace import PACE
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -95,6 +96,7 @@ def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between
         Diverged: two routes disagree.
     """
     times = np.union1d(asked, np.concatenate([counting, between])) if len(counting) or len(between) else asked
+    PACE.until = float(times[-1])
     parts = {element.name: _of_element(element, times, scene.asks) for element in scene.elements}
     columns = joined(scene, _to_common_end({name: Columns.of(part) for name, part in parts.items()}))
     whole = (columns if times is asked else off_grid_apart(scene, columns, asked, between)).dataset()

@@ -65,8 +65,7 @@ def load_comparison(name: str) -> Comparison:
     if "gravity" in content:
         raise InputError("comparison", name, SCENE_IS_A_FOLDER)
     if "study" in content:
-        advice = f"this file is for another command: proofroll {content['study']} {content.get('scene', '')}".strip()
-        raise InputError(f"{path}: study", content["study"], advice)
+        raise InputError(f"{path}: study", content["study"], f"is no comparison; proofroll report {name} runs it")
     return _comparison(path, content)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -14,6 +15,8 @@ from proofroll.core.errors import InputError
 GROUP = "proofroll.scene_sources"
 
 
+# Variable that names the folder of robot files and of all that they name, for a process and its workers.
+ROOT = "PROOFROLL_ROOT"
 # Between the file of a robot and that of its controller, in the name of a scene.
 BESIDE = "+"
 
@@ -57,6 +60,11 @@ class SceneSource(Protocol):
         Raises:
             InputError: the file with these parameters is no scene.
         """
+
+
+def root_words() -> list[str]:
+    """Option of a command that reads robot files as this process does; empty: they are read in their own folders."""
+    return ["--root", os.environ[ROOT]] if os.environ.get(ROOT) else []
 
 
 def with_control(name: str, control: Path) -> str:

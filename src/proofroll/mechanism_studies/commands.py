@@ -22,13 +22,14 @@ _FAINT = 1e-10  # relative to the largest value of its unit: what is shown as ze
 def balance(
     scene: options.SceneName,
     settings: options.Set = None,
+    _root: options.Root = None,
     engine: options.Engines = None,
     hold: Annotated[list[str] | None, typer.Option(help="Joint that is held where it starts; repeat.")] = None,
     control: options.Control = None,
     tolerance: Annotated[float, typer.Option(help="Relative difference up to which an engine agrees.")] = 1e-3,
     as_json: options.Json = False,
 ) -> None:
-    """Find an equilibrium near the start, the efforts that hold it, and eigenvalues about it, in every engine.
+    """Find an equilibrium, what holds it, and eigenvalues. It is sought near the start, in every engine.
 
     Velocities are zero and signals are as at time 0. The effort of a joint that is held, or moves as prescribed, is
     drive.<joint>; the reaction of a fixed one is force.<joint> and torque.<joint>, on its child, along the axes of the

@@ -23,6 +23,8 @@ _OF_SCALE, _OF_ERROR = 1e-9, 1e-3
 # and a machine's speed varies. The factor is larger where costs scatter: six median deviations, which are four standard
 # deviations of a normal scatter; one cost in 20,000 exceeds them.
 _COST, _SCATTERS = 1.5, 6.0
+# Observed orders that differ by more belong to different methods; a ladder shows an order to a tenth or two.
+_ANOTHER_ORDER = 0.5
 # Digits for changed errors: the first that shows a difference is taken.
 _DIGITS = (2, 4, 8, 17)
 # Kinds of changes, the gravest first, with words for their number.
@@ -231,7 +233,8 @@ def _changes(
         return
     old_line, new_line = _first(old_lines), _first(new_lines)
     if old_line.status != new_line.status:
-        yield "verdict", f"{old_line.status} → {new_line.status}: {new_line.message}".removesuffix(": ")
+        old_end = f"{old_line.status} ({old_line.message})" if old_line.message else old_line.status
+        yield "verdict", f"{old_end} → {new_line.status}: {new_line.message}".removesuffix(": ")
         return
     values = []
     for name, new in new_lines.items():
@@ -241,6 +244,8 @@ def _changes(
             continue
         if old.verdict != new.verdict:
             yield "verdict", f"{name or 'run'} {old.verdict or 'without verdict'} → {new.verdict or 'without verdict'}"
+        if old.order and new.order and abs(old.order - new.order) > _ANOTHER_ORDER:
+            yield "value", f"observed order of {name} {old.order:.2f} → {new.order:.2f}"
         if (size := _beyond(old, new)) > 0:
             digits = next(count for count in _DIGITS if error(old.error, count) != error(new.error, count))
             change = f"{error(old.error, digits)} → {error(new.error, digits)}"

@@ -50,19 +50,24 @@ MEANINGS = {
 
 
 @cache
-def engine_title(engine: str) -> str:
-    """Name of an engine for readers, with the place or options that it has; its code name if it is not installed."""
+def engine_title(engine: str, title: str = "") -> str:
+    """Name of an engine for readers, with the place or options that it has; its code name if it is not installed.
+
+    Args:
+        engine: code name, with a place or options or without.
+        title: its own title, where it is known; else the engine is loaded, which may take half a second.
+    """
     code = re.split(r"[\[@]", engine, maxsplit=1)[0]
     try:
-        title = title_of(load_engine(code))
+        title = title or title_of(load_engine(code))
     except (ProofrollError, PackageNotFoundError):
         title = code
     return title + engine[len(code) :]
 
 
-def engine_words(engine: str, formulation: str | None = None) -> str:
+def engine_words(engine: str, formulation: str | None = None, own_title: str = "") -> str:
     """Engine and formulation for readers; an engine whose name ends with its formulation says it once."""
-    title, words = engine_title(engine), (formulation or "").replace("_", " ")
+    title, words = engine_title(engine, own_title), (formulation or "").replace("_", " ")
     return title if not words or title.endswith(f" {words}") else f"{title} {words}"
 
 

@@ -10,17 +10,17 @@ from proofroll.cli import options
 from proofroll.cli.checking import check_text, is_text_check
 from proofroll.core.errors import InputError
 from proofroll.core.limits import TIME_LIMIT
+from proofroll.vocabulary.command import show_keys
 
 
 def check(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="A robot file (URDF, MJCF), a scene, or a comparison or other study.")],
+    file: Annotated[
+        Path | None, typer.Argument(help="A robot file (URDF, MJCF), a scene, or a comparison or other study.")
+    ] = None,
     engine: options.Engines = None,
     base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
-    root: Annotated[
-        Path | None,
-        typer.Option("--root", help="Folder of what a robot file includes and its meshes; by default its own."),
-    ] = None,
+    _root: options.Root = None,
     states: Annotated[int, typer.Option(min=1, max=1000, help="Random states that are compared.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
     out: Annotated[Path | None, typer.Option("--out", help="Write check.html and check.json to this folder.")] = None,
@@ -36,16 +36,32 @@ def check(
     ] = None,
     settings: options.Set = None,
     plot: Annotated[Path | None, typer.Option(help="Draw a scene at its start to this page (.html).")] = None,
+    keys: Annotated[
+        bool, typer.Option("--keys", help="Print the keys of scenes and studies instead; FILE: a key, table or word.")
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Check a scene or a comparison without running it, or a robot file with every engine's own importer.
+    """Check a scene, study or robot file before it is run. Robot files are checked in every engine's own importer.
 
     For a scene it prints the start, with the normal force or the degrees of freedom; --plot draws it.
     For a robot file: exit 1 if an engine (or the file of --against) does not hold the model that the file describes, or
     if the file is physically impossible. The other options are for these.
     """
+    if keys:
+        options.require_only(
+            context, {"file", "keys", "as_json"}, "this is for files; --keys prints what they may hold"
+        )
+        show_keys(str(file or ""), as_json)
+        return
+    if file is None:
+        raise InputError("FILE", None, "name a scene, a study or a robot file, or give --keys")
     if is_text_check(file):
-        _require_none_for_robots(context)
+        options.require_only(
+            context,
+            {"file", "plot", "settings", "as_json"},
+            "this is for robot files; nothing is run to check a scene or a study",
+            {"engine": ", and `proofroll compare SCENE --engine NAME` says what an engine makes of one"},
+        )
         check_text(options.own_first(str(file)), as_json, plot, settings)
         return
     if settings:
@@ -57,7 +73,7 @@ def check(
     from proofroll.robots.check.terminal import WIDTH, check_parts
     from proofroll.robots.files.meaning import CheckSettings
 
-    how = CheckSettings(base=base, root=root, states=states, seed=seed, time_limit=time_limit)
+    how = CheckSettings(base=base, states=states, seed=seed, time_limit=time_limit)
     if against is None:
         if names:
             raise InputError("--map", ", ".join(names), "this is for two files; name the other by --against FILE")
@@ -94,18 +110,3 @@ def _partners(texts: Sequence[str]) -> dict[str, str]:
                 raise InputError(f"{name}: {ours}", theirs, 'write the name of a joint in the second file, "..."')
             written.append(f"{ours}={theirs}")
     return options.assignments(written, "--map")
-
-
-def _require_none_for_robots(context: typer.Context) -> None:
-    """Raises InputError for the first given option that is for robot files only: it would be ignored."""
-    for parameter in context.command.params:
-        if parameter.name in {"file", "plot", "settings", "as_json", "help"}:
-            continue
-        source = context.get_parameter_source(str(parameter.name))
-        if source is not None and source.name == "COMMANDLINE":
-            advice = "this is for robot files; nothing is run to check a scene or a study"
-            if parameter.name == "engine":
-                advice += ", and `proofroll compare SCENE --engine NAME` says what an engine makes of one"
-            value = context.params[str(parameter.name)]
-            shown = ", ".join(value) if isinstance(value, list) else value
-            raise InputError(parameter.opts[0], shown, advice)

@@ -207,6 +207,7 @@ class Result:
         processor: processor time of the worker by activity [s], which other processes do not lengthen.
         interpreter: path of the Python that ran it.
         host: name of the machine of a cluster that ran it, where no speed is measured; empty: this machine.
+        cut: True if a limit of time ended a truth, which a slower machine would have ended earlier; it is not stored.
     """
 
     status: Status
@@ -223,6 +224,7 @@ class Result:
     processor: dict[str, float] = field(default_factory=dict)
     interpreter: str = ""
     host: str = ""
+    cut: bool = False
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Result:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, ProofrollError
-from proofroll.core.plugins import GROUP, distribution_of, engine_names, release
+from proofroll.core.plugins import GROUP, distribution_of, engine_names, package_of, release
 from proofroll.running import environments
 from proofroll.running.bound_program import printed_by
 from proofroll.running.engine_questions import describe
@@ -101,17 +101,6 @@ def _require_plausible(name: str, requirements: Sequence[str]) -> None:
         f"there is no such engine; choose one of {', '.join(names)}, or install the package that announces it here, too"
     )
     raise InputError("engine", name, advice)
-
-
-def package_of(engine: str) -> str:
-    """Requirement that installs an engine: of the extra with its name in the adapter's package; empty if unknown."""
-    for point in announced(GROUP):
-        if point.name != engine or point.dist is None:
-            continue
-        for text in point.dist.requires or []:
-            if re.search(rf"extra\s*==\s*['\"]{re.escape(engine)}['\"]", text):
-                return distribution_of(text)
-    return ""
 
 
 def _require_supported(name: str, requirements: Sequence[str]) -> None:

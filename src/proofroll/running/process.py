@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from proofroll.core.errors import InputError, Missing, ProofrollError, Unwritable
+from proofroll.core.pace import AT, PACE
 from proofroll.running.case import Status
 from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
 
@@ -24,6 +25,8 @@ THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"),
     "1",
 )
+# A worker draws nothing; MuJoCo would look for a library of windows, which takes a tenth of a second.
+_NO_WINDOWS = {"MUJOCO_GL": "disable"}
 # Variables that redirect a Python's imports or start-up; they are meant for this Python, not for another interpreter.
 _OF_THIS_PYTHON = (
     "PYTHONPATH",
@@ -70,6 +73,12 @@ def end_all() -> None:
     """Kills every worker of this process with all that it started, without waiting; safe in a signal handler."""
     for worker in list(_living):
         worker.shoot()
+
+
+def truths_at() -> list[str]:
+    """Lines about how far truths have come, in this process and its workers."""
+    said = [item for worker in list(_living) for item in worker.said[-1:]]
+    return [*([f"{AT}{PACE.text}"] if PACE.text else []), *(item for item in said if item.startswith(AT))]
 
 
 def processor_seconds() -> float:
@@ -123,7 +132,7 @@ class Worker:
                 stdout=log,
                 stderr=log,
                 pass_fds=(writer, life),
-                env=(environment_of_another() if python else safe_environment()) | THREADS,
+                env=_NO_WINDOWS | (environment_of_another() if python else safe_environment()) | THREADS,
                 text=True,
                 start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
             )
@@ -266,9 +275,14 @@ class Worker:
             if not self._listen(0):
                 break
         how = _how(code) if ended else "closed its answers without ending"
-        lines = self._said.decode(errors="replace").splitlines()
-        last = next((" ".join(line.split()) for line in reversed(lines) if line.strip()), "")
+        last = "".join(self.said[-1:])
         return f"the engine's process {how}" + (f": {last[:200]}" if last else "")
+
+    @property
+    def said(self) -> list[str]:
+        """Last lines that it printed."""
+        lines = self._said.decode(errors="replace").splitlines()
+        return [" ".join(line.split()) for line in lines if line.strip()]
 
     def shoot(self) -> None:
         """Kills the process and all that it started, without waiting."""

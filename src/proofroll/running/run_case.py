@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.errors import Diverged, ProofrollError, Refused, lack_behind
+from proofroll.core.limits import FOR_A_TRUTH
+from proofroll.core.pace import AT, PACE
 from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.integrity import changed
@@ -62,7 +64,8 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         counting = samples_between(scene, times) if case.turns else times[:0]
         between = np.array(case.between)
         spent.on("loading")
-        return _run_truth(scene, times, (counting, between), out, made_with("truth", case.engine.version), spent)
+        with PACE.limited(case.time_limit * FOR_A_TRUTH, lambda text: print(f"{AT}{text}", flush=True)):
+            return _run_truth(scene, times, (counting, between), out, made_with("truth", case.engine.version), spent)
     kind, settings = engine_and_settings(case)
     versions = made_with(plain_name(case.engine.name), kind.version())
     spent.on("loading")
@@ -173,7 +176,7 @@ def _run_truth(
     attrs = {"status": "done", "message": message, "wall_seconds": wall}
     write(dataset.assign_attrs(attrs | manifest("truth", {}, scene, versions)), out)
     spent.on("writing")
-    return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)
+    return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name, cut=PACE.over)
 
 
 class _TimeAccounts:

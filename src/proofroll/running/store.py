@@ -102,7 +102,7 @@ class Store:
         """Stores a result and its trajectory; returns the result with the checksum of the trajectory.
 
         Record and trajectory are replaced together, after both are completely on disk. A result that may change next
-        time (:data:`LASTING`) is not stored.
+        time (:data:`LASTING`) is not stored, nor one that was cut, but for its trajectory.
 
         Args:
             case: of the run.
@@ -119,7 +119,11 @@ class Store:
             except OSError as error:
                 raise ProofrollError(f"{path} cannot be read ({error.strerror or error})") from None
             result = dataclasses.replace(result, checksum=checksum)
-        if result.status in LASTING:
+        if result.cut and written:
+            with self._locked(fcntl.LOCK_EX):
+                self._held.pop(case.key, None)
+                written.replace(self.trajectory(case))
+        elif result.status in LASTING:
             content = {"case": dataclasses.asdict(case), "result": dataclasses.asdict(result)}
             path = self.folder / f"{case.key}.json"
             with self._locked(fcntl.LOCK_EX), replacing(path) as record:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from proofroll.core.dataset import end_of_truth
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event, EventKind
+from proofroll.core.pace import PACE
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.record import Record
@@ -65,10 +66,15 @@ def followed(
 
     Where the first ends early the second is not followed beyond that end, for the truth ends there, too.
     """
-    path = follow(tree_route, until, kinks, CLOSE)
-    end = until if path.known else path.stretches[-1].end
-    last = min(until, end + _BEHIND * time_accuracy(end))
-    return path, follow(body_route, last, kinks, CLOSE, first_close([path], CLOSE))
+    try:
+        PACE.follow("first", until)
+        path = follow(tree_route, until, kinks, CLOSE)
+        end = until if path.known else path.stretches[-1].end
+        last = min(until, end + _BEHIND * time_accuracy(end))
+        PACE.follow("second", until)
+        return path, follow(body_route, last, kinks, CLOSE, first_close([path], CLOSE))
+    finally:
+        PACE.leave()
 
 
 def cut_early(

@@ -1,12 +1,9 @@
-"""Command ``vocabulary``: prints the keys of scenes, comparisons and studies."""
+"""Keys of scenes, comparisons and studies on a terminal, for ``check --keys``."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from typing import Annotated
-
-import typer
 
 from proofroll.cli import options
 
@@ -32,11 +29,8 @@ class KeyEntry:
     meaning: str
 
 
-def vocabulary(
-    word: Annotated[str, typer.Argument(help="A key, a table, or a word of a meaning; without it: all keys.")] = "",
-    as_json: options.Json = False,
-) -> None:
-    """Print the keys of scenes, comparisons and studies, with types, defaults and units."""
+def show_keys(word: str, as_json: bool) -> None:
+    """Prints the entries of a word, or all if it is empty. Raises InputError if there are none."""
     entries = [*all_entries()]
     chosen = entries_about(word, entries) if word else entries
     if as_json:

@@ -96,7 +96,7 @@ formulas `i`.
 What somebody else found of the same mechanism; it moves nothing. `source` (required); `time`, an instant, or `times`,
 a list [s]; a number, or a list of as many, for each observable, as `"q.slide"`; `parameters` with which they hold, the
 others at their defaults; `within`, the largest error that the numbers are known to have: without it a unit of the last
-digit of each. `proofroll drill published` holds them against the truth.
+digit of each. `python -m proofroll_drill published` holds them against the truth.
 
 ### `unmodelled`
 
@@ -128,7 +128,7 @@ Parameter = list of values. `[vary]`: every combination is run. `[brief]`: a rep
 }
 INTRODUCTION = """# The vocabulary of scenes and comparisons
 
-Written from what reads the files; `proofroll vocabulary WORD` prints a part of it. `proofroll check NAME` says
+Written from what reads the files; `proofroll check --keys WORD` prints a part of it. `proofroll check NAME` says
 whether a file is sound, and an unknown key is an error. SI units, angles in rad. In a scene
 `"$name"` is the value of a parameter, and `"= mass*length^2/12"` is a formula of parameters with `+ - * / ^ ( )`,
 `pi`, `sin`, `cos`, `tan`, `asin`, `acos`, `atan`, `atan2`, `sqrt`, `hypot` and `abs`; `"30 deg"` and `"2 mm"` are

@@ -1,4 +1,4 @@
-"""``proofroll bench`` as a user meets it. No exit code hangs on speed."""
+"""``python -m proofroll_benchmarks`` as a user meets it. No exit code hangs on speed."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 
 from proofroll import cli
 from proofroll.report.terminal.screen import console
+from proofroll_benchmarks.command import bench
 from proofroll_benchmarks.tables import study_lines, study_tables
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -29,10 +30,10 @@ def proofroll(
     monkeypatch.setenv("COLUMNS", "100")
 
     def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["proofroll", "bench", *arguments])
+        monkeypatch.setattr(sys, "argv", ["proofroll_benchmarks", *arguments])
         capfd.readouterr()
         with pytest.raises(SystemExit) as ended:
-            cli.main()
+            cli.main(bench)
         captured = capfd.readouterr()
         assert isinstance(ended.value.code, int)
         return ended.value.code, captured.out, captured.err

@@ -1,4 +1,4 @@
-"""Commands about balls on surfaces: first slips, and maps of regimes."""
+"""Commands of the article: first slips, maps of regimes, figures."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from proofroll.cli import options
+from proofroll.papers.blajer_2006.figures.command import figures
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -17,6 +18,13 @@ if TYPE_CHECKING:
     from proofroll.papers.blajer_2006.slip.onset import OnsetStudy
 
 
+paper = typer.Typer(
+    help="Blajer's article (2006): first slips, regimes, figures.", rich_markup_mode=None, no_args_is_help=True
+)
+paper.command()(figures)
+
+
+@paper.command()
 def onset(
     scene: options.SceneName,
     settings: options.Set = None,
@@ -79,6 +87,7 @@ def _onset_table(study: OnsetStudy) -> Table:
     return table
 
 
+@paper.command()
 def regimes(
     study: Annotated[str, typer.Argument(help='A file with study = "regimes", its name, or its scene.')] = "regimes",
     out: options.Out = Path("out"),

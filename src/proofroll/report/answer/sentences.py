@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from proofroll.core.number_format import number
 from proofroll.core.plugins import parse_engine
+from proofroll.files.scene_sources import root_words
 from proofroll.report.labels import engine_title, engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
 from proofroll.running.case import Status
@@ -237,7 +238,7 @@ def _given(made: SceneAnswer | StepAnswer) -> list[str]:
     words = ["--tolerance", made.tolerance]
     for name, value in made.parameters.items():
         words += ["--set", f"{name}={value!r}"]
-    return [*words, "--until", f"{made.until!r}"]
+    return [*words, "--until", f"{made.until!r}", *root_words()]
 
 
 def step_sentence(made: StepAnswer) -> str:

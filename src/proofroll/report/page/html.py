@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from proofroll.core import number_format
 from proofroll.files.json_data import plain
+from proofroll.files.scene_sources import root_words
 from proofroll.report import labels
 from proofroll.report.answer import picture, sentences
 from proofroll.report.comparison import tables, verdict_matrix
@@ -149,4 +150,4 @@ def _again(comparison: ReportedComparison, run: ReportedRun) -> str:
     words = ["proofroll", "run", comparison.scene, "--engine", run.engine]
     for name, value in run.parameters.items():
         words += ["--set", f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"]
-    return shlex.join([*words, "--until", f"{comparison.until:g}", "--every", f"{comparison.every:g}"])
+    return shlex.join([*words, "--until", f"{comparison.until:g}", "--every", f"{comparison.every:g}", *root_words()])

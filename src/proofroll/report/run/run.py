@@ -168,9 +168,9 @@ def _event_text(event: Event) -> str:
     return f"{event.kind.replace('_', '-')}{name} at {time} ± {bar} s"
 
 
-def _ended_words(content: RunContent) -> str:
+def _ended_words(content: RunContent, engine: str) -> str:
     """Sentence on the end of a run: who reached what time, how fast, and the time before the first step."""
-    words = engine_words(content.engine, content.settings.get("formulation")), content.settings.get("preset")
+    words = engine_words(content.engine, content.settings.get("formulation"), engine), content.settings.get("preset")
     resolution = [name for name in ("dt", "rtol") if content.settings.get(name) is not None][:1]
     steps = [step(name, content.settings[name]) for name in resolution]
     title = ", ".join(filter(None, (*words, *precision_words(content.precision), *steps)))
@@ -204,18 +204,21 @@ def event_csv(content: RunContent) -> str:
     return text.getvalue()
 
 
-def run_lines(content: RunContent, *, forces: bool = True, everything: bool = False, checked: str = "") -> list[Any]:
+def run_lines(
+    content: RunContent, *, engine: str = "", forces: bool = True, everything: bool = False, checked: str = ""
+) -> list[Any]:
     """Lines and tables about a run for the terminal, printed by rich.
 
     Args:
         content: of the run.
+        engine: title of the engine; empty: the engine is loaded for it.
         forces: True to show more than a few forces, too.
         everything: True to show forces, velocities, settings and all digits.
         checked: command that holds the run against the truth; empty: there is none.
     """
     from rich.text import Text
 
-    lines: list[Any] = [Text(_ended_words(content))]
+    lines: list[Any] = [Text(_ended_words(content, engine))]
     lines += [Text(content.step_bound)] if content.step_bound else []
     lines += [Text(words) for words in (*omitted_lines(content.omitted or []), *filter(None, [content.quiet]))]
     lines += [Text(f"  {cause.sentence}") for cause in content.diagnosis]

@@ -5,6 +5,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError, error_location, require_known
+from proofroll.files.scene_sources import ROOT
 from proofroll.robots.files import urdf
 from proofroll.robots.files.mjcf.parse import neutral_mjcf
 from proofroll.robots.files.robot_file import RUN_XACRO, Expand, RobotFile, names_files_inside, read_xml
@@ -21,7 +22,7 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
     Args:
         path: path of a URDF or MJCF.
         base: support of the root of a URDF, ``fixed`` or ``free``.
-        root: folder that holds the file and all files named in it; by default the file's own.
+        root: folder that holds the file and all files named in it; by default :data:`ROOT`, or the file's own.
         expand: writes out macros of an MJCF (repetition, attached models); None: a file with macros is refused.
 
     Raises:
@@ -30,7 +31,8 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
     require_known("base", base, BASES)
     with error_location(str(path)):
         # Path.resolve() fails at a loop of links
-        inside, file = (Path(os.path.realpath(item)) for item in (path.parent if root is None else root, path))
+        whole = root or os.environ.get(ROOT) or path.parent
+        inside, file = (Path(os.path.realpath(item)) for item in (whole, path))
         if not file.is_relative_to(inside):
             advice = f"{path.name} is in {file.parent}, not in this folder; name one that holds it with --root"
             raise InputError("--root", inside, advice)

@@ -175,9 +175,7 @@ def required_file(folder: Path, element: Element, inside: Path) -> Path:
     """Path of the file that an element names. Raises InputError if it lies outside the folder ``inside``."""
     target = file_inside(folder, element.get("file", ""), inside)
     if target is None:
-        message = (
-            "it is outside its folder, the only one that files are read from; `proofroll check` takes another by --root"
-        )
+        message = "it is outside its folder, the only one that files are read from; name one that holds all by --root"
         raise InputError(f"<{element.tag} file>", element.get("file", ""), message)
     return target
 

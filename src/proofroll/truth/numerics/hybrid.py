@@ -18,6 +18,7 @@ from proofroll.core.dop853 import NEAREST, controlled_step, corrected_by, go_on_
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.event_location import locate_rise
 from proofroll.core.number_format import number
+from proofroll.core.pace import PACE, OutOfTime
 from proofroll.core.stalling import StepCount
 
 State = FloatArray
@@ -249,6 +250,7 @@ def follow(
             return path(complete=False)
         end = next((corner for corner in breaks if time < corner < until), until)
         try:
+            PACE.reached(time)
             stretch = route.walk(time, change.state, change.mode, end)
         except (Diverged, Refused) as error:
             stretches += _known(error, partial(route.walk, time, change.state, change.mode), time, end, close)
@@ -400,6 +402,10 @@ def integrate_to_guard(
         if rise:
             return stretch(rise.time, law.corrected(rise.state), rise.guard)
         count.took(solver.t)
+        try:
+            PACE.reached(float(solver.t))
+        except OutOfTime as stopped:
+            raise StoppedWithin(str(stopped), float(solver.t), stretch(float(solver.t), solver.y.copy())) from None
     return stretch(until, np.asarray(solver.y))
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.event_location import locate_rise_within, points_within
+from proofroll.core.pace import PACE, OutOfTime
 from proofroll.core.stalling import StepCount, StepWatch
 from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -25,7 +26,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.followed_paths import TOLERANCES
 from proofroll.truth.numerics.compiled_once import compiled_once, heyoka
-from proofroll.truth.numerics.hybrid import Stretch, StretchLaw
+from proofroll.truth.numerics.hybrid import StoppedWithin, Stretch, StretchLaw
 from proofroll.truth.numerics.picard import PicardSteps
 from proofroll.truth.numerics.run_time_constants import Constants, Symbol
 from proofroll.truth.numerics.scalars import Scalar
@@ -255,12 +256,13 @@ class CompiledMode:
         """Stretch from a time and state to the first rise of a guard, or to ``until`` [s].
 
         Raises:
-            Diverged: the steps become too small or too many.
+            Diverged: the steps become too small or too many, or take too long.
         """
         if not until > time:
             return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=None)
         count, watch, pars = StepCount(time, until), StepWatch(), self._parameters(mode, time)
         steps, grazes, visited, rise = list[ModeStep](), list[float](), list[tuple[float, Array]](), None
+        stopped = ""
         for step in self._steps(pars, state, until):
             leaving, crests = not steps, list[float]()
             steps.append(step)
@@ -278,7 +280,13 @@ class CompiledMode:
                 step.guards,
             )
             grazes += step.inside(np.array(crests))[-1].tolist() if crests else []
-            if rise is not None:
+            if rise is None:
+                try:
+                    PACE.reached(float(step.last[-1]))
+                except OutOfTime as out_of_time:
+                    stopped = str(out_of_time)
+                    break
+            else:
                 if rise[1] in self._kinks and not self._slips:
                     place = step.start + _BEFORE * (rise[0] - step.start)
                     shorter = [*self._steps(pars, step.first, float(step.inside(np.array([place]))[-1, 0]))]
@@ -286,9 +294,9 @@ class CompiledMode:
                         steps[-1:], rise = shorter, (shorter[-1].end, rise[1])
                 break
         last = steps[-1].last if rise is None else steps[-1].inside(np.array([rise[0]]))[:, 0]
-        end, guard = (until, None) if rise is None else (float(last[-1]), rise[1])
+        end, guard = (until, None) if rise is None and not stopped else (float(last[-1]), rise and rise[1])
         blur = 0.0 if rise is None else self._blur(pars, steps[-1], *rise)
-        return CompiledStretch(
+        stretch = CompiledStretch(
             start=time,
             end=end,
             mode=mode,
@@ -301,6 +309,9 @@ class CompiledMode:
             by=self,
             steps=steps,
         )
+        if stopped:
+            raise StoppedWithin(stopped, end, stretch)
+        return stretch
 
     def steps_of(self, stretch: CompiledStretch) -> Iterator[tuple[float, float, Inside]]:
         """Steps of a stretch up to its end: start and end of the variable of integration, states within."""

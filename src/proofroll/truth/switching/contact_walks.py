@@ -295,10 +295,13 @@ class ContactWalks(ABC):
         self, compiled: CompiledMode, time: float, state: Array, mode: ContactMode, until: float
     ) -> Stretch[ContactMode] | None:
         """Stretch by a compiled mode; None: its steps fail, or a bushing turns further than its law says."""
-        with suppress(Diverged):
+        try:
             stretch = compiled.walk(self._law(state, mode, self._signs), mode, time, state, until)
-            return None if self._overturns(compiled, stretch) else stretch
-        return None
+        except StoppedWithin:  # it is out of time
+            raise
+        except Diverged:
+            return None
+        return None if self._overturns(compiled, stretch) else stretch
 
     def _overturns(self, compiled: CompiledMode, stretch: Stretch[ContactMode]) -> bool:
         """True if a bushing turns further than its rotation vector is unique, which compiled equations do not ask."""

@@ -13,7 +13,13 @@ from proofroll.elements.mechanism.diagnosis.contact_forces import REPORTED_FORCE
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import at_start
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.impacts import impacts, laws_of_impacts
-from proofroll.elements.mechanism.diagnosis.joint_laws import of_actuators, of_couplings, of_stops, soft_couplings
+from proofroll.elements.mechanism.diagnosis.joint_laws import (
+    of_actuators,
+    of_couplings,
+    of_stops,
+    soft_couplings,
+    soft_stops,
+)
 from proofroll.elements.mechanism.diagnosis.laws_of_parts import of_applied_forces, of_bushings, rolling_resistance
 from proofroll.elements.mechanism.diagnosis.motions import of_motions
 from proofroll.elements.mechanism.diagnosis.numbers import (
@@ -67,6 +73,7 @@ _OF_PARTS: tuple[Hypothesis, ...] = (
     of_couplings,
     soft_couplings,
     of_stops,
+    soft_stops,
     of_each_body,
     of_each_joint,
     friction_of_each_joint,

@@ -9,7 +9,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES_EXACTLY, Cause, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.fitting import change_by, factor_text, least_squares_parameter, possible
 from proofroll.core.diagnosis.samples import run_and_truth
+from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import EventKind, events_of
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, is_one_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
@@ -26,6 +28,9 @@ _AT_STOP = 1e-3  # largest distance from a stop of rebounds found by parabolas, 
 _SOFT = 0.1
 # Least change of velocity between two samples, relative to the changes before and after, that counts as a jump.
 _JUMPS = 5.0
+# Samples of a flight between stops at least, accuracy of its continuation, and how many times the rate that forces give
+# in one interval a joint has to have that was thrown back.
+_FLIGHT, _OF_FLIGHT, _GAINED = 5, 1e-10, 4.0
 _REACHES = 2.0  # steps of way beyond a stop in which a method may turn back
 
 
@@ -288,6 +293,88 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
                 explains=count,
                 change=change,
             )
+
+
+@hypothesis(
+    "soft stops",
+    "behind a stop without rebounds the run moves on by the scene's equations, at once from a rate that no force gives",
+)
+def soft_stops(evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: a stop gives way, and throws its joint back where the scene's lets it rest.
+
+    A flight of the run between the stops is continued from its first sample by the scene's equations without stops.
+    """
+    mechanism, pair = evidence.element.mechanism, run_and_truth(evidence)
+    limited = [joint for joint in mechanism.joints if joint.limits and not joint.restitution]
+    if pair is None or not is_motion(pair[0]) or not limited or mechanism.contacts or mechanism.loops:
+        return
+    if any(joint.kind in WITH_QUATERNION for joint in mechanism.joints):
+        return
+    (q, v), (true, _) = (placed_of(mechanism, dataset).of_tree() for dataset in pair)
+    times = np.asarray(pair[0]["time"], dtype=float)
+    hits = {event.name: event.time for event in reversed(events_of(pair[1])) if event.kind == EventKind.IMPACT}
+    for joint in limited:
+        if joint.name not in hits or not joint.limits:
+            continue
+        place, rated = mechanism.place_of(joint.name)
+        low, high = joint.limits
+        equations = JointCoordinates(
+            replace(mechanism, joints=tuple(replace(j, limits=None) for j in mechanism.joints))
+        )
+        beyond = np.maximum(q[:, place] - high, low - q[:, place])
+        for flight in _flights(mechanism, q):
+            first = flight.start
+            if first == 0 or times[first] <= hits[joint.name]:
+                continue
+            state = np.concatenate([q[first], v[first]])
+            rates = _rates(equations, times[first])
+            gained = abs(float(rates(0.0, state)[len(q[0]) + rated])) * (times[first] - times[first - 1])
+            above = q[first - 1, place] > (low + high) / 2
+            if abs(v[first, rated]) <= _GAINED * gained or (v[first, rated] > 0) == above:
+                continue
+            expected = np.array([*integrate(rates, state, times[flight] - times[first], _OF_FLIGHT)])[:, place]
+            off = np.abs(q[: flight.stop, place] - true[: flight.stop, place])
+            says = (
+                f"the stop of {joint.name} at {high if above else low:.3g} gives way, by up to {beyond.max():.2g} "
+                f"where its stops are {high - low:.2g} {joint.unit} apart, and throws it back at "
+                f"{abs(v[first, rated]):.2g} {joint.unit}/s"
+            )
+            yield Cause(
+                f"soft stop of {joint.name}",
+                says,
+                f"{joint.name} between its stops",
+                joint.unit,
+                float(off[flight].max()),
+                float(np.abs(q[flight, place] - expected).max() + off[times[: flight.stop] < hits[joint.name]].max()),
+                remedy="make the stop stiffer, or slow the joint down: a stop of no width is none for a soft one",
+                fitted=2,
+                covers=_COVERS,
+                explains=len(expected) - 1,
+                change=abs(v[first, rated]) / float(np.abs(v[:first, rated]).max()),
+            )
+            break
+
+
+def _flights(mechanism: Mechanism, q: FloatArray) -> Iterator[slice]:
+    """Samples between two contacts with stops, of at least :data:`_FLIGHT`; the longest first."""
+    inside = np.ones(len(q), dtype=bool)
+    for joint in mechanism.joints:
+        if joint.limits:
+            place, _ = mechanism.place_of(joint.name)
+            inside &= (q[:, place] > joint.limits[0]) & (q[:, place] < joint.limits[1])
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
+    flights = [slice(int(start), int(stop)) for start, stop in edges.reshape(-1, 2) if stop - start >= _FLIGHT]
+    yield from sorted(flights, key=lambda flight: flight.start - flight.stop)
+
+
+def _rates(equations: JointCoordinates, start: float) -> Callable[[float, FloatArray], FloatArray]:
+    """Right-hand side of coordinates and velocities from a time [s] on."""
+
+    def rates(t: float, y: FloatArray) -> FloatArray:
+        q, v = np.split(y, 2)
+        return np.concatenate([v, equations.solve(q, v, time=start + t).acceleration])
+
+    return rates
 
 
 @dataclass(frozen=True)

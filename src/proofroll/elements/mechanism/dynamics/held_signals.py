@@ -19,6 +19,7 @@ from proofroll.elements.mechanism.scene.control import EFFORT, constant
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.policy import Observation
+from proofroll.elements.mechanism.scene.rotations import to_quaternion
 from proofroll.elements.mechanism.scene.signal import Held, Table, is_held, value_at
 
 if TYPE_CHECKING:
@@ -158,9 +159,7 @@ def drive(mechanism: Mechanism, values: Iterable[float]) -> None:
 def placed_start(mechanism: Mechanism) -> Placed:
     """Motion of a mechanism at time 0."""
     motion = Tree(mechanism).at(*mechanism.start())
-    from scipy.spatial.transform import Rotation
-
-    quaternions = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
+    quaternions = np.array([to_quaternion(R) for R in motion.R_WB[:-1]])
     state = (motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], quaternions)
     return Placed(mechanism, np.zeros(1), *(part[None] for part in state))
 

@@ -13,6 +13,7 @@ from proofroll.elements.mechanism.scene.joint import Joint
 from proofroll.elements.mechanism.scene.joint_kinds import AXES, DISTANCE, FACTS, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.prescribed import moved
+from proofroll.elements.mechanism.scene.rotations import from_quaternion
 
 TURN = 2 * np.pi
 
@@ -44,12 +45,9 @@ class Placed:
     @cached_property
     def R_WB(self) -> FloatArray:
         """Rotations of the bodies, and of the world last, shape (time, bodies + 1, 3, 3)."""
-        count, bodies = self.q_WB.shape[:2]
-        from scipy.spatial.transform import Rotation
-
-        turned = Rotation.from_quat(self.q_WB.reshape(-1, 4), scalar_first=True).as_matrix()
-        world = np.broadcast_to(np.eye(3), (count, 1, 3, 3))
-        return read_only(np.concatenate([turned.reshape(count, bodies, 3, 3), world], 1))
+        turned = np.moveaxis(from_quaternion(np.moveaxis(self.q_WB, -1, 0)), (0, 1), (-2, -1))
+        world = np.broadcast_to(np.eye(3), (len(turned), 1, 3, 3))
+        return read_only(np.concatenate([turned, world], 1))
 
     def point(self, body: str, position: Sequence[float]) -> FloatArray:
         """Position in the world of a point fixed to a body or to the world [m], shape (time, 3)."""

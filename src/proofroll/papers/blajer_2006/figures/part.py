@@ -28,7 +28,7 @@ class FiguresPart(Part):
     key: ClassVar[str] = "figures"
     order: ClassVar[float] = 10
     words: ClassVar[str] = "figures"
-    command: ClassVar[str] = "figures {.name}"
+    command: ClassVar[str] = "paper figures {.name}"
     template: ClassVar[str] = "figures.html"
     names: ClassVar[Mapping[str, Any]] = {"statements": statement_tables}
     asked: Figures

@@ -90,7 +90,7 @@ class RegimesStudy:
         return replace(self, speed=self.speed.halved, mu_static=self.mu_static.halved)
 
 
-# Chapter of ``proofroll vocabulary``: header of each table, what reads it, fields that are no keys.
+# Chapter of ``proofroll check --keys``: header of each table, what reads it, fields that are no keys.
 CHAPTER = {
     'A regime map: `study = "regimes"`': (
         ("", RegimesStudy, ("name", "speed", "mu_static")),

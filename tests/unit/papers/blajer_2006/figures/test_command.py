@@ -50,7 +50,7 @@ def written(tmp_path: Path, text: str = TEXT) -> str:
 def test_figures_and_numbers(proofroll: Proofroll, tmp_path: Path) -> None:
     """Exit 0, the files asked for, one JSON document, and the same content beside the figures."""
     out = tmp_path / "out"
-    code, stdout, _ = proofroll("figures", written(tmp_path), "--out", str(out), "--format", "png", "--json")
+    code, stdout, _ = proofroll("paper", "figures", written(tmp_path), "--out", str(out), "--format", "png", "--json")
     content = json.loads(stdout)
     assert code == 0
     assert content == json.loads((out / "figures.json").read_text(encoding="utf-8"))
@@ -65,7 +65,7 @@ def test_figures_and_numbers(proofroll: Proofroll, tmp_path: Path) -> None:
 def test_a_wrong_number_is_a_contradiction(proofroll: Proofroll, tmp_path: Path) -> None:
     """Exit 1, and the table shows what was stated and found, within 100 columns."""
     path = written(tmp_path, TEXT.replace('"-160"', '"-150"'))
-    code, stdout, stderr = proofroll("figures", path, "--engine", "truth", "--out", str(tmp_path / "out"))
+    code, stdout, stderr = proofroll("paper", "figures", path, "--engine", "truth", "--out", str(tmp_path / "out"))
     assert code == 1
     assert "-150" in stdout
     assert "✗" in stdout
@@ -95,7 +95,7 @@ def test_what_goes_wrong_is_one_line(
     """A broken file or argument ends with 2, an engine that refuses with 3, each in one line."""
     assert old in TEXT
     text = TEXT.replace(old, new, 1)
-    said = proofroll("figures", written(tmp_path, text), "--out", str(tmp_path / "out"), *arguments)
+    said = proofroll("paper", "figures", written(tmp_path, text), "--out", str(tmp_path / "out"), *arguments)
     assert said[0] == code
     assert words in said[2]
     assert said[2].count("\n") == 1

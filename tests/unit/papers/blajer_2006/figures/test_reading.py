@@ -93,7 +93,7 @@ def test_files_are_found_by_scene_and_are_no_comparisons() -> None:
     ours = load_figures("sphere_in_cylinder")
     assert ours.name not in comparison_names()
     assert ours.wants_orientation
-    with pytest.raises(InputError, match="proofroll figures sphere_in_cylinder"):
+    with pytest.raises(InputError, match=f"proofroll report {ours.name} runs it"):
         load_comparison(ours.name)
     with pytest.raises(InputError, match=f"choose one of {ours.name}"):
         load_figures("sphere_in_cone")

@@ -1,4 +1,4 @@
-"""Scenes of the page about ropes, belts, gears, screws and differentials: their truths are closed forms."""
+"""Scenes of the page on how to build: their motions are closed forms."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "ropes_belts_gears.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "how_to_build.md"
 SCENES = dict(
     re.findall(r"^```toml\n# (\w+)/scene\.toml\n(.*?)^```$", PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE)
 )
@@ -24,6 +26,12 @@ def _differential() -> tuple[float, float]:
     # 2 a = l + r;  6 = 0.02 a + 2 M;  0.1 l = M;  0.3 r = M
     moment = 6 / (2 + 0.02 * (1 / 0.1 + 1 / 0.3) / 2)
     return moment / 0.1, moment / 0.3
+
+
+def run(text: str, folder: Path) -> xr.Dataset:
+    """Dataset of a scene of the page, 0.5 s of it."""
+    folder.joinpath("scene.toml").write_text(text, encoding="utf-8")
+    return simulate(load_scene(str(folder)), "projection", until=0.5, every=0.1)
 
 
 @pytest.mark.parametrize(
@@ -56,13 +64,33 @@ def test_the_force_of_a_coupling_is_that_on_one_joint(tmp_path: Path) -> None:
 
 @pytest.mark.drill
 def test_a_parcel_slides_on_a_conveyor(tmp_path: Path) -> None:
-    """The scene of the page about conveyors starts with the acceleration mu g."""
-    page = PAGE.with_name("conveyors.md").read_text("utf-8")
-    (tmp_path / "scene.toml").write_text(page.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    """The conveyor's parcel starts with the acceleration mu g."""
+    (tmp_path / "scene.toml").write_text(SCENES["conveyor"], encoding="utf-8")
     dataset = truth(load_scene(str(tmp_path)), np.array([0.0, 0.05]))
     assert float(dataset["middle.x"][-1]) == pytest.approx(0.3 * _G * 0.05**2 / 2, rel=1e-9)
 
 
+@pytest.mark.drill
+def test_a_sleeve_without_mass_swings_and_turns(tmp_path: Path) -> None:
+    """The rotor swings along the axis as on the spring alone, about the place where it holds the weight."""
+    found = run(SCENES["sleeve"], tmp_path)
+    middle = -0.02 - 2 * 9.81 / 800
+    place = middle - middle * np.cos(np.sqrt(800 / 2) * found["time"].to_numpy())
+    assert np.abs(found["q.slide"].to_numpy() - place).max() < 1e-10
+    moment = -0.02 * 0.2 * 30**2 * np.sin(30 * found["time"].to_numpy())
+    assert np.abs(found["drive.turn"].to_numpy() - moment).max() < 1e-10
+
+
+def test_an_arm_without_mass_carries_its_force_alone(tmp_path: Path) -> None:
+    """What the ball does to the arm is what the hinge does to it, and has no moment about the hinge."""
+    found = run(SCENES["held_by_an_arm"], tmp_path)
+    force = {name: np.stack([found[f"force.{name}.{c}"] for c in "xyz"], axis=-1) for name in ("hinge", "ball")}
+    assert np.abs(force["hinge"] - force["ball"]).max() < 1e-10
+    moment = np.cross(found["p_WB"].to_numpy()[:, 1] - found["p_WB"].to_numpy()[:, 0], force["ball"])
+    assert np.abs(moment @ [0, 1, 1]).max() < 1e-10
+    assert np.abs(force["ball"]).max() > 1.0
+
+
 def test_the_page_has_these_scenes() -> None:
     """Every scene of the page is tested."""
-    assert set(SCENES) == {"belt", "tackle", "screw", "differential"}
+    assert set(SCENES) == {"belt", "tackle", "screw", "differential", "conveyor", "sleeve", "held_by_an_arm"}

@@ -1,4 +1,4 @@
-"""``proofroll plot``, ``run --plot`` and ``proofroll replay``: a person's own run as a picture, and in motion."""
+"""``run --plot`` and ``proofroll replay``: a person's own run as a picture, and in motion."""
 
 from __future__ import annotations
 
@@ -62,13 +62,6 @@ def test_a_page_has_the_curves_that_are_furthest_off(proofroll: Proofroll, tmp_p
     assert "<script src=" not in html  # nothing is loaded
     assert '<meta http-equiv="Content-Security-Policy" content="default-src \'none\';' in html
     assert page.stat().st_size < 1.5e6
-    dataset = read(run)
-    del dataset.attrs["scene"]
-    write(dataset, tmp_path / "alone.nc")
-    assert proofroll("plot", str(tmp_path / "alone.nc"))[0] == 0
-    alone = (tmp_path / "alone.html").read_text(encoding="utf-8")
-    assert "The run alone: it does not say which scene it is of" in alone
-    assert {title.partition(" [")[0] for title in curves_of(tmp_path / "alone.html")} == set(names_of_curves(dataset))
 
 
 @pytest.mark.drill
@@ -97,7 +90,7 @@ def test_bad_files(proofroll: Proofroll, tmp_path: Path) -> None:
         ([str(tmp_path / "text.npz")], "no run in netCDF"),
         ([str(tmp_path / "text.nc"), "--out", str(tmp_path / "run.gif")], ".html"),
     ):
-        code, out, err = proofroll("plot", *arguments)
+        code, out, err = proofroll("replay", *arguments)
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert word in err
     assert [path.name for path in tmp_path.iterdir() if path.suffix in {".html", ".gif"}] == []

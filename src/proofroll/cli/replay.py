@@ -1,4 +1,4 @@
-"""Commands ``plot`` and ``replay``: a run as a picture, and in motion."""
+"""Command ``replay``: a run in motion."""
 
 import sys
 from pathlib import Path
@@ -8,24 +8,6 @@ import typer
 
 from proofroll.cli import options
 from proofroll.core.errors import InputError
-
-
-def plot(
-    trajectory: Annotated[Path, typer.Argument(help="A file of proofroll run --out, or one of a report.")],
-    out: Annotated[
-        Path | None, typer.Option(help="File to write, by its ending: html, svg, png or pdf; RUN.html by default.")
-    ] = None,
-) -> None:
-    """Draw a run: as a page in motion beside the truth, or all variables over time as a picture."""
-    from proofroll.report.run.plot import draw_run, read_run, require_ending
-
-    target = trajectory.parent / f"{trajectory.stem}.html" if out is None else out
-    if out is not None:
-        require_ending(out)
-    options.require_pages()
-    options.require_writable(target)
-    draw_run(read_run(trajectory), target)
-    sys.stdout.write(f"The plot is in {target}.\n")
 
 
 def replay(
@@ -38,8 +20,12 @@ def replay(
         ),
     ] = None,
     control: options.Control = None,
+    _root: options.Root = None,
 ) -> None:
-    """Show a run in motion beside the truth, as a page for a browser."""
+    """Show a stored run in motion beside the truth, as a page.
+
+    Below are its curves, as with `proofroll run --plot`.
+    """
     from proofroll.report.run.plot import read_run
     from proofroll.report.run.replay import replay_page
     from proofroll.running.store import write_text

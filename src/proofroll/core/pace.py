@@ -1,0 +1,78 @@
+"""Pace of a truth: how far it has come, and the processor time that it may take."""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from proofroll.core.errors import Diverged
+
+_EVERY = 1.0  # s of processor time between two messages
+AT = "truth at "  # beginning of a line that a worker prints about it
+_ROUTES = {"first": 0.5, "second": 1.0}  # route -> part of the limit that is used when it ends
+
+
+class OutOfTime(Diverged):
+    """A truth has taken the processor time that it may; what it has found so far is known."""
+
+
+class Pace:
+    """Pace of the truth that this process computes.
+
+    Attributes:
+        until: last time of the truth [s].
+        text: time that is reached and time that is still needed; empty: no truth is being followed.
+        over: True if the last truth was ended by its limit.
+    """
+
+    def __init__(self) -> None:
+        self.text, self.over, self.until = "", False, 0.0
+        self._tell: Callable[[str], object] = str
+        self._limit, self._began = math.inf, 0.0
+        self._route, self._begun, self._end, self._told = "", 0.0, math.inf, 0.0
+
+    @contextmanager
+    def limited(self, seconds: float, tell: Callable[[str], object] = str) -> Iterator[None]:
+        """Context manager of a truth.
+
+        Args:
+            seconds: processor time after which it ends where it is.
+            tell: called with the text about every second.
+        """
+        self._limit, self._tell, self.over = seconds, tell, False
+        self._began = self._told = time.process_time()
+        try:
+            yield
+        finally:
+            self._limit = math.inf
+            self.leave()
+            self._tell("")  # what was told before is over
+
+    def follow(self, route: str, end: float) -> None:
+        """Begins the ``first`` or ``second`` route to an end in its own unit of time."""
+        self._route, self._begun, self._end = route, time.process_time(), end
+
+    def leave(self) -> None:
+        """Ends a route: what follows has no limit."""
+        self._route = self.text = ""
+
+    def reached(self, t: float) -> None:
+        """Records the time that a route has reached, in its own unit.
+
+        Raises:
+            OutOfTime: the limit is used.
+        """
+        if not self._route:
+            return
+        now, part = time.process_time(), t / self._end
+        if now - self._began > _ROUTES[self._route] * self._limit:
+            self.over = True
+            raise OutOfTime(f"its limit of {self._limit:g} s of processor time was reached", t)
+        if part > 0 and now - self._told > _EVERY:
+            self._told, spent = now, now - self._begun
+            left = spent * (1 / part - 1) + (spent / part if self._route == "first" else 0.0)
+            self.text = f"{part * self.until:.3g} of {self.until:.3g} s, about {left:.0f} s left"
+            self._tell(self.text)
+
+
+PACE = Pace()

@@ -1,0 +1,72 @@
+"""A truth that is ended by its limit of processor time keeps what it has found, and is not stored."""
+
+from __future__ import annotations
+
+import dataclasses
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from proofroll.core.dataset import ended_early
+from proofroll.core.pace import PACE
+from proofroll.core.truth import truth
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import EngineFacts, Result, Status
+from proofroll.running.identity import resolve
+from proofroll.running.run_case import run
+from proofroll.running.store import Store
+from proofroll.studies.cases import case_of
+
+TIMES = np.linspace(0.0, 1.0, 101)
+
+
+@pytest.fixture
+def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processor time is a hundredth of a second more at each look."""
+    ticks = count()
+    monkeypatch.setattr("proofroll.core.pace.time.process_time", lambda: next(ticks) / 100)
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [("bouncing_ball", {"restitution": 0.8}), ("stopped_fall", {})],
+)
+@pytest.mark.usefixtures("ticking")
+def test_a_limit_keeps_what_came_before(name: str, parameters: dict[str, float]) -> None:
+    """A truth that is ended by its limit has the values of the whole one up to there, and says why it ends."""
+    scene = load_scene(name, **parameters)
+    whole = truth(scene, TIMES)
+    for limit in (0.5, 0.25, 0.12, 0.06):
+        with PACE.limited(limit):
+            cut = truth(scene, TIMES)
+        if PACE.over:
+            break
+    ended = ended_early(cut)
+    assert ended is not None
+    end, reason = ended
+    assert reason == f"its limit of {limit:g} s of processor time was reached"
+    assert 0 < len(cut.time) < len(whole.time)
+    assert end > cut.time[-1]
+    bar = float(cut["positions"].attrs["error_bar"]) + float(whole["positions"].attrs["error_bar"])
+    same = np.abs(cut["positions"].to_numpy() - whole["positions"].to_numpy()[: len(cut.time)])
+    assert same.max() <= max(bar, 1e-12)
+
+
+@pytest.mark.drill
+@pytest.mark.usefixtures("ticking")
+def test_a_truth_that_was_cut_is_not_stored(tmp_path: Path) -> None:
+    """A worker gives what the truth has found, and the next run does not take that for the whole."""
+    scene = load_scene("stopped_fall")
+    case = case_of("stopped_fall", scene, {}, EngineFacts(**resolve("truth", {})), 1.0, 0.01, time_limit=0.25)
+    result = Result.from_dict(run(dataclasses.asdict(case), str(tmp_path / "cut.npz")))
+    assert (result.status, result.cut) == (Status.DONE, True)
+    assert "its limit of 0.2 s of processor time was reached" in result.message
+    store = Store(tmp_path / "cases")
+    store.put(case, result, tmp_path / "cut.npz")
+    assert (store.has(case), store.get(case)) == (False, None)
+    assert ended_early(store.stored(case).dataset) is not None  # for who asked
+    store.put(case, dataclasses.replace(result, cut=False))
+    assert store.get(case) is not None
