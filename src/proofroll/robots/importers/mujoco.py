@@ -20,6 +20,7 @@ _PASSIVE = sum(
     int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}", 0))
     for name in (("SPRING", "DAMPER") if hasattr(mujoco.mjtDisableBit, "mjDSBL_DAMPER") else ("PASSIVE",))
 )
+_NOT_COMPARED = ("EQUALITY", "LIMIT", "CONTACT", "ACTUATION")
 
 
 class MujocoRobots:
@@ -69,17 +70,21 @@ class MujocoRobots:
         return Whole(int(model.nv), float(model.body_mass[moved].sum()))
 
     def read(self, request: Request) -> Reading:
-        """Compiled model without actuators, tendons, medium and constraints, friction among them."""
+        """Compiled model without actuators, tendons, medium and constraints but dry friction of joints.
+
+        Friction rows are hard: how soft the file has them is a remark.
+        """
         model = _compile(request)
         off = mujoco.mjtDisableBit
-        model.opt.disableflags |= int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_ACTUATION)
+        model.opt.disableflags |= sum(int(getattr(off, f"mjDSBL_{name}")) for name in _NOT_COMPARED)
         model.opt.density = model.opt.viscosity = 0.0
-        for name in ("body_gravcomp", "tendon_stiffness", "tendon_damping"):
+        for name in ("body_gravcomp", "tendon_stiffness", "tendon_damping", "tendon_frictionloss"):
             if hasattr(model, name):
                 getattr(model, name)[:] = 0.0
         if request.kind == "urdf":
             model.opt.gravity = request.gravity
         data = mujoco.MjData(model)
+        softness = _softness_of_friction(model, data)
         joints = tuple(model.joint(index).name for index in range(model.njnt))
         dofs = tuple({0: 6, 1: 3}.get(int(kind), 1) for kind in model.jnt_type)
         home = {
@@ -99,7 +104,7 @@ class MujocoRobots:
             position={name: np.array([p[body] for p, _ in frames]) for name, body in home.items()},
             rotation={name: np.array([R[body].reshape(3, 3) for _, R in frames]) for name, body in home.items()},
             coupled=_coupled(model, joints),
-            remarks=tuple(f"option {name}={str(on).lower()}" for name, on in request.options.items()),
+            remarks=softness,
             **arrays,
         )
 
@@ -160,7 +165,8 @@ def _at(
     def inverse(acceleration: Array) -> Array:
         data.qacc[:] = acceleration
         flags = model.opt.disableflags
-        model.opt.disableflags |= _PASSIVE  # else it is added and subtracted again, which leaves round-off
+        # Else passive forces are added and subtracted again, which leaves round-off.
+        model.opt.disableflags |= _PASSIVE | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
         mujoco.mj_inverse(model, data)
         model.opt.disableflags = flags
         return np.array(data.qfrc_inverse + data.qfrc_passive)
@@ -172,6 +178,25 @@ def _at(
         return np.array(data.qacc)
 
     return AtState(T=T, drift=np.zeros(model.nv), M=M, g=g, h=data.qfrc_bias.copy(), inverse=inverse, forward=forward)
+
+
+def _softness_of_friction(model: Any, data: Any) -> tuple[str, ...]:
+    """Remark on the softness of dry friction in the file's own rows, which are hard from then on."""
+    mujoco.mj_forward(model, data)
+    rows = np.flatnonzero(data.efc_type[: data.nefc] == int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
+    # The row resists with (damping · speed) / R until it reaches its friction.
+    speeds = data.efc_R[rows] * data.efc_frictionloss[rows] / data.efc_KBIP[rows, 1]
+    model.dof_solref[:], model.dof_solimp[:, :2] = (-1.0, -1e9), mujoco.mjMAXIMP
+    model.opt.solver, model.opt.iterations, model.opt.tolerance = int(mujoco.mjtSolver.mjSOL_NEWTON), 100, 0.0
+    if not rows.size:
+        return ()
+    worst = int(speeds.argmax())
+    joint = model.joint(int(model.dof_jntid[data.efc_id[rows[worst]]]))
+    unit = "m/s" if joint.type[0] == mujoco.mjtJoint.mjJNT_SLIDE else "rad/s"
+    return (
+        f"its dry friction is soft: joint {joint.name} creeps at up to {speeds[worst]:.2g} {unit} under a load that "
+        "its friction should hold (solreffriction, solimpfriction); compared as hard",
+    )
 
 
 def _group(model: Any, body: int) -> RobotBody:
