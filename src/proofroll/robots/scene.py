@@ -59,7 +59,7 @@ class RobotScenes:
         """Title, source and parameters of a robot's scene."""
         file, robot = read_robot(path, "fixed")
         parameters = dict(_RELEASE) | _parameters(file, robot)
-        if any(len(part) for part in file.root.findall("actuator")):
+        if robot.actuators:
             words = "whether the file's actuators act, with their controls at zero (1), or not (0)"
             parameters["actuators"] = (0, "1", words, SWITCH)
         if any(map(any, file.controls)):
@@ -80,7 +80,7 @@ class RobotScenes:
         """
         file, robot = read_robot(path, BASES[int(values.get("free_base", 0))])
         controls = ((), *file.controls)[int(values.get("keyframe", 0))]
-        acting, silent = scene_actuators(file.root, robot, controls) if values.get("actuators") else ([], [])
+        acting, silent = scene_actuators(robot, controls) if values.get("actuators") else ([], [])
         clauses = [f"{what} (actuators=0 leaves all out)" for what in silent]
         start = random_states(robot, 1, int(values["seed"]))
         start = held_start(robot, start) if values["couplings"] else start

@@ -161,7 +161,7 @@ class ControlledScenes:
         with error_location(str(self._path)):
             followers = {mimic.joint for mimic in robot.mimics} if values.get("couplings") else set()
             single = [joint.name for joint in robot.moving if joint.dofs == 1 and joint.name not in followers]
-            of_file = _servos_of_file(file, robot)
+            of_file = _servos_of_file(robot)
             controller.require_joints(single, {joint.name: joint.kind for joint in robot.moving}, _positions(of_file))
             actuators = _actuators(robot, controller, single, of_file, file.driven)
             names = [row["name"] for row in actuators]
@@ -241,9 +241,9 @@ def start_of(robot: Robot, controller: Controller) -> RobotStates:
     return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=rest)
 
 
-def _servos_of_file(file: RobotFile, robot: Robot) -> dict[str, dict[str, Any]]:
+def _servos_of_file(robot: Robot) -> dict[str, dict[str, Any]]:
     """Joint -> table of its position actuator in the file, or of another one that has a limit."""
-    rows = scene_actuators(file.root, robot)[0]
+    rows = scene_actuators(robot)[0]
     return {row["joint"]: row for row in rows if row["kind"] == "position" or "limit" in row}
 
 

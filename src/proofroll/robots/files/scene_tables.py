@@ -126,9 +126,8 @@ def _omitted(file: RobotFile, robot: Robot, values: Mapping[str, float]) -> Iter
     ranges = sum(joint.lower is not None or joint.upper is not None for joint in robot.moving)
     if ranges and not values.get("limits"):
         yield f"{counted(ranges, 'joint ranges')} (limits=1)"
-    actuators = sum(len(part) for part in file.root.findall("actuator"))
-    if actuators and values.get("actuators") == 0:
-        yield f"{counted(actuators, 'actuators')} (actuators=1)"
+    if robot.actuators and values.get("actuators") == 0:
+        yield f"{counted(len(robot.actuators), 'actuators')} (actuators=1)"
     if values.get("actuators") and values.get("keyframe") == 0:
         yield f"controls of {counted(len(file.controls), 'keyframes')} (keyframe=1)"
     for law in _FACTORS:

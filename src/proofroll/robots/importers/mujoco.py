@@ -12,7 +12,19 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.engines.mujoco.running import mass_matrix, written
-from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie, composed
+from proofroll.robots.importers.mujoco_actuators import actuators_of, is_off, reflected
+from proofroll.robots.model import (
+    NO_BODY,
+    Array,
+    Cord,
+    Mimic,
+    Robot,
+    RobotBody,
+    RobotJoint,
+    RobotLoop,
+    Tie,
+    composed,
+)
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
 # Springs and dampers; MuJoCo up to 3.3 has one flag for both.
@@ -231,12 +243,13 @@ def robot_of(model: Any) -> Robot:
     """
     if np.any(getattr(model, "tendon_armature", np.zeros(0))):
         raise Refused("a tendon has armature, which the check does not cover")
-    if any(np.any(getattr(model, f"{name}poly", 0)) for name in ("jnt_stiffness", "dof_damping")):
+    if any(np.any(getattr(model, f"{name}poly", 0)) for name in ("jnt_stiffness", "dof_damping", "actuator_damping")):
         raise Refused("a joint has a spring or damper that is not linear, which the check does not cover")
     names = [NO_BODY, *(model.body(index).name for index in range(1, model.nbody))]
     bodies: dict[str, RobotBody] = {}
     joints: list[RobotJoint] = []
-    driven = {int(model.actuator_trnid[index, 0]) for index in range(model.nu) if model.actuator_trntype[index] == 0}
+    actuators = actuators_of(model)
+    driven = {actuator.joint for actuator in actuators}
     for index in range(1, model.nbody):
         name, parent = names[index], names[int(model.body_parentid[index])]
         bodies[name] = body_of(model, index, name)
@@ -259,9 +272,9 @@ def robot_of(model: Any) -> Robot:
             child = name if last else f"{name}/{joint - begin}"
             if not last:
                 bodies[child] = RobotBody(child, 0.0, np.zeros(3), np.zeros((3, 3)))
-            joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
+            joints.append(_joint(model, joint, parent, child, position, rotation, model.joint(joint).name in driven))
             parent, position, rotation = child, np.zeros(3), np.eye(3)
-    gravity = np.zeros(3) if _off(model, "GRAVITY") else np.array(model.opt.gravity)
+    gravity = np.zeros(3) if is_off(model, "GRAVITY") else np.array(model.opt.gravity)
     loops, ties, further = _constraints(model, names)
     cords, laws_of_tendons = _tendons(model, names)
     robot = Robot(
@@ -275,10 +288,11 @@ def robot_of(model: Any) -> Robot:
         ties=ties,
         cords=cords,
         further=(*further, *laws_of_tendons),
+        actuators=actuators,
     )
     laws = {"SPRING": "stiffness", "DAMPER": "damping", "FRICTIONLOSS": "friction"}
-    off = {law: 0.0 for flag, law in laws.items() if _off(model, flag)}
-    return robot.with_joints(**off | ({"friction": 0.0} if _off(model, "CONSTRAINT") else {}))
+    off = {law: 0.0 for flag, law in laws.items() if is_off(model, flag)}
+    return robot.with_joints(**off | ({"friction": 0.0} if is_off(model, "CONSTRAINT") else {}))
 
 
 def body_of(model: Any, index: int, name: str) -> RobotBody:
@@ -286,13 +300,6 @@ def body_of(model: Any, index: int, name: str) -> RobotBody:
     A = matrix(model.body_iquat[index])
     inertia = A @ np.diag(model.body_inertia[index]) @ A.T
     return RobotBody(name, float(model.body_mass[index]), np.array(model.body_ipos[index]), inertia)
-
-
-def _off(model: Any, flag: str) -> bool:
-    """True if the file disables a part of the physics; MuJoCo up to 3.3 has one flag for springs and dampers."""
-    bits = mujoco.mjtDisableBit
-    name = "PASSIVE" if flag in {"SPRING", "DAMPER"} and not hasattr(bits, f"mjDSBL_{flag}") else flag
-    return bool(model.opt.disableflags & int(getattr(bits, f"mjDSBL_{name}")))
 
 
 def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:
@@ -320,18 +327,20 @@ def _joint(
     anchor = np.array(model.jnt_pos[index]) * (kind != JointKind.FREE)
     shift = float(model.qpos0[start]) * (kind in ONE_COORDINATE)
     bounded = bool(model.jnt_limited[index])
+    least, greatest = model.jnt_actfrcrange[index].tolist()
     return RobotJoint(
         name=model.joint(index).name, kind=kind, parent=parent, child=child,
         position=position + rotation @ anchor if kind != JointKind.FREE else np.zeros(3),
         rotation=rotation if kind != JointKind.FREE else np.eye(3),
         axis=np.array(model.jnt_axis[index]), child_position=anchor,
-        damping=_first(model.dof_damping[dof]),
+        damping=_first(model.dof_damping[dof]) + reflected(model, "damping", index),
         friction=float(model.dof_frictionloss[dof]),
-        armature=float(model.dof_armature[dof]),
+        armature=float(model.dof_armature[dof]) + reflected(model, "armature", index),
         stiffness=_first(model.jnt_stiffness[index]),
         rest=float(model.qpos_spring[start]) - shift,
         lower=float(model.jnt_range[index, 0]) - shift if bounded and kind in ONE_COORDINATE else None,
         upper=float(model.jnt_range[index, 1]) - shift if bounded else None,
+        effort=greatest if model.jnt_actfrclimited[index] and greatest == -least else None,
         actuated=driven,
         ref=shift,
     )  # fmt: skip
@@ -339,7 +348,7 @@ def _joint(
 
 def _equalities(model: Any) -> list[int]:
     """Numbers of the equality constraints that act."""
-    if _off(model, "EQUALITY") or _off(model, "CONSTRAINT"):
+    if is_off(model, "EQUALITY") or is_off(model, "CONSTRAINT"):
         return []
     return [index for index in range(model.neq) if model.eq_active0[index]]
 
@@ -410,9 +419,11 @@ def _tendons(model: Any, names: Sequence[str]) -> tuple[tuple[Cord, ...], tuple[
         kind = "fixed" if mujoco.mjtWrap.mjWRAP_JOINT in wraps else "spatial"
         name = model.tendon(index).name or f"tendon{index}"
         values = {law: getattr(model, f"tendon_{law}", None) for law in laws}
-        if any(item is not None and np.any(item[index]) and not _off(model, laws[law]) for law, item in values.items()):
+        if any(
+            item is not None and np.any(item[index]) and not is_off(model, laws[law]) for law, item in values.items()
+        ):
             further.append(f"the tendon {kind} {name}")
-        if not model.tendon_limited[index] or _off(model, "LIMIT"):
+        if not model.tendon_limited[index] or is_off(model, "LIMIT"):
             continue
         low, high = model.tendon_range[index].tolist()
         if wraps != [mujoco.mjtWrap.mjWRAP_SITE] * 2 or low > 0:

@@ -39,6 +39,8 @@ _LOOKS = {
 }
 # Elements that change masses or motion in a way that the check does not cover.
 _UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
+# Attributes that say where an actuator acts.
+_PLACES = {"name", "joint", "jointinparent", "tendon", "site", "refsite", "slidersite", "cranksite", "body"}
 COMPENSATION = "its gravity compensation is left out, as actuators are; all engines read it without"
 # Macros, which the engine that defines the format writes out.
 _MACROS = {"replicate", "attach", "composite"}
@@ -106,9 +108,11 @@ def _add(
         if len(root.findall("worldbody")) > count:
             _merge_worlds(root)
     contained = names_files_inside(root, file.parent, inside)
-    for part in ("actuator", "extension"):
-        for element in [*root.iter(part)]:
-            element[:] = [child for child in element if part == "actuator" and child.tag != "plugin"]
+    for extension in [*root.iter("extension")]:
+        extension[:] = []
+    for plugin in (plugin for part in root.iter("actuator") for plugin in part.findall("plugin")):
+        plugin.tag, plugin[:] = "general", []  # an actuator with a law of a program's own stays one
+        plugin.attrib = {key: plugin.attrib[key] for key in plugin.attrib.keys() & _PLACES} | {"dyntype": "user"}
     for element in root.iter():
         if element.tag in _UNCOVERED:
             raise InputError("file", path, f"the check does not cover <{element.tag}>")
