@@ -25,6 +25,7 @@ from proofroll.robots.files.scene_tables import (
     ParameterRow,
     described,
     held_start,
+    keyframe_states,
     laws,
     read_robot,
     tables_of,
@@ -62,9 +63,9 @@ class RobotScenes:
         if robot.actuators:
             words = "whether the file's actuators act, with their controls at zero (1), or not (0)"
             parameters["actuators"] = (0, "1", words, SWITCH)
-        if any(map(any, file.controls)):
-            words = "number of the file's keyframe whose controls the actuators have (0: they are zero)"
-            parameters["keyframe"] = (0, "1", words, {"at_least": 0, "at_most": len(file.controls), "integer": True})
+        if file.keyframes:
+            words = "number of the file's keyframe that gives start and controls (0: a random start, controls at zero)"
+            parameters["keyframe"] = (0, "1", words, {"at_least": 0, "at_most": len(file.keyframes), "integer": True})
         return {
             "title": f"{robot.name}, released from a random pose",
             "reason": "How engines move this robot",
@@ -79,11 +80,13 @@ class RobotScenes:
             InputError: nothing in the file moves, or a link has an impossible inertia.
         """
         file, robot = read_robot(path, BASES[int(values.get("free_base", 0))])
-        controls = ((), *file.controls)[int(values.get("keyframe", 0))]
+        number_of_keyframe = int(values.get("keyframe", 0))
+        keyframe = file.keyframes[number_of_keyframe - 1] if number_of_keyframe else None
+        controls = keyframe.ctrl if keyframe else ()
         acting, silent = scene_actuators(robot, controls) if values.get("actuators") else ([], [])
         clauses = [f"{what} (actuators=0 leaves all out)" for what in silent]
-        start = random_states(robot, 1, int(values["seed"]))
-        start = held_start(robot, start) if values["couplings"] else start
+        start = keyframe_states(robot, keyframe) if keyframe else random_states(robot, 1, int(values["seed"]))
+        start = held_start(robot, start) if values["couplings"] and not keyframe else start
         tables = tables_of(file, robot, start, values)
         drives = [f"{counted(len(file.driven), 'transmissions')} (--control)"] if file.driven else []
         omitted = [*drives, *tables["omitted"]]
