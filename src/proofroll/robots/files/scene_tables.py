@@ -271,7 +271,7 @@ def keyframe_states(robot: Robot, keyframe: Keyframe) -> RobotStates:
     """The state of a keyframe; what it leaves out is the pose of the file, at rest.
 
     Raises:
-        InputError: it has more or fewer numbers than the robot's joints.
+        InputError: more or fewer numbers than coordinates of the robot.
     """
     widths = {
         joint.name: {JointKind.FREE: 7, JointKind.SPHERICAL: 4}.get(JointKind(joint.kind), 1) for joint in robot.moving
