@@ -333,6 +333,22 @@ def test_round_off_of_what_cancels_is_no_difference(tmp_path: Path) -> None:
     assert row.status == "holds", row.layers
 
 
+def test_round_off_of_gravity_is_no_bar(tmp_path: Path) -> None:
+    """A wheel on whose axis gravity has no torque leaves the bar of the truth at round-off, and defects are seen."""
+    pytest.importorskip("pinocchio")
+    path = tmp_path / "wheel.urdf"
+    turned = 'rpy="0.3 0.2 1.1"'
+    wheel = spherical("1.3", "0.04", com="0.1332 0.1776 0.296")
+    joint = '<parent link="base"/><child link="wheel"/><axis xyz="0.36 0.48 0.8"/><dynamics damping="0.2"/>'
+    path.write_text(
+        f'<robot name="r"><link name="base"/><link name="wheel">{wheel}</link>'
+        f'<joint name="j" type="continuous"><origin xyz="1 2 3" {turned}/>{joint}</joint></robot>'
+    )
+    content = check(path, ["pinocchio"])
+    assert content.truth.difference < 1e-12
+    assert [cause.id for cause in content.engines[0].causes] == ["damping_left_out"]
+
+
 def _defect(pattern: str, instead: str) -> Callable[[str], str]:
     """A change of the text of a file."""
 

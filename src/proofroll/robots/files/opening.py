@@ -45,10 +45,12 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
         if base == "free":
             urdf.rename_world(root)
         contained = names_files_inside(root, path.resolve().parent, inside)
-        driven, rotors = urdf.driven_joints(root), urdf.rotor_inertias(root)
+        driven, rotors = urdf.transmissions(root)
         kind, (root, remarks), body = "urdf", urdf.neutral_urdf(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
         kind, (root, remarks, contained, keyframes), body = "mjcf", neutral_mjcf(root, path, inside, expand), "body"
+    elif root.tag == "sdf":
+        raise InputError("file", path, "it is an SDF, which is not read; give the robot as a URDF or an MJCF")
     else:
         raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
     count = sum(1 for _ in root.iter(body))
