@@ -18,12 +18,14 @@ from proofroll.cli import app
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.events import events_of
 from proofroll.core.limits import TIME_LIMIT
+from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.robots.check.two_formulations import world_jacobians
 from proofroll.robots.files.meaning import meaning
 from proofroll.robots.files.opening import open_robot
 from proofroll.robots.files.reading import write
+from proofroll.robots.scene import RobotScenes
 from proofroll.robots.states import random_states
 from proofroll.truth.bodies import maximal_taylor
 
@@ -289,10 +291,68 @@ def test_controls_of_a_keyframe(tmp_path: Path) -> None:
     key = '<keyframe><key/><key ctrl="{}"/></keyframe></mujoco>'
     text = mjcf(actuator='<position name="m" joint="k1" kp="20"/>').replace("</mujoco>", key)
     path.write_text(text.format("0.4"))
-    assert "controls of 2 keyframes (keyframe=1)" in load_scene(str(path), actuators=1).omitted
+    assert "2 keyframes (keyframe=1)" in load_scene(str(path), actuators=1).omitted
     taken = load_scene(str(path), actuators=1, keyframe=2)
     assert taken.elements[0].mechanism.actuators[0].target == 0.4
     assert taken.omitted == ("contacts",)
     path.write_text(text.format("0.4 1"))
-    with pytest.raises(InputError, match="this keyframe has 2 controls, and the file 1 actuators"):
+    with pytest.raises(InputError, match="this keyframe has 2 controls, and the file 1 actuator"):
         load_scene(str(path), actuators=1, keyframe=2)
+
+
+@pytest.mark.parametrize("key", ['qpos="{}" qvel="{}"', 'qpos="{}"', ""], ids=["whole", "at rest", "home"])
+def test_a_keyframe_is_a_start(tmp_path: Path, key: str) -> None:
+    """A robot that starts in a keyframe has poses and velocities of MuJoCo's bodies there, whatever its joints are."""
+    mujoco = pytest.importorskip("mujoco")
+    random = np.random.default_rng(3)
+    loose = '<body name="b" pos="1 2 3" euler="9 8 7"><freejoint name="f"/><geom size="0.1" pos="0.2 0 0"/>{}</body>'
+    ball = '<body name="c" pos="0.4 0 0"><joint name="s" type="ball"/><geom size="0.1" pos="0.1 0.3 0"/></body>'
+    text = mjcf(joint='ref="20" range="30 60"', extra=loose.format(ball))
+    vectors = (" ".join(f"{value:.9g}" for value in random.normal(size=count)) for count in (13, 11))
+    text = text.replace("</mujoco>", f"<keyframe><key {key.format(*vectors)}/></keyframe></mujoco>")
+    path = tmp_path / "arm.xml"
+    path.write_text(text)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    for scene in (load_scene(str(path), keyframe=1, speed=0.3), _under_control(path, 'start = "1"')):
+        sample = simulate(scene, "mujoco", until=2e-3, every=2e-3).isel(time=0)
+        for body in ("upper", "lower", "b", "c"):
+            velocity = np.zeros(6)
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, model.body(body).id, velocity, 0)
+            at_body = sample.sel(body=body)
+            assert at_body.p_WB.to_numpy() == pytest.approx(data.body(body).xpos, abs=1e-12)
+            assert at_body.w_WB.to_numpy() == pytest.approx(velocity[:3], abs=1e-12)
+            assert at_body.v_WB.to_numpy() == pytest.approx(velocity[3:], abs=1e-12)
+
+
+def _under_control(robot: Path, text: str) -> Scene:
+    """Scene of a robot under a controller whose file has this text."""
+    control = robot.with_suffix(".toml")
+    control.write_text(text)
+    return load_scene(f"{robot}+{control}")
+
+
+def test_a_wrong_keyframe_is_one_line(tmp_path: Path) -> None:
+    """A keyframe that does not fit the joints, or that is not there, is told with what fits."""
+    path = tmp_path / "arm.xml"
+    path.write_text(mjcf().replace("</mujoco>", '<keyframe><key name="home" qpos="1 2 3"/></keyframe></mujoco>'))
+    with pytest.raises(InputError, match="this keyframe has 3 numbers, and the joints of the file 2"):
+        load_scene(str(path), keyframe=1)
+    with pytest.raises(InputError, match=r"arm\.xml has no such keyframe; choose from 1, home"):
+        _under_control(path, 'start = "hom"')
+
+
+def test_a_random_start_lies_in_the_ranges_of_the_file(tmp_path: Path) -> None:
+    """Joints whose range is far from 0, or closes a loop there, start inside it."""
+    path = tmp_path / "arm.xml"
+    second = '<joint name="k2" axis="1 0 0" range="20 40"/><joint name="far" type="slide" range="3 4"/>'
+    text = mjcf(compiler='autolimits="true"', second=second, joint='range="25 50"')
+    loop = '<equality><connect body1="lower" body2="world" anchor="0 0 0.1"/></equality></mujoco>'
+    for content in (text, text.replace("</mujoco>", loop)):
+        path.write_text(content)
+        values = {name: row["value"] for name, row in RobotScenes.content(path)["parameters"].items()}
+        tables = RobotScenes.tables(path, values | {"limits": 1})
+        starts = {joint["name"]: (joint["limits"], joint["q0"][0]) for joint in tables["joints"]}
+        assert all(ends[0] <= q <= ends[1] for ends, q in starts.values()), starts

@@ -1,8 +1,8 @@
-"""Command ``export``: writes a scene in an engine's own file format."""
+"""Command ``export``: writes a scene in an engine's own file format, or that of a robot file as a scene's own."""
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -13,15 +13,31 @@ from proofroll.core.limits import TIME_LIMIT
 def export(
     scene: options.SceneName,
     file: Annotated[Path, typer.Argument(help="The file to write.")],
-    engine: Annotated[str, typer.Option(help="name[key=value,…]; mujoco writes MJCF.")],
+    engine: Annotated[str | None, typer.Option(help="name[key=value,…]; mujoco writes MJCF.")] = None,
+    kind: Annotated[
+        Literal["scene"] | None,
+        typer.Option("--as", help="Instead of a model, the scene.toml of a robot file (URDF, MJCF), to be added to."),
+    ] = None,
     settings: options.Set = None,
     _root: options.Root = None,
 ) -> None:
-    """Write the model that an engine builds of a scene. Its own tools read it."""
+    """Write the model that an engine builds of a scene, or a robot file as a scene.
+
+    With --as scene FILE is the scene's new folder, or the path of its scene.toml.
+    """
+    from proofroll.core.errors import InputError
+    from proofroll.files.scene_file import scene_text
     from proofroll.running.engine_questions import model_file
     from proofroll.running.store import write_text
     from proofroll.studies.cases import single_case
 
+    if (engine is None) == (kind is None):
+        raise InputError("--engine", engine, "give an engine, whose model is written, or --as scene")
+    if engine is None:
+        file = file if file.name == "scene.toml" else file / "scene.toml"
+        write_text(file, scene_text(scene, options.assignments(settings)))
+        sys.stdout.write(f"{file} is written\n")
+        return
     options.require_writable(file, "file")
     case = single_case(scene, options.assignments(settings), engine, until=1.0, every=1.0, time_limit=TIME_LIMIT)
     with options.spinner(f"{scene} in {case.engine.name}"):

@@ -12,8 +12,6 @@ from proofroll.cli import options
 
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
-    from proofroll.core.scene import Scene
-    from proofroll.files.scene_sources import OwnOptions
     from proofroll.running.runner import Runner
     from proofroll.studies.answer.records import StepAnswer
 
@@ -50,6 +48,7 @@ def answer_steps(
     from proofroll.studies.answer.own_step import engine_facts, step_answer
     from proofroll.studies.answer.question import question_named
     from proofroll.studies.answer.records import StepAnswer
+    from proofroll.studies.comparison.default_comparison import own_engine
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
     from proofroll.studies.study_store import keep_study
 
@@ -58,7 +57,7 @@ def answer_steps(
     heads = [f"{engine}: " if len(engines) > 1 or like else "" for engine in engines]
     further: list[str] = []
     if like is not None:
-        own_options, engine = _own_engine(like, whole.loaded, runner)
+        own_options, engine = own_engine(like, whole.loaded, runner.workers)
         heads.append(f"yours ({own_options.words}): ")
         engines = [*engines, engine]
         others = ", ".join(own_options.others)
@@ -82,36 +81,6 @@ def answer_steps(
         lines += _change(made[-1]) if like else []
         options.show_lines([*lines, *further, scope_sentence(made[0])], widest=WIDTH)
     raise typer.Exit(options.OK if all(item.holds for item in made) else options.CONTRADICTED)
-
-
-def _own_engine(like: Path, scene: Scene, runner: Runner) -> tuple[OwnOptions, str]:
-    """Options of a person's own model, and the engine with them, in its first formulation that represents a scene.
-
-    Raises:
-        InputError: the file has no options that can be compared, or no formulation represents the scene.
-    """
-    from proofroll.core.errors import InputError
-    from proofroll.core.plugins import EngineSpec, parse_engine
-    from proofroll.files.scene_sources import ReadsOptions, source_of
-    from proofroll.running.engine_questions import resolve
-    from proofroll.studies.comparison.default_comparison import able
-
-    source = source_of(str(like))
-    if source is None or not isinstance(source[0], ReadsOptions):
-        advice = "give the path of your own MuJoCo model, *.xml" if like.is_file() else "there is no such file"
-        raise InputError("--like", like, advice)
-    own_options = source[0].own_options(like)
-    formulations = able(scene, runner.workers, names=[own_options.engine])
-    if not formulations:
-        raise InputError("--like", like, f"no formulation of {own_options.engine} represents {scene.name}")
-    given_options = {**parse_engine(formulations[0]).options, "preset": "default", **own_options.settings}
-    choices = [
-        EngineSpec(own_options.engine, options)
-        for options in ({**given_options, **own_options.of_contacts}, given_options)
-    ]
-    resolved = resolve([(choice.name, choice.options) for choice in choices], runner.workers)
-    taken = choices[1] if isinstance(resolved[0], InputError) else choices[0]
-    return own_options, str(taken)
 
 
 def _change(made: StepAnswer) -> list[str]:

@@ -105,7 +105,8 @@ class Row:
         order: observable -> lowest and highest order that is expected.
         limit: observable -> largest expected distance of the limit of small steps from the truth.
         bound: observable -> tolerance that replaces the band's.
-        short: why it does not hold a tolerance, for the first screen: a clause of at most twelve words, or empty.
+        short: why it does not hold a tolerance, or what it is, for the first screen: a clause of at most twelve words,
+            or empty.
     """
 
     engine: str

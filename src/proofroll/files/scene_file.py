@@ -23,9 +23,11 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import LATEST
 from proofroll.core.validation import strict, units_of, validated
 from proofroll.files.data_folders import data_folder
+from proofroll.files.json_data import plain
 from proofroll.files.scene_parameters import Parameter, check_parameters, units_read, values_of
-from proofroll.files.scene_sources import source_of, stem_of
+from proofroll.files.scene_sources import parts_of, source_of, stem_of
 from proofroll.files.toml import named_file, read_toml
+from proofroll.files.toml_text import toml_text
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,7 @@ class _GravityTable:
 
 SCENE_IS_A_FOLDER = "a scene is a folder: put this file into one, under the name scene.toml"
 strict(Parameter, SceneFile, Gravity)
+_NO_MARKS = "./\\"  # in names, as names of observables and files have them between their parts
 _OWN = frozenset(item.name for item in dataclasses.fields(SceneFile)) - {"tables"}
 
 
@@ -119,6 +122,40 @@ def _read(name: str, asked: Mapping[str, object]) -> tuple[SceneFile, dict[str, 
     tables = dict(source.tables(path, values))
     omitted = tuple(tables.pop("omitted", ()))
     return dataclasses.replace(file, gravity=tables.pop("gravity"), tables=tables), values, path, omitted
+
+
+def scene_text(name: str, asked: Mapping[str, object]) -> str:
+    """Text of a ``scene.toml`` that is the scene of a file in another format, with numbers in place of parameters.
+
+    Args:
+        name: path of the file.
+        asked: values of its parameters, those that are not its defaults.
+
+    Raises:
+        InputError: no such file, a scene's own file, or one under a controller.
+    """
+    if source_of(name) is None or parts_of(name)[1]:
+        raise InputError("--as", "scene", f"{name} is no robot file alone; a scene has its text in its scene.toml")
+    file, _, _, omitted = _read(name, asked)
+    head = {key: value for key in ("title", "source", "reason", "duration") if (value := getattr(file, key))}
+    tables = {key: rows for key, rows in plain(file.tables).items() if rows}
+    names = {str(row["name"]): "" for rows in tables.values() for row in _rows(rows) if "name" in row}
+    for own in names:
+        plain_name = own.translate(dict.fromkeys(map(ord, _NO_MARKS), "_"))
+        while plain_name != own and plain_name in {*names, *names.values()}:
+            plain_name += "_"
+        names[own] = plain_name
+    content = {**head, "gravity": plain(file.gravity), **_renamed(tables, names)}
+    return f"# Not in this scene: {', '.join(omitted)}\n{toml_text(content)}"
+
+
+def _renamed(content: Any, names: Mapping[str, str]) -> Any:
+    """Content with other names; all texts that are a name are meant."""
+    if isinstance(content, Mapping):
+        return {key: _renamed(item, names) for key, item in content.items()}
+    if isinstance(content, list):
+        return [_renamed(item, names) for item in content]
+    return names.get(content, content) if isinstance(content, str) else content
 
 
 def scene_folder(name: str) -> Path:
@@ -269,7 +306,7 @@ def _check_names(tables: Mapping[str, Any], path: Path) -> None:
     for table, rows in tables.items():
         for index, row in enumerate(_rows(rows)):
             name = row.get("name", "")
-            if isinstance(name, str) and any(mark in name for mark in "./\\"):
+            if isinstance(name, str) and any(mark in name for mark in _NO_MARKS):
                 advice = "a name has no dot and no slash, which names of observables and files have between their parts"
                 raise InputError(f"{path}: {table}.{index}.name", name, advice)
 

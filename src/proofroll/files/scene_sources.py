@@ -162,8 +162,8 @@ class ReadsOptions(Protocol):
     """Ability of a reader whose files have options of an engine."""
 
     @staticmethod
-    def own_options(path: Path) -> OwnOptions:
-        """Options of a file. Raises InputError if it has none, or none that can be compared."""
+    def own_options(path: Path) -> OwnOptions | None:
+        """Options of a file; None: its format has none. Raises InputError if it has none that can be compared."""
 
 
 @dataclass(frozen=True)

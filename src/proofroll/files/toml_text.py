@@ -39,4 +39,4 @@ def _value(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, float) and not math.isfinite(value):
         return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
-    return repr(value)
+    return repr(float(value)) if isinstance(value, float) else repr(value)  # numpy's float has another text

@@ -78,7 +78,7 @@ class RobotJoint:
         stiffness: spring torque per coordinate [N m/rad or N/m].
         rest: coordinate at which the spring is at rest [rad or m].
         lower, upper: limits of the coordinate, of a spherical joint the largest angle [rad or m]; None: there is none.
-        effort: largest size of its drive's effort [N m or N]; None: none is given.
+        effort: largest size of the effort of all its drives [N m or N]; None: none is given.
         speed: largest velocity of its drive [rad/s or m/s]; None: none is given.
         actuated: True if an actuator acts on the joint.
         turning: True if the armature of a free joint acts along the body's axes, False: along the world's.
@@ -110,6 +110,35 @@ class RobotJoint:
     def dofs(self) -> int:
         """Number of velocities of the joint."""
         return DOFS[self.kind]
+
+
+@dataclasses.dataclass(frozen=True)
+class RobotActuator:
+    """A motor at a joint through a gear g: effort g (gain · control + bias − kp g q − kd g dq/dt), q counted from 0.
+
+    Attributes:
+        name: unique among actuators.
+        joint: the joint that it drives.
+        gear: turns of the motor per turn of the joint.
+        gain: effort per control.
+        bias: constant effort [N m or N].
+        kp: gain of the motor's position [N m/rad or N/m].
+        kd: gain of the motor's velocity [N m s/rad or N s/m].
+        ends: lowest and highest control; None: it has no range.
+        limit: largest size of its effort at the joint [N m or N]; None: there is none.
+        unlike: clause on a law that none of these represents; empty: they say all.
+    """
+
+    name: str
+    joint: str
+    gear: float
+    gain: float
+    bias: float
+    kp: float
+    kd: float
+    ends: tuple[float, float] | None
+    limit: float | None
+    unlike: str
 
 
 @dataclasses.dataclass(frozen=True)
@@ -185,6 +214,7 @@ class Robot:
         ties: further linear relations of joints.
         cords: tendons with a largest length.
         further: clauses on constraints and laws of tendons that none of these represents.
+        actuators: of an MJCF, in the order of their controls.
         gravity: acceleration [m/s²], shape (3,).
         sources: body -> facts of the file that only hypotheses need: its inertia as written, for example.
     """
@@ -199,6 +229,7 @@ class Robot:
     ties: tuple[Tie, ...] = ()
     cords: tuple[Cord, ...] = ()
     further: tuple[str, ...] = ()
+    actuators: tuple[RobotActuator, ...] = ()
 
     @cached_property
     def moving(self) -> tuple[RobotJoint, ...]:

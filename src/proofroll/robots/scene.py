@@ -18,13 +18,14 @@ from proofroll.files.scene_sources import OwnOptions
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.opening import BASES
-from proofroll.robots.files.robot_file import RobotFile
+from proofroll.robots.files.robot_file import RobotFile, read_xml
 from proofroll.robots.files.scene_tables import (
     ENDINGS,
     SWITCH,
     ParameterRow,
     described,
     held_start,
+    keyframe_states,
     laws,
     read_robot,
     tables_of,
@@ -50,7 +51,7 @@ class RobotScenes:
         return ControlledScenes(control)
 
     @staticmethod
-    def own_options(path: Path) -> OwnOptions:
+    def own_options(path: Path) -> OwnOptions | None:
         """See :class:`proofroll.files.scene_sources.ReadsOptions`."""
         return own_options(path)
 
@@ -59,12 +60,12 @@ class RobotScenes:
         """Title, source and parameters of a robot's scene."""
         file, robot = read_robot(path, "fixed")
         parameters = dict(_RELEASE) | _parameters(file, robot)
-        if any(len(part) for part in file.root.findall("actuator")):
+        if robot.actuators:
             words = "whether the file's actuators act, with their controls at zero (1), or not (0)"
             parameters["actuators"] = (0, "1", words, SWITCH)
-        if any(map(any, file.controls)):
-            words = "number of the file's keyframe whose controls the actuators have (0: they are zero)"
-            parameters["keyframe"] = (0, "1", words, {"at_least": 0, "at_most": len(file.controls), "integer": True})
+        if file.keyframes:
+            words = "number of the file's keyframe that gives start and controls (0: a random start, controls at zero)"
+            parameters["keyframe"] = (0, "1", words, {"at_least": 0, "at_most": len(file.keyframes), "integer": True})
         return {
             "title": f"{robot.name}, released from a random pose",
             "reason": "How engines move this robot",
@@ -79,11 +80,13 @@ class RobotScenes:
             InputError: nothing in the file moves, or a link has an impossible inertia.
         """
         file, robot = read_robot(path, BASES[int(values.get("free_base", 0))])
-        controls = ((), *file.controls)[int(values.get("keyframe", 0))]
-        acting, silent = scene_actuators(file.root, robot, controls) if values.get("actuators") else ([], [])
+        number_of_keyframe = int(values.get("keyframe", 0))
+        keyframe = file.keyframes[number_of_keyframe - 1] if number_of_keyframe else None
+        controls = keyframe.ctrl if keyframe else ()
+        acting, silent = scene_actuators(robot, controls) if values.get("actuators") else ([], [])
         clauses = [f"{what} (actuators=0 leaves all out)" for what in silent]
-        start = random_states(robot, 1, int(values["seed"]))
-        start = held_start(robot, start) if values["couplings"] else start
+        start = keyframe_states(robot, keyframe) if keyframe else random_states(robot, 1, int(values["seed"]))
+        start = held_start(robot, start) if values["couplings"] and not keyframe else start
         tables = tables_of(file, robot, start, values)
         drives = [f"{counted(len(file.driven), 'transmissions')} (--control)"] if file.driven else []
         omitted = [*drives, *tables["omitted"]]
@@ -122,27 +125,45 @@ _INTEGRATORS = {
     int(getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}")): name for name in ("Euler", "RK4", "implicitfast")
 }
 _CONES = {int(mujoco.mjtCone.mjCONE_PYRAMIDAL): "pyramidal", int(mujoco.mjtCone.mjCONE_ELLIPTIC): "elliptic"}
-# Solver and iterations of the adapter, which are MuJoCo's defaults.
-_SOLVER, _ITERATIONS = "Newton", 100
+# Options that are settings, that the scene has, and that act on contacts, islands and speed alone.
+_READ = {"integrator", "timestep", "cone", "gravity", "density", "viscosity", "disableflags", "disableactuator"}
+_READ |= {"impratio", "sleep_tolerance", "wind", "magnetic", "enableflags", "jacobian"}
+_READ |= {f"{family}_{what}" for family in ("o", "ccd", "sdf") for what in ("friction", "margin", "solref", "solimp")}
+_READ |= {"ccd_iterations", "ccd_tolerance", "sdf_iterations", "sdf_initpoints"}
+_FLAGS = {"EULERDAMP": "eulerdamp", "REFSAFE": "refsafe"}  # of joints and rows, which no scene has
 
 
-def own_options(path: Path) -> OwnOptions:
+def own_options(path: Path) -> OwnOptions | None:
     """Options of an MJCF file: integrator, step and cone; what the adapter sets otherwise is named.
+
+    None: the file is a URDF.
 
     Raises:
         InputError: MuJoCo cannot read the file, or the adapter has none of its integrator.
     """
+    if read_xml(path).tag == "robot":
+        return None
     try:
-        option = mujoco.MjSpec.from_file(str(path)).option
+        spec, plain = mujoco.MjSpec.from_file(str(path)), mujoco.MjSpec()
     except ValueError as error:
         raise InputError("--like", path, f"MuJoCo cannot read it: {error}") from None
+    option = spec.option
     integrator = _INTEGRATORS.get(int(option.integrator))
     if integrator is None:
         known = ", ".join(_INTEGRATORS.values())
         raise InputError("--like", path, f"its integrator is none that can be compared; choose {known}")
-    solver = mujoco.mjtSolver(int(option.solver)).name.removeprefix("mjSOL_").replace("NEWTON", _SOLVER)
-    others = [f"solver {solver}"] if solver != _SOLVER else []
-    others += [f"{option.iterations} iterations"] if int(option.iterations) != _ITERATIONS else []
+    keys = [key for key in dir(option) if not key.startswith("_") and key not in _READ]
+    unlike = [key for key in keys if np.any(getattr(option, key) != getattr(plain.option, key))]
+    solver = mujoco.mjtSolver(int(option.solver)).name.removeprefix("mjSOL_")
+    words = {"solver": f"solver {solver}", "iterations": f"{option.iterations} iterations"}
+    others = [words.get(key, f"{key} {getattr(option, key):g}") for key in unlike]
+    bits = mujoco.mjtDisableBit
+    others += [f"flag {word}" for name, word in _FLAGS.items() if option.disableflags & getattr(bits, f"mjDSBL_{name}")]
+    usual = {"joints": plain.worldbody.add_body().add_joint(), "equalities": plain.add_equality()}
+    for kind, element in usual.items():
+        for key in [key for key in dir(element) if key.startswith(("solref", "solimp"))]:
+            count = sum(bool(np.any(getattr(item, key) != getattr(element, key))) for item in getattr(spec, kind))
+            others += [f"{key.replace('_', '')} of {counted(count, kind)}"] if count else []
     return OwnOptions(
         engine="mujoco",
         words=f"{integrator}, dt {number(option.timestep, 3)} s",

@@ -78,9 +78,10 @@ def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
     for joint in robot.moving:
         if joint.kind in ONE_COORDINATE:
             reach = np.pi if joint.kind == JointKind.REVOLUTE else 1.0
-            lower = -reach if joint.lower is None else max(joint.lower, -reach)
-            upper = reach if joint.upper is None else min(joint.upper, reach)
-            angle[joint.name] = random.uniform(*((lower, upper) if lower < upper else (-reach, reach)), count)
+            own = (-reach if joint.lower is None else joint.lower, reach if joint.upper is None else joint.upper)
+            near = (max(own[0], -reach), min(own[1], reach))
+            usable = (ends for ends in (near, own) if ends[0] < ends[1])
+            angle[joint.name] = random.uniform(*next(usable, (-reach, reach)), count)
         else:
             rotation[joint.name] = np.asarray(Rotation.random(count, rng=random).as_matrix())
             if joint.kind == JointKind.FREE:

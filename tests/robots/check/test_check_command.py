@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,25 @@ def test_a_difference(proofroll: Proofroll, tmp_path: Path) -> None:
     assert cause["layer"] == "forward dynamics"
     assert cause["before"] > 1e-2
     assert cause["after"] < 1e-10
+
+
+@pytest.mark.parametrize("law", ["", 'solreffriction="0.05 1" solimpfriction="0.6 0.8 0.001 0.5 2"'])
+def test_softness_of_dry_friction(proofroll: Proofroll, tmp_path: Path, law: str) -> None:
+    """MuJoCo holds an MJCF with dry friction, and the creep that is told is that of its own run under a load."""
+    mujoco = pytest.importorskip("mujoco")
+    body = '<body name="a"><joint name="h" axis="0 1 0" frictionloss="0.3" {}/><geom size="0.1" pos="0.3 0 0"/></body>'
+    text = f"<mujoco><worldbody>{body.format(law)}</worldbody></mujoco>"
+    path = tmp_path / "dry.xml"
+    path.write_text(text)
+    code, out, _ = proofroll("check", str(path), "--engine", "mujoco")
+    assert code == 0
+    model = mujoco.MjModel.from_xml_string(text.replace("<worldbody>", '<option gravity="0 0 0"/><worldbody>'))
+    data = mujoco.MjData(model)
+    data.qfrc_applied[:] = 0.3 / 2
+    mujoco.mj_step(model, data, 5000)
+    told = re.search(r"joint h creeps at up to (\S+) rad/s", " ".join(out.split()))
+    assert told is not None
+    assert float(told[1]) == pytest.approx(2 * data.qvel[0], rel=0.05)
 
 
 def test_wide_table(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

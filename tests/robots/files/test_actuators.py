@@ -28,15 +28,26 @@ ACTUATORS = {
     "general, by the default of positions": '<general name="m" joint="k2"/>',
     "motor, by the limit of positions": '<motor name="m" joint="k2" class="weak" ctrlrange="0.5 1"/>',
     "effort of the joint": '<position name="m" joint="k1" kp="2000"/>',
+    "damping ratio": '<position name="m" joint="k1" kp="40" dampratio="1.5"/>',
+    "range of the joint": '<position name="m" joint="k1" kp="20" inheritrange="0.5"/>',
+    "a group that is off": '<position name="m" joint="k1" kp="20" group="2"/>',
+    "constant push": '<general name="m" joint="k1" gainprm="30" biastype="affine" biasprm="5 -20 -2" gear="2"/>',
+    "several": '<position name="m" joint="k1" kp="20" gear="2"/><general joint="k1" gainprm="3" gear="-1"/>'
+    '<general joint="k1" gainprm="2" biastype="affine" biasprm="1 -30 -2" gear="3"/>',
+    "two limits": '<motor name="m" joint="k1" gear="80"/><motor joint="k1" gear="90"/>',
+    "rotor": '<motor name="m" joint="k1" gear="3" armature="0.02" damping="0.3"/>',
 }
+JOINT = 'actuatorfrcrange="-50 50" ref="15" range="20 60" limited="true"'
 
 
 @pytest.mark.parametrize("keyframe", [0, 1])
+@pytest.mark.parametrize("flag", ["", '<flag clampctrl="disable"/>', '<flag actuation="disable"/>'])
 @pytest.mark.parametrize("actuators", ACTUATORS.values(), ids=ACTUATORS)
-def test_efforts_are_those_of_the_file(tmp_path, actuators, keyframe):
-    """Each actuator has the effort that MuJoCo gives it in the pose of release, at zero and at a keyframe's control."""
-    text = mjcf(actuator=actuators, joint='actuatorfrcrange="-50 50"').replace("<worldbody>", DEFAULTS + "<worldbody>")
-    controls = " ".join(["0.7", "0"][: actuators.count("joint=")])
+def test_efforts_are_those_of_the_file(tmp_path, actuators, flag, keyframe):
+    """Each joint has the effort that MuJoCo gives it in the pose of release, at zero and at a keyframe's controls."""
+    text = mjcf(actuator=actuators, joint=JOINT, option='actuatorgroupdisable="2"')
+    text = text.replace("<worldbody>", f"<option>{flag}</option>{DEFAULTS}<worldbody>")
+    controls = " ".join(["0.7", "0", "-2"][: actuators.count("joint=")])
     text = text.replace("</mujoco>", f'<keyframe><key ctrl="{controls}"/></keyframe></mujoco>')
     path = tmp_path / "arm.xml"
     path.write_text(text)
@@ -44,7 +55,7 @@ def test_efforts_are_those_of_the_file(tmp_path, actuators, keyframe):
     q, v = made.start()
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = q, v
+    data.qpos[:], data.qvel[:] = model.qpos0 + q, v
     data.ctrl[:] = keyframe * model.key_ctrl[0]
     mujoco.mj_forward(model, data)
     found = np.zeros(2)
@@ -67,19 +78,34 @@ def test_an_arm_of_a_file_moves_under_its_servos(tmp_path):
     assert float(np.abs(run["effort.m"] - true["effort.m"]).max()) < 1e-3
 
 
-@pytest.mark.parametrize(
-    "actuator",
-    [
-        '<general name="m" joint="k1" dyntype="integrator"/>',
-        '<position name="m" joint="k1" dampratio="1"/>',
-        '<motor name="m" joint="k1" forcerange="-1 2"/>',
-        '<motor name="m" site="s"/>',
-        '<position name="n" joint="k1"/><position name="m" joint="k1"/>',
-    ],
-)
-def test_an_actuator_that_no_scene_has_is_named(tmp_path, actuator):
-    """Activation, damping ratios, limits of one side, sites, two servos: one line names the actuator."""
+UNLIKE = {
+    "dyntype integrator": '<general name="m" joint="k1" dyntype="integrator"/>',
+    "dyntype filterexact, a time constant": '<position name="m" joint="k1" timeconst="0.1"/>',
+    "forcerange of two sizes": '<motor name="m" joint="k1" forcerange="-1 2"/>',
+    "actuatorfrcrange of two sizes": '<motor name="m" joint="k2"/>',
+    "transmission site": '<motor name="m" site="s"/>',
+    "gaintype affine": '<damper name="m" joint="k1" kv="3" ctrlrange="0 1"/>',
+    "dyntype user": '<plugin name="m" joint="k1" plugin="mujoco.pid" actdim="1"><config key="kp" value="4"/></plugin>',
+    "delay 0.1": '<motor name="m" joint="k1" delay="0.1" nsample="3"/>',
+    "biasprm, which pushes onward": '<general name="m" joint="k1" biastype="affine" biasprm="0 3 0"/>',
+    "joint of several coordinates": '<motor name="m" joint="k3"/>',
+}
+SECOND = '<joint name="k2" axis="1 0 0" actuatorfrcrange="-1 2"/>'
+LOOSE = '<body><joint name="k3" type="ball"/><geom size="0.1"/></body>'
+
+
+@pytest.mark.parametrize(("law", "actuator"), UNLIKE.items(), ids=UNLIKE)
+def test_an_actuator_that_no_scene_has_is_named(tmp_path, law, actuator):
+    """An actuator with a law that no scene has, of activation, delay, ends or place: one line names it and the law."""
     path = tmp_path / "arm.xml"
-    path.write_text(mjcf(actuator=actuator, base='<site name="s"/>'))
-    with pytest.raises(Refused, match=r"the actuator \w+ m \(actuators=0 leaves all out\)"):
+    path.write_text(mjcf(actuator=actuator, second=SECOND, base='<site name="s"/>', extra=LOOSE))
+    with pytest.raises(Refused, match=rf"the actuator m with its {law}.* \(actuators=0 leaves all out\)"):
+        truth(load_scene(str(path), actuators=1), np.array([0.0, 0.1]))
+
+
+def test_two_limits_at_one_joint_are_not_added(tmp_path):
+    """Two actuators of one joint, one with a limit of its own, have no common law: the second is named."""
+    path = tmp_path / "arm.xml"
+    path.write_text(mjcf(actuator='<motor name="n" joint="k1" forcerange="-2 2"/><motor name="m" joint="k1"/>'))
+    with pytest.raises(Refused, match=r"the actuator m beside another of its joint, with a limit of one alone"):
         truth(load_scene(str(path), actuators=1), np.array([0.0, 0.1]))

@@ -6,7 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
+import numpy as np
 import pytest
+from robot_gallery import locate
+from robot_templates import urdf
+
+from proofroll import load_scene, simulate
+from proofroll.files.scene_file import scene_text
 
 Proofroll = Callable[..., tuple[int, str, str]]
 
@@ -33,6 +39,8 @@ def test_a_mechanism_with_other_numbers(proofroll: Proofroll, tmp_path: Path) ->
         (("pendulum", "{file}", "--engine", "mujoco", "--set", "lenght=1"), 2, "length"),
         (("no_such_scene", "{file}", "--engine", "mujoco"), 2, "no_such_scene"),
         (("pendulum", "{file}/in/a/file", "--engine", "mujoco"), 2, "long.xml"),
+        (("pendulum", "{file}", "--as", "scene"), 2, "pendulum is no robot file alone"),
+        (("pendulum", "{file}"), 2, "give an engine, whose model is written, or --as scene"),
     ],
 )
 def test_what_cannot_be_written(
@@ -46,3 +54,48 @@ def test_what_cannot_be_written(
     assert (answer, out, err.count("\n")) == (code, "", 1)
     assert said in err
     assert not file.exists() or not file.read_text()
+
+
+LAWS = """<mujoco model="arm"><worldbody><body name="a.b" pos="0.1 0 1" euler="10 20 30"><freejoint name="root"/>
+<geom size="0.1" pos="0.2 0 0"/><body name="c" pos="0.3 0 0"><joint name="h" axis="0 1 0" damping="0.3" armature="0.1"/>
+<joint name="k" axis="1 0 0" stiffness="2" springref="20"/><geom size="0.1" pos="0 0.2 0"/></body></body></worldbody>
+<actuator><position name="m" joint="h" kp="20" kv="1"/></actuator></mujoco>"""
+
+
+def test_a_urdf_as_a_scene(proofroll: Proofroll, tmp_path: Path) -> None:
+    """The scene of a URDF has the bodies and joints of the file, with names that a scene may have."""
+    file, folder = tmp_path / "arm.urdf", tmp_path / "arm"
+    file.write_text(urdf().replace('"slide"', '"sl.ide"'))
+    assert proofroll("export", str(file), str(folder / "scene.toml"), "--as", "scene", "--set", "seed=3")[0] == 0
+    written, own = (load_scene(name).elements[0].mechanism for name in (str(folder), str(file)))
+    assert [body.name for body in written.bodies] == ["shoulder", "sl_ide", "tip"]
+    assert [body.mass for body in written.bodies] == [body.mass for body in own.bodies]
+    assert [joint.parent for joint in written.joints] == ["world", "shoulder", "sl_ide"]
+    assert written.start()[0].tolist() == load_scene(str(file), seed=3).elements[0].mechanism.start()[0].tolist()
+
+
+@pytest.mark.drill
+def test_a_robot_as_a_scene_moves_as_its_file(proofroll: Proofroll, tmp_path: Path) -> None:
+    """The scene of a robot file runs as the file with the same numbers, to the last digit, and says what it lacks."""
+    file, folder = tmp_path / "arm.xml", tmp_path / "arm"
+    file.write_text(LAWS)
+    numbers = ("--set", "actuators=1", "--set", "speed=0.7")
+    assert proofroll("export", str(file), str(folder), "--as", "scene", *numbers)[0] == 0
+    text = (folder / "scene.toml").read_text()
+    assert text.startswith("# Not in this scene: contacts\n")
+    scenes = load_scene(str(folder)), load_scene(str(file), actuators=1, speed=0.7)
+    written, own = (simulate(scene, "mujoco", until=0.02, every=0.01) for scene in scenes)
+    assert set(written.body.to_numpy()) == {"a_b", "c_0", "c"}
+    for quantity in ("p_WB", "q_WB", "v_WB", "q.h", "effort.m"):
+        assert np.array_equal(written[quantity], own[quantity]), quantity
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("name", ["ur5", "panda", "hopper", "half_cheetah", "ant"])
+def test_robots_of_packages_as_scenes(tmp_path: Path, name: str) -> None:
+    """Robots of packages, written as scenes, move as their files."""
+    file, folder = str(locate(name)), tmp_path / name
+    folder.mkdir()
+    (folder / "scene.toml").write_text(scene_text(file, {}))
+    written, own = (simulate(load_scene(scene), "mujoco", until=0.1, every=0.1) for scene in (str(folder), file))
+    assert np.array_equal(written.p_WB, own.p_WB)

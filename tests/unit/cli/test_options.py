@@ -78,4 +78,4 @@ def test_an_sdf_is_called_so(tmp_path: Path, command_line: CommandLine) -> None:
     file.write_text('<?xml version="1.0"?><sdf version="1.9"><world name="w"/></sdf>')
     said = {command_line(*words.split())[2] for words in (f"check {file}", f"compare {file}", f"recommend {file}")}
     assert said == {command_line("run", str(file), "--engine", "truth")[2]}
-    assert "<sdf> is neither a URDF (<robot>) nor an MJCF (<mujoco>)" in said.pop()
+    assert "it is an SDF, which is not read; give the robot as a URDF or an MJCF" in said.pop()

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from robot_templates import urdf
 
 from proofroll.core.errors import InputError
 from proofroll.files.scene_sources import ReadsOptions, source_of
+from proofroll.studies.comparison.default_comparison import default_comparison
 
 Proofroll = Callable[..., tuple[int, str, str]]
 MODEL = "<mujoco><option {}/><worldbody><body><joint/><geom size='.1'/></body></worldbody></mujoco>"
+
+SCREW = """<mujoco><worldbody><body pos="0 0 1"><joint name="s" type="slide" axis="0 0 1"/><geom size="0.05" mass="1"/>
+<body><joint name="t" axis="0 0 1" frictionloss="0.05"/><geom type="cylinder" size="0.02 0.1" mass="0.2"/></body></body>
+</worldbody><equality><joint joint1="t" joint2="s" polycoef="0 628.3185307179587 0 0 0"/></equality></mujoco>"""
 
 
 @pytest.fixture
@@ -36,8 +43,11 @@ def test_options_of_a_model_are_settings(model: Callable[[str], Path]) -> None:
     own = reader.own_options(path)
     assert (own.engine, own.settings) == ("mujoco", {"integrator": "RK4", "dt": "0.004"})
     assert own.of_contacts == {"cone": "pyramidal"}
-    assert (own.words, own.others) == ("RK4, dt 4e-3 s", ["solver CG", "7 iterations"])
+    assert (own.words, own.others) == ("RK4, dt 4e-3 s", ["7 iterations", "solver CG"])
     assert reader.own_options(model("")).settings == {"integrator": "Euler", "dt": "0.002"}
+    softened = "<flag refsafe='disable'/></option><default><joint solreffriction='0.03 1'/></default><option"
+    others = reader.own_options(model(f"noslip_iterations='3'>{softened}")).others
+    assert others == ["noslip_iterations 3", "flag refsafe", "solreffriction of 1 joint"]
     with pytest.raises(InputError, match="integrator is none that can be compared; choose Euler, RK4, implicitfast"):
         reader.own_options(model("integrator='implicit'"))
 
@@ -50,6 +60,33 @@ def test_another_file_is_no_model(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "give the path of your own MuJoCo model, *.xml" in err
     err = proofroll("compare", "pendulum", "--like", str(tmp_path / "none.xml"), "--out", str(tmp_path))[2]
     assert "there is no such file" in err
+
+
+@pytest.mark.drill
+def test_rows_of_models_with_options(tmp_path: Path, model: Callable[[str], Path]) -> None:
+    """A model is compared with its own options, too, and the row names what it leaves out; a URDF has no such row."""
+    rows = default_comparison(str(model("integrator='RK4' timestep='0.004' solver='CG'")), {}).rows
+    (own,) = (row for row in rows if row.short)
+    assert own.engine == "mujoco[formulation=joints,preset=default,integrator=RK4,dt=0.004]"
+    assert own.short == "the file's own options, but for solver CG"
+    rows = default_comparison(str(model("")), {}).rows
+    assert [row.engine for row in rows if row.short] == ["mujoco[formulation=joints,preset=default]"]
+    unfit = default_comparison(str(model("integrator='implicit'")), {}).unfit
+    assert "choose Euler, RK4, implicitfast" in unfit["the file's own options"]
+    path = tmp_path / "arm.urdf"
+    path.write_text(urdf())
+    assert not any(row.short for row in default_comparison(str(path), {}).rows)
+
+
+@pytest.mark.drill
+def test_the_creep_of_a_screw_shows(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A screw whose coupling creeps in plain MuJoCo is wrong in the row of the file, and right in matched."""
+    path = tmp_path / "screw.xml"
+    path.write_text(SCREW)
+    _, out, _ = proofroll("compare", str(path), "--out", str(tmp_path), "--json")
+    verdicts = {row["engine"]: row["verdict"] for row in json.loads(out)["rows"]}
+    assert verdicts["mujoco[formulation=joints]"] == "agrees"
+    assert verdicts["mujoco[formulation=joints,preset=default]"] == "differs"
 
 
 @pytest.mark.drill

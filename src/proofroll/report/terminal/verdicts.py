@@ -223,7 +223,7 @@ def _cut(row: ReportedRow, rows: Sequence[ReportedRow], room: int) -> str:
 def _why(row: ReportedRow, runs: Sequence[ReportedRun]) -> str:
     """Reason of a row in one clause: the share of cases, the words of its file, and its limit of small steps."""
     worst = worst_of(row)
-    clauses = [] if row.verdict is Verdict.AGREES else [row.claim.short]
+    clauses = [row.claim.short] if row.verdict is not Verdict.AGREES or row.verdict in row.claim.expect else []
     limit = f"order {worst.order:.3g}, " if worst is not None and worst.order is not None else ""
     match row.verdict:
         case Verdict.CONVERGES:

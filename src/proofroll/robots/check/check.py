@@ -201,10 +201,10 @@ def _accepted(path: Path, causes: Sequence[str]) -> set[str]:
 
 
 def bar_of(truth: RobotTruth) -> float:
-    """Error bar of a truth: the largest relative difference of its two formulations."""
-    first_terms, second_terms = truth.dynamics, body_recursion(truth.robot, truth.states)
-    pairs = ((first_terms.M, second_terms.M), (first_terms.g, second_terms.g), (first_terms.h, second_terms.h))
-    return max(float(np.abs(a - b).max() / (np.abs(b).max() or 1.0)) for a, b in pairs)
+    """Error bar of a truth: the largest difference of its two formulations, relative to the scale of its layer."""
+    first, second = truth.dynamics, body_recursion(truth.robot, truth.states)
+    off = {"mass matrix": first.M - second.M, "gravity": first.g - second.g, "bias": first.h - second.h}
+    return max(float(np.abs(values).max()) / truth.scales[layer] for layer, values in off.items())
 
 
 def robot_drawing(truth: RobotTruth) -> DrawnRobot:

@@ -132,6 +132,7 @@ def sentences(row: ImporterRow) -> Iterator[str]:
     name = row.named
     if row.says and row.layers:
         yield f"{name}: {row.says}"
+    yield from (f"{name}: {remark}." for remark in row.remarks)
     if row.message:
         yield f"{name} {_VERBS.get(row.status, row.status)}: {row.message}"
     for cause in row.causes:

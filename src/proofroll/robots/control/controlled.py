@@ -25,7 +25,15 @@ from proofroll.robots.control.controller import Controller, Gains, read_controll
 from proofroll.robots.control.imported import imported_robots
 from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.robot_file import RobotFile
-from proofroll.robots.files.scene_tables import ENDINGS, ParameterRow, described, laws, read_robot, tables_of
+from proofroll.robots.files.scene_tables import (
+    ENDINGS,
+    ParameterRow,
+    described,
+    keyframe_states,
+    laws,
+    read_robot,
+    tables_of,
+)
 from proofroll.robots.model import Robot
 from proofroll.robots.states import RobotStates
 
@@ -161,7 +169,7 @@ class ControlledScenes:
         with error_location(str(self._path)):
             followers = {mimic.joint for mimic in robot.mimics} if values.get("couplings") else set()
             single = [joint.name for joint in robot.moving if joint.dofs == 1 and joint.name not in followers]
-            of_file = _servos_of_file(file, robot)
+            of_file = _servos_of_file(robot)
             controller.require_joints(single, {joint.name: joint.kind for joint in robot.moving}, _positions(of_file))
             actuators = _actuators(robot, controller, single, of_file, file.driven)
             names = [row["name"] for row in actuators]
@@ -169,7 +177,7 @@ class ControlledScenes:
                 advice = "it has nothing to drive: no joint has gains; give [[gains]] with kp and kd"
                 raise InputError("policy.call", controller.policy.call, advice)
             control = self._control(controller, names, actuators, always)
-        tables = tables_of(file, robot, start_of(robot, controller), values)
+        tables = tables_of(file, robot, start_of(file, robot, controller), values)
         return tables | {"actuators": actuators, **({} if control is None else {"control": control})}
 
     def _controller(self) -> Controller:
@@ -212,13 +220,18 @@ class ControlledScenes:
         )
 
 
-def start_of(robot: Robot, controller: Controller) -> RobotStates:
-    """State of a robot at time 0: the controller's start, else its pose, else 0."""
+def start_of(file: RobotFile, robot: Robot, controller: Controller) -> RobotStates:
+    """State of a robot at time 0: the controller's start, else a keyframe's, else its pose, else 0."""
     start = controller.start
-    q = {**controller.pose, **start.q}
+    home = keyframe_states(robot, file.keyframe(start.keyframe)) if start.keyframe else None
     single = [joint for joint in robot.moving if joint.dofs == 1]
+    if home is None:
+        q, v = {**controller.pose, **start.q}, start.v
+    else:
+        q = {**{name: float(rows[0]) for name, rows in home.angle.items()}, **start.q}
+        v = {**{joint.name: float(home.velocity[joint.name][0, 0]) for joint in single}, **start.v}
     angle = {joint.name: np.array([q.get(joint.name, 0.0)]) for joint in single}
-    velocity = {joint.name: np.array([[start.v.get(joint.name, 0.0)]]) for joint in single}
+    velocity = {joint.name: np.array([[v.get(joint.name, 0.0)]]) for joint in single}
     for mimic in robot.mimics:
         angle[mimic.joint] = mimic.multiplier * angle[mimic.other] + mimic.offset
         velocity[mimic.joint] = mimic.multiplier * velocity[mimic.other]
@@ -228,7 +241,10 @@ def start_of(robot: Robot, controller: Controller) -> RobotStates:
             continue
         R, p = (joint.rotation if joint.kind == JointKind.FREE else np.eye(3)), joint.position
         rates = np.zeros(joint.dofs)
-        if joint.kind == JointKind.FREE and not position:
+        if home is not None:
+            R, p = home.rotation[joint.name][0], home.position.get(joint.name, p[None])[0]
+            rates = home.velocity[joint.name][0]
+        if joint.kind == JointKind.FREE and not position and (home is None or start.base is not None):
             if start.base is not None:
                 R = np.asarray(Rotation.from_quat(start.base[3:], scalar_first=True).as_matrix())
                 p = np.array(start.base[:3])
@@ -241,9 +257,9 @@ def start_of(robot: Robot, controller: Controller) -> RobotStates:
     return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=rest)
 
 
-def _servos_of_file(file: RobotFile, robot: Robot) -> dict[str, dict[str, Any]]:
+def _servos_of_file(robot: Robot) -> dict[str, dict[str, Any]]:
     """Joint -> table of its position actuator in the file, or of another one that has a limit."""
-    rows = scene_actuators(file.root, robot)[0]
+    rows = scene_actuators(robot)[0]
     return {row["joint"]: row for row in rows if row["kind"] == "position" or "limit" in row}
 
 

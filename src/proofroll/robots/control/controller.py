@@ -74,6 +74,7 @@ class RobotStart:
         q: joint -> coordinate, in place of its pose.
         v: joint -> velocity; 0 by default.
         drop: height of the lowest foot above the ground [m].
+        keyframe: name of a keyframe of the robot file, or its number, in place of pose and rest; empty: none.
     """
 
     base: tuple[float, ...] | None = None
@@ -81,6 +82,7 @@ class RobotStart:
     q: dict[str, float] = field(default_factory=dict)
     v: dict[str, float] = field(default_factory=dict)
     drop: float | None = field(default=None, metadata={"unit": "m"})
+    keyframe: str = ""
 
 
 @dataclass(frozen=True)
@@ -269,6 +271,8 @@ def controller_of(content: Mapping[str, Any], path: Path) -> Controller:
     """Controller of the content of a file at ``path``; see :func:`read_controller`."""
     with error_location(str(path)):
         tables: dict[str, Any] = dict(content)
+        if isinstance(tables.get("start"), str):
+            tables["start"] = {"keyframe": tables["start"]}
         for name in ("pose", "targets", *_TABLES):
             _require_table(name, tables.get(name, {}))
         gains = tables.get("gains", [])

@@ -8,7 +8,7 @@ from proofroll.core.errors import InputError, error_location, require_known
 from proofroll.files.scene_sources import ROOT
 from proofroll.robots.files import urdf
 from proofroll.robots.files.mjcf.parse import neutral_mjcf
-from proofroll.robots.files.robot_file import RUN_XACRO, Expand, RobotFile, names_files_inside, read_xml
+from proofroll.robots.files.robot_file import RUN_XACRO, Expand, Keyframe, RobotFile, names_files_inside, read_xml
 
 # More bodies than any robot has; each costs a row and a column of dense matrices.
 MOST_BODIES = 2000
@@ -41,16 +41,18 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
 
 def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> RobotFile:
     root, driven, rotors = read_xml(path), dict[str, float](), dict[str, float]()
-    controls: tuple[tuple[float, ...], ...] = ()
+    keyframes: tuple[Keyframe, ...] = ()
     if root.tag == "robot":
         _require_plain(root, path)
         if base == "free":
             urdf.rename_world(root)
         contained = names_files_inside(root, path.resolve().parent, inside)
-        driven, rotors = urdf.driven_joints(root), urdf.rotor_inertias(root)
+        driven, rotors = urdf.transmissions(root)
         kind, (root, remarks), body = "urdf", urdf.neutral_urdf(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
-        kind, (root, remarks, contained, controls), body = "mjcf", neutral_mjcf(root, path, inside, expand), "body"
+        kind, (root, remarks, contained, keyframes), body = "mjcf", neutral_mjcf(root, path, inside, expand), "body"
+    elif root.tag == "sdf":
+        raise InputError("file", path, "it is an SDF, which is not read; give the robot as a URDF or an MJCF")
     else:
         raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
     count = sum(1 for _ in root.iter(body))
@@ -58,7 +60,7 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
         raise InputError("file", path, f"it has {count} {body}s; at most {MOST_BODIES} are checked")
     return RobotFile(
         path=path, kind=kind, root=root, base=base, remarks=tuple(remarks), contained=contained, driven=driven,
-        rotors=rotors, controls=controls,
+        rotors=rotors, keyframes=keyframes,
     )  # fmt: skip
 
 

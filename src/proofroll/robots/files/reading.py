@@ -15,7 +15,7 @@ from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, Refused, require_known
 from proofroll.files.json_data import plain
 from proofroll.robots.files.robot_file import RobotFile
-from proofroll.robots.model import Cord, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie
+from proofroll.robots.model import Cord, Mimic, Robot, RobotActuator, RobotBody, RobotJoint, RobotLoop, Tie
 from proofroll.robots.protocol import GROUP, Reading, Request, Whole
 from proofroll.robots.states import RobotStates
 from proofroll.running.loading import local_name
@@ -235,6 +235,9 @@ def robot_from(data: Mapping[str, Any]) -> Robot:
         ),
         cords=tuple(Cord(**_arrays(cord)) for cord in data["cords"]),
         further=tuple(data["further"]),
+        actuators=tuple(
+            RobotActuator(**item | {"ends": item["ends"] and tuple(item["ends"])}) for item in data["actuators"]
+        ),
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 
 # Limits of bytes, depth and elements for untrusted XML; a robot file has a few hundred kB, the largest known 2 MB.
 LARGEST, DEEPEST, MOST_ELEMENTS = 32 * 2**20, 400, 200_000
@@ -31,6 +31,23 @@ class LintRemark:
 
 
 @dataclasses.dataclass(frozen=True)
+class Keyframe:
+    """A state that an MJCF has by name; a vector that it leaves out is empty.
+
+    Attributes:
+        name: in the file; empty: it has none.
+        qpos: coordinates in MuJoCo's order [m, rad and quaternions], counted as in the file.
+        qvel: velocities in MuJoCo's order [m/s, rad/s].
+        ctrl: controls of the actuators, in their order.
+    """
+
+    name: str
+    qpos: tuple[float, ...]
+    qvel: tuple[float, ...]
+    ctrl: tuple[float, ...]
+
+
+@dataclasses.dataclass(frozen=True)
 class RobotFile:
     """A robot file, prepared for engines.
 
@@ -44,7 +61,7 @@ class RobotFile:
         driven: joints to which transmissions of a URDF lead, with their reductions (turns of the motor per turn of the
             joint); empty: it has none, and says nothing of drives.
         rotors: joint -> inertia of the rotors in its transmissions, reflected to the joint [kg m² or kg].
-        controls: for each keyframe of an MJCF the controls of its actuators, in their order; empty: it gives none.
+        keyframes: of an MJCF, in its order.
     """
 
     path: Path
@@ -55,7 +72,14 @@ class RobotFile:
     contained: bool = True
     driven: Mapping[str, float] = dataclasses.field(default_factory=dict, hash=False)
     rotors: Mapping[str, float] = dataclasses.field(default_factory=dict, hash=False)
-    controls: tuple[tuple[float, ...], ...] = ()
+    keyframes: tuple[Keyframe, ...] = ()
+
+    def keyframe(self, name: str) -> Keyframe:
+        """Keyframe of this name, or with this number from 1 on. Raises InputError if there is none."""
+        numbered = {str(place): item for place, item in enumerate(self.keyframes, 1)}
+        named = numbered | {item.name: item for item in self.keyframes if item.name}
+        require_known("start", name, named, f"{self.path.name} has no such keyframe; choose from")
+        return named[name]
 
 
 # Function: name -> content of a file (first) and of the files that it attaches -> content with macros written out.

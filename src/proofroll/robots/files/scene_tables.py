@@ -17,11 +17,11 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted
-from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, LAWS, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, FACTS, LAWS, ONE_COORDINATE, JointKind
 from proofroll.elements.mechanism.scene.rotations import to_rpy
 from proofroll.robots.files.meaning import opened, robot_of_text
 from proofroll.robots.files.mjcf.parse import COMPENSATION
-from proofroll.robots.files.robot_file import RobotFile
+from proofroll.robots.files.robot_file import Keyframe, RobotFile
 from proofroll.robots.files.urdf import extra_dynamics
 from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotJoint, RobotLoop, Tie
 from proofroll.robots.states import RobotStates
@@ -80,7 +80,7 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
         if body.impossible:
             advice = f"it {body.impossible}; correct it, or take the bodies of each joint as one by possible=0"
             raise InputError(f"{path}: <link {link}> inertia", body.moments.tolist(), advice)
-    names = _names(robot)
+    names, near = _names(robot), 1.0 if values.get("keyframe") else _NEAR
     with_couplings = bool(values["couplings"])
     following = _following(robot) if with_couplings else frozenset()
     gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])
@@ -93,7 +93,7 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
             for name, body in bodies
         ],
         "joints": [
-            _joint(robot, joint, names, start, values) | (_guess(joint, start) if joint.name in following else {})
+            _joint(robot, joint, names, start, values) | (_guess(joint, start, near) if joint.name in following else {})
             for joint in robot.moving
         ],
         "loops": [_loop(robot, link, names) for link in _links(robot)] if with_couplings else [],
@@ -126,11 +126,10 @@ def _omitted(file: RobotFile, robot: Robot, values: Mapping[str, float]) -> Iter
     ranges = sum(joint.lower is not None or joint.upper is not None for joint in robot.moving)
     if ranges and not values.get("limits"):
         yield f"{counted(ranges, 'joint ranges')} (limits=1)"
-    actuators = sum(len(part) for part in file.root.findall("actuator"))
-    if actuators and values.get("actuators") == 0:
-        yield f"{counted(actuators, 'actuators')} (actuators=1)"
-    if values.get("actuators") and values.get("keyframe") == 0:
-        yield f"controls of {counted(len(file.controls), 'keyframes')} (keyframe=1)"
+    if robot.actuators and values.get("actuators") == 0:
+        yield f"{counted(len(robot.actuators), 'actuators')} (actuators=1)"
+    if values.get("keyframe") == 0:
+        yield f"{counted(len(file.keyframes), 'keyframes')} (keyframe=1)"
     for law in _FACTORS:
         if values.get(law) == 0 and any(getattr(joint, law) for joint in robot.moving):
             yield f"{law} of joints ({law}=1)"
@@ -176,7 +175,7 @@ def _joint(
     laws = {
         law: values[law] * getattr(joint, law) for law in _FACTORS if joint.kind in LAWS[law] and getattr(joint, law)
     }
-    v = values.get("speed", 1.0) * start.velocity[joint.name][0]
+    v = (1.0 if values.get("keyframe") else values.get("speed", 1.0)) * start.velocity[joint.name][0]
     if joint.kind == JointKind.FREE:  # its coordinates are relative to the world, whatever its parent is
         turned = start.rotation[joint.name][0]
         q = [*start.position[joint.name][0], *_quaternion(turned)]
@@ -268,11 +267,47 @@ def held_start(robot: Robot, start: RobotStates) -> RobotStates:
     )
 
 
-def _guess(joint: RobotJoint, start: RobotStates) -> dict[str, Any]:
-    """Keys of a joint whose start follows from loops: a guess near the pose of the file, where they are closed."""
+def keyframe_states(robot: Robot, keyframe: Keyframe) -> RobotStates:
+    """The state of a keyframe; what it leaves out is the pose of the file, at rest.
+
+    Raises:
+        InputError: more or fewer numbers than coordinates of the robot.
+    """
+    widths = {
+        joint.name: {JointKind.FREE: 7, JointKind.SPHERICAL: 4}.get(JointKind(joint.kind), 1) for joint in robot.moving
+    }
+    for key, vector, size in (("qpos", keyframe.qpos, sum(widths.values())), ("qvel", keyframe.qvel, robot.dofs)):
+        if len(vector) not in {0, size}:
+            advice = f"this keyframe has {counted(len(vector), 'numbers')}, and the joints of the file {size}"
+            raise InputError(f"<key {key}>", list(vector), advice)
+    angle, rotation, position, velocity = {}, {}, {}, {}
+    place, rates = 0, np.array(keyframe.qvel or np.zeros(robot.dofs))
+    for joint in robot.moving:
+        q = np.array(keyframe.qpos[place : place + FACTS[JointKind(joint.kind)].nq])
+        v = rates[robot.columns[joint.name]]
+        place += q.size
+        home = robot.sources[joint.child]
+        if joint.kind in ONE_COORDINATE:
+            angle[joint.name] = q - joint.ref if q.size else np.zeros(1)
+        elif q.size:
+            rotation[joint.name] = np.asarray(Rotation.from_quat(q[-4:], scalar_first=True).as_matrix())[None]
+        else:
+            rotation[joint.name] = np.array(home["rotation"] if joint.kind == JointKind.FREE else np.eye(3))[None]
+        if joint.kind == JointKind.FREE:
+            position[joint.name] = np.array(q[:3] if q.size else home["position"])[None]
+            v = np.concatenate([v[:3], rotation[joint.name][0] @ v[3:]])
+        velocity[joint.name] = v[None]
+    rest = {name: np.zeros_like(rows) for name, rows in velocity.items()}
+    return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=rest)
+
+
+def _guess(joint: RobotJoint, start: RobotStates, part: float) -> dict[str, Any]:
+    """Keys of a joint whose start follows from loops: a guess in its range, at a ``part`` of a coordinate."""
     if joint.kind == JointKind.SPHERICAL:
-        return {"dependent": True, "q0": [1.0, 0.0, 0.0, 0.0]}
-    return {"dependent": True, "q0": [_NEAR * float(start.angle[joint.name][0])]}
+        return {"dependent": True} if part == 1 else {"dependent": True, "q0": [1.0, 0.0, 0.0, 0.0]}
+    lower, upper = (-np.inf, np.inf) if joint.lower is None or joint.upper is None else (joint.lower, joint.upper)
+    guess = part * float(start.angle[joint.name][0])
+    return {"dependent": True, "q0": [min(max(guess, lower), upper) if lower < upper else guess]}
 
 
 def _loop(robot: Robot, loop: RobotLoop | Cord, names: Mapping[str, str]) -> dict[str, Any]:

@@ -69,29 +69,24 @@ def extra_dynamics(joint: Element) -> list[str]:
     return [key for key, value in attributes if key not in {"damping", "friction"} and value.strip("0. ")]
 
 
-def driven_joints(root: Element) -> dict[str, float]:
-    """Joints to which the transmissions of a URDF lead, with their reductions; 1 where none can be read."""
-    reductions = {}
-    for item in root.findall("transmission"):
-        for joint in item.findall("joint"):
-            if name := joint.get("name"):
-                reductions[name] = next((number for number in map(_reduction, item.iter("mechanicalReduction"))), 1.0)
-    return reductions
+def transmissions(root: Element) -> tuple[dict[str, float], dict[str, float]]:
+    """Joints to which the transmissions of a URDF lead, with their reductions, and with the inertia of their rotors.
 
-
-def rotor_inertias(root: Element) -> dict[str, float]:
-    """Joint -> inertia of the rotors of its transmissions times the squares of their gear ratios, as Drake reads them.
+    A reduction is 1 where none can be read. Inertias are reflected by Drake's gear ratio [kg m² or kg]; only joints
+    with rotors have one.
 
     Raises:
         InputError: an inertia or a ratio is no number, or negative.
     """
+    reductions: dict[str, float] = {}
     inertias: dict[str, float] = {}
     for item in root.findall("transmission"):
         inertia, ratio = _of_actuator(item, "rotor_inertia", "0"), _of_actuator(item, "gear_ratio", "1")
-        for joint in item.findall("joint") if inertia and ratio else ():
-            name = joint.get("name", "")
-            inertias[name] = inertias.get(name, 0.0) + inertia * ratio**2
-    return inertias
+        for joint in item.findall("joint"):
+            if name := joint.get("name"):
+                reductions[name] = next((number for number in map(_reduction, item.iter("mechanicalReduction"))), 1.0)
+                inertias[name] = inertias.get(name, 0.0) + inertia * ratio**2
+    return reductions, {name: inertia for name, inertia in inertias.items() if inertia}
 
 
 def _of_actuator(transmission: Element, key: str, default: str) -> float:

@@ -87,12 +87,11 @@ def defaults_not_inherited(evidence: RobotEvidence) -> Robot | None:
 @hypothesis(
     {
         "pinocchio": "all versions so far",
-        "mujoco": "all versions so far (frictionloss is a soft constraint of its solver)",
         "drake": "1.51.1",
         "pybullet": "3.2.7",
         "exudyn": "1.13.6 (its tree has none)",
     },
-    "add the friction torque yourself; in MuJoCo slow joints slip with less than frictionloss: see solreffriction",
+    "add the friction torque yourself",
 )
 def friction_left_out(evidence: RobotEvidence) -> Robot | None:
     """Friction of joints is not used in the forward dynamics."""

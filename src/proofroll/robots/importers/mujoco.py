@@ -12,7 +12,19 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.engines.mujoco.running import mass_matrix, written
-from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie, composed
+from proofroll.robots.importers.mujoco_actuators import actuators_of, is_off, reflected
+from proofroll.robots.model import (
+    NO_BODY,
+    Array,
+    Cord,
+    Mimic,
+    Robot,
+    RobotBody,
+    RobotJoint,
+    RobotLoop,
+    Tie,
+    composed,
+)
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
 # Springs and dampers; MuJoCo up to 3.3 has one flag for both.
@@ -20,6 +32,7 @@ _PASSIVE = sum(
     int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}", 0))
     for name in (("SPRING", "DAMPER") if hasattr(mujoco.mjtDisableBit, "mjDSBL_DAMPER") else ("PASSIVE",))
 )
+_NOT_COMPARED = ("EQUALITY", "LIMIT", "CONTACT", "ACTUATION")
 
 
 class MujocoRobots:
@@ -69,17 +82,21 @@ class MujocoRobots:
         return Whole(int(model.nv), float(model.body_mass[moved].sum()))
 
     def read(self, request: Request) -> Reading:
-        """Compiled model without actuators, tendons, medium and constraints, friction among them."""
+        """Compiled model without actuators, tendons, medium and constraints but dry friction of joints.
+
+        Friction rows are hard: how soft the file has them is a remark.
+        """
         model = _compile(request)
         off = mujoco.mjtDisableBit
-        model.opt.disableflags |= int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_ACTUATION)
+        model.opt.disableflags |= sum(int(getattr(off, f"mjDSBL_{name}")) for name in _NOT_COMPARED)
         model.opt.density = model.opt.viscosity = 0.0
-        for name in ("body_gravcomp", "tendon_stiffness", "tendon_damping"):
+        for name in ("body_gravcomp", "tendon_stiffness", "tendon_damping", "tendon_frictionloss"):
             if hasattr(model, name):
                 getattr(model, name)[:] = 0.0
         if request.kind == "urdf":
             model.opt.gravity = request.gravity
         data = mujoco.MjData(model)
+        softness = _softness_of_friction(model, data)
         joints = tuple(model.joint(index).name for index in range(model.njnt))
         dofs = tuple({0: 6, 1: 3}.get(int(kind), 1) for kind in model.jnt_type)
         home = {
@@ -99,7 +116,7 @@ class MujocoRobots:
             position={name: np.array([p[body] for p, _ in frames]) for name, body in home.items()},
             rotation={name: np.array([R[body].reshape(3, 3) for _, R in frames]) for name, body in home.items()},
             coupled=_coupled(model, joints),
-            remarks=tuple(f"option {name}={str(on).lower()}" for name, on in request.options.items()),
+            remarks=softness,
             **arrays,
         )
 
@@ -160,7 +177,8 @@ def _at(
     def inverse(acceleration: Array) -> Array:
         data.qacc[:] = acceleration
         flags = model.opt.disableflags
-        model.opt.disableflags |= _PASSIVE  # else it is added and subtracted again, which leaves round-off
+        # Else passive forces are added and subtracted again, which leaves round-off.
+        model.opt.disableflags |= _PASSIVE | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
         mujoco.mj_inverse(model, data)
         model.opt.disableflags = flags
         return np.array(data.qfrc_inverse + data.qfrc_passive)
@@ -172,6 +190,25 @@ def _at(
         return np.array(data.qacc)
 
     return AtState(T=T, drift=np.zeros(model.nv), M=M, g=g, h=data.qfrc_bias.copy(), inverse=inverse, forward=forward)
+
+
+def _softness_of_friction(model: Any, data: Any) -> tuple[str, ...]:
+    """Remark on the softness of dry friction in the file's own rows, which are hard from then on."""
+    mujoco.mj_forward(model, data)
+    rows = np.flatnonzero(data.efc_type[: data.nefc] == int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
+    # The row resists with (damping · speed) / R until it reaches its friction.
+    speeds = data.efc_R[rows] * data.efc_frictionloss[rows] / data.efc_KBIP[rows, 1]
+    model.dof_solref[:], model.dof_solimp[:, :2] = (-1.0, -1e9), mujoco.mjMAXIMP
+    model.opt.solver, model.opt.iterations, model.opt.tolerance = int(mujoco.mjtSolver.mjSOL_NEWTON), 100, 0.0
+    if not rows.size:
+        return ()
+    worst = int(speeds.argmax())
+    joint = model.joint(int(model.dof_jntid[data.efc_id[rows[worst]]]))
+    unit = "m/s" if joint.type[0] == mujoco.mjtJoint.mjJNT_SLIDE else "rad/s"
+    return (
+        f"its dry friction is soft: joint {joint.name} creeps at up to {speeds[worst]:.2g} {unit} under a load that "
+        "its friction should hold (solreffriction, solimpfriction); compared as hard",
+    )
 
 
 def _group(model: Any, body: int) -> RobotBody:
@@ -206,12 +243,13 @@ def robot_of(model: Any) -> Robot:
     """
     if np.any(getattr(model, "tendon_armature", np.zeros(0))):
         raise Refused("a tendon has armature, which the check does not cover")
-    if any(np.any(getattr(model, f"{name}poly", 0)) for name in ("jnt_stiffness", "dof_damping")):
+    if any(np.any(getattr(model, f"{name}poly", 0)) for name in ("jnt_stiffness", "dof_damping", "actuator_damping")):
         raise Refused("a joint has a spring or damper that is not linear, which the check does not cover")
     names = [NO_BODY, *(model.body(index).name for index in range(1, model.nbody))]
     bodies: dict[str, RobotBody] = {}
     joints: list[RobotJoint] = []
-    driven = {int(model.actuator_trnid[index, 0]) for index in range(model.nu) if model.actuator_trntype[index] == 0}
+    actuators = actuators_of(model)
+    driven = {actuator.joint for actuator in actuators}
     for index in range(1, model.nbody):
         name, parent = names[index], names[int(model.body_parentid[index])]
         bodies[name] = body_of(model, index, name)
@@ -234,9 +272,9 @@ def robot_of(model: Any) -> Robot:
             child = name if last else f"{name}/{joint - begin}"
             if not last:
                 bodies[child] = RobotBody(child, 0.0, np.zeros(3), np.zeros((3, 3)))
-            joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
+            joints.append(_joint(model, joint, parent, child, position, rotation, model.joint(joint).name in driven))
             parent, position, rotation = child, np.zeros(3), np.eye(3)
-    gravity = np.zeros(3) if _off(model, "GRAVITY") else np.array(model.opt.gravity)
+    gravity = np.zeros(3) if is_off(model, "GRAVITY") else np.array(model.opt.gravity)
     loops, ties, further = _constraints(model, names)
     cords, laws_of_tendons = _tendons(model, names)
     robot = Robot(
@@ -250,10 +288,11 @@ def robot_of(model: Any) -> Robot:
         ties=ties,
         cords=cords,
         further=(*further, *laws_of_tendons),
+        actuators=actuators,
     )
     laws = {"SPRING": "stiffness", "DAMPER": "damping", "FRICTIONLOSS": "friction"}
-    off = {law: 0.0 for flag, law in laws.items() if _off(model, flag)}
-    return robot.with_joints(**off | ({"friction": 0.0} if _off(model, "CONSTRAINT") else {}))
+    off = {law: 0.0 for flag, law in laws.items() if is_off(model, flag)}
+    return robot.with_joints(**off | ({"friction": 0.0} if is_off(model, "CONSTRAINT") else {}))
 
 
 def body_of(model: Any, index: int, name: str) -> RobotBody:
@@ -261,13 +300,6 @@ def body_of(model: Any, index: int, name: str) -> RobotBody:
     A = matrix(model.body_iquat[index])
     inertia = A @ np.diag(model.body_inertia[index]) @ A.T
     return RobotBody(name, float(model.body_mass[index]), np.array(model.body_ipos[index]), inertia)
-
-
-def _off(model: Any, flag: str) -> bool:
-    """True if the file disables a part of the physics; MuJoCo up to 3.3 has one flag for springs and dampers."""
-    bits = mujoco.mjtDisableBit
-    name = "PASSIVE" if flag in {"SPRING", "DAMPER"} and not hasattr(bits, f"mjDSBL_{flag}") else flag
-    return bool(model.opt.disableflags & int(getattr(bits, f"mjDSBL_{name}")))
 
 
 def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:
@@ -295,18 +327,20 @@ def _joint(
     anchor = np.array(model.jnt_pos[index]) * (kind != JointKind.FREE)
     shift = float(model.qpos0[start]) * (kind in ONE_COORDINATE)
     bounded = bool(model.jnt_limited[index])
+    least, greatest = model.jnt_actfrcrange[index].tolist()
     return RobotJoint(
         name=model.joint(index).name, kind=kind, parent=parent, child=child,
         position=position + rotation @ anchor if kind != JointKind.FREE else np.zeros(3),
         rotation=rotation if kind != JointKind.FREE else np.eye(3),
         axis=np.array(model.jnt_axis[index]), child_position=anchor,
-        damping=_first(model.dof_damping[dof]),
+        damping=_first(model.dof_damping[dof]) + reflected(model, "damping", index),
         friction=float(model.dof_frictionloss[dof]),
-        armature=float(model.dof_armature[dof]),
+        armature=float(model.dof_armature[dof]) + reflected(model, "armature", index),
         stiffness=_first(model.jnt_stiffness[index]),
         rest=float(model.qpos_spring[start]) - shift,
         lower=float(model.jnt_range[index, 0]) - shift if bounded and kind in ONE_COORDINATE else None,
         upper=float(model.jnt_range[index, 1]) - shift if bounded else None,
+        effort=greatest if model.jnt_actfrclimited[index] and greatest == -least else None,
         actuated=driven,
         ref=shift,
     )  # fmt: skip
@@ -314,7 +348,7 @@ def _joint(
 
 def _equalities(model: Any) -> list[int]:
     """Numbers of the equality constraints that act."""
-    if _off(model, "EQUALITY") or _off(model, "CONSTRAINT"):
+    if is_off(model, "EQUALITY") or is_off(model, "CONSTRAINT"):
         return []
     return [index for index in range(model.neq) if model.eq_active0[index]]
 
@@ -385,9 +419,11 @@ def _tendons(model: Any, names: Sequence[str]) -> tuple[tuple[Cord, ...], tuple[
         kind = "fixed" if mujoco.mjtWrap.mjWRAP_JOINT in wraps else "spatial"
         name = model.tendon(index).name or f"tendon{index}"
         values = {law: getattr(model, f"tendon_{law}", None) for law in laws}
-        if any(item is not None and np.any(item[index]) and not _off(model, laws[law]) for law, item in values.items()):
+        if any(
+            item is not None and np.any(item[index]) and not is_off(model, laws[law]) for law, item in values.items()
+        ):
             further.append(f"the tendon {kind} {name}")
-        if not model.tendon_limited[index] or _off(model, "LIMIT"):
+        if not model.tendon_limited[index] or is_off(model, "LIMIT"):
             continue
         low, high = model.tendon_range[index].tolist()
         if wraps != [mujoco.mjtWrap.mjWRAP_SITE] * 2 or low > 0:

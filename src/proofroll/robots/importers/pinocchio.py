@@ -77,7 +77,6 @@ class PinocchioRobots:
             joints=joints, dofs=dofs, mass=mass, com=com, inertia=inertia,
             position={name: np.array([X.translation for X in placements]) for name, placements in frames.items()},
             rotation={name: np.array([X.rotation for X in placements]) for name, placements in frames.items()},
-            remarks=("option mimic=true",) if reduced else (),
             **arrays,
         )  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from proofroll.core.bounds import require_bounds
@@ -10,11 +11,12 @@ from proofroll.core.engine_abilities import offered
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.multi_element import represents
 from proofroll.core.observable import Role
-from proofroll.core.plugins import engine_names, parse_engine, require_engine
+from proofroll.core.plugins import EngineSpec, engine_names, parse_engine, require_engine
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
+from proofroll.files.scene_sources import OwnOptions, ReadsOptions, source_of
 from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.engine_questions import describe_each, resolve
 from proofroll.running.idle_workers import Workers
@@ -62,6 +64,7 @@ def default_comparison(
     time_grid(until, every)
     rest = f" (the first {until:g} s of {file.duration:g})" if file.duration and until < file.duration - every else ""
     rows = asked_rows(scene, file, workers, engines, _CLOSE)
+    own_rows, own_unfit = ([], {}) if engines else _own_rows(name, scene, workers)
     if not rows:
         raise InputError("engine", None, "none is installed here that can be asked; pip install 'proofroll[all]'")
     described = {} if engines else describe_each(engine_names(), workers)
@@ -74,7 +77,7 @@ def default_comparison(
         every=every,
         vary={key: [scene.parameters[key]] for key in parameters},
         bands={_CLOSE: Band("one per cent is visible to the eye: a first look", bounds(scene, every))},
-        rows=rows,
+        rows=[*rows, *own_rows],
         budget=budget,
         spent=processor_seconds() - begin,
         absent={name: str(answer) for name, answer in described.items() if isinstance(answer, Missing)},
@@ -82,7 +85,8 @@ def default_comparison(
             name: _unfit(scene, answer)
             for name, answer in described.items()
             if not isinstance(answer, Missing) and not any(parse_engine(row.engine).name == name for row in rows)
-        },
+        }
+        | own_unfit,
     )
 
 
@@ -132,6 +136,45 @@ def asked_rows(
         texts += [str(spec)] if spec.options else able(scene, workers, names=[spec.name]) or [spec.name]
     texts = texts if engines else able(scene, workers) or [engine.name for engine in _installed(workers)]
     return [Row(text, tolerance, list(Verdict), because=_BECAUSE) for text in _stepped(texts, file.dt, workers)]
+
+
+def own_engine(file: Path, scene: Scene, workers: Workers | None) -> tuple[OwnOptions, str]:
+    """Options of a person's own model, and the engine with them, in its first formulation that represents a scene.
+
+    Raises:
+        InputError: the file has no options that can be compared, or no formulation represents the scene.
+    """
+    source = source_of(str(file))
+    own_options = source[0].own_options(file) if source is not None and isinstance(source[0], ReadsOptions) else None
+    if own_options is None:
+        advice = "give the path of your own MuJoCo model, *.xml" if file.is_file() else "there is no such file"
+        raise InputError("--like", file, advice)
+    formulations = able(scene, workers, names=[own_options.engine])
+    if not formulations:
+        raise InputError("--like", file, f"no formulation of {own_options.engine} represents {scene.name}")
+    preset = {**parse_engine(formulations[0]).options, "preset": "default"}
+    without_contacts = {**preset, **own_options.settings}
+    choices = [preset, without_contacts, {**without_contacts, **own_options.of_contacts}]
+    usual, _, with_contacts = resolve([(own_options.engine, options) for options in choices], workers)
+    taken = choices[1 if isinstance(with_contacts, InputError) else 2]
+    known = usual.settings if isinstance(usual, EngineFacts) else {}
+    unusual = {key: value for key, value in taken.items() if key in preset or str(known.get(key, value)) != value}
+    return own_options, str(EngineSpec(own_options.engine, unusual))
+
+
+def _own_rows(name: str, scene: Scene, workers: Workers | None) -> tuple[list[Row], dict[str, str]]:
+    """Row of the engine's options in the file of a scene, if its format has any; or the reason why there is none."""
+    source = source_of(name)
+    if source is None or not isinstance(source[0], ReadsOptions):
+        return [], {}
+    try:
+        if source[0].own_options(source[1]) is None:
+            return [], {}
+        own_options, engine = own_engine(source[1], scene, workers)
+    except InputError as error:
+        return [], {"the file's own options": error.advice}
+    but = f", but for {', '.join(own_options.others)}" if own_options.others else ""
+    return [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE, short=f"the file's own options{but}")], {}
 
 
 def times_of(file: SceneFile) -> tuple[float, float]:

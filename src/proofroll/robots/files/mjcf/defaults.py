@@ -44,11 +44,6 @@ def with_classes(root: Element, tag: str) -> Iterator[tuple[Element, dict[str, s
     return ((item.element, item.given) for item in classed(root, tag))
 
 
-def class_of(root: Element, element: Element) -> dict[str, str]:
-    """Attributes of an element outside <worldbody>, own and inherited from its class."""
-    return _classes(root, element.tag).get(element.get("class", _main(root)), {}) | element.attrib
-
-
 def _main(root: Element) -> str:
     """Name of the class of elements that name none."""
     return next((default.get("class", _MAIN) for default in root.findall("default")), _MAIN)

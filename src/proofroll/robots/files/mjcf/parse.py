@@ -14,6 +14,7 @@ from proofroll.robots.files.mjcf.meshes import remove_height_fields, remove_mesh
 from proofroll.robots.files.robot_file import (
     MOST_ELEMENTS,
     Expand,
+    Keyframe,
     LintRemark,
     names_files_inside,
     numbers,
@@ -39,6 +40,8 @@ _LOOKS = {
 }
 # Elements that change masses or motion in a way that the check does not cover.
 _UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
+# Attributes that say where an actuator acts.
+_PLACES = {"name", "joint", "jointinparent", "tendon", "site", "refsite", "slidersite", "cranksite", "body"}
 COMPENSATION = "its gravity compensation is left out, as actuators are; all engines read it without"
 # Macros, which the engine that defines the format writes out.
 _MACROS = {"replicate", "attach", "composite"}
@@ -46,8 +49,8 @@ _MACROS = {"replicate", "attach", "composite"}
 
 def neutral_mjcf(
     root: Element, path: Path, inside: Path, expand: Expand | None = None
-) -> tuple[Element, list[LintRemark], bool, tuple[tuple[float, ...], ...]]:
-    """Copy of an MJCF, remarks on omissions, True if all its files lie in ``inside``, and controls of its keyframes.
+) -> tuple[Element, list[LintRemark], bool, tuple[Keyframe, ...]]:
+    """Copy of an MJCF, remarks on omissions, True if all its files lie in ``inside``, and its keyframes.
 
     The only files that the copy names are meshes that exist in that folder.
 
@@ -57,7 +60,7 @@ def neutral_mjcf(
     parts: dict[str, Element] = {}
     remarks, contained = _add(root, path, path.resolve(), inside, parts)
     root = next(iter(parts.values()))
-    controls = _controls_of_keyframes(root)
+    keyframes = tuple(_keyframe(key) for part in root.findall("keyframe") for key in part.findall("key"))
     for part in parts.values():
         part[:] = [child for child in part if child.tag != "keyframe"]
     macros = [name for name in sorted(_MACROS) if any(part.find(f".//{name}") is not None for part in parts.values())]
@@ -70,13 +73,15 @@ def neutral_mjcf(
         root = expand(parts)
         remarks.append(LintRemark("note", names, "written out by the engine that defines the format, to six digits"))
     name_all(root)
-    return root, remarks, contained, controls
+    return root, remarks, contained, keyframes
 
 
-def _controls_of_keyframes(root: Element) -> tuple[tuple[float, ...], ...]:
-    """Controls of each keyframe, which may be none."""
-    keys = [key for part in root.findall("keyframe") for key in part.findall("key")]
-    return tuple(tuple(numbers(key, "ctrl", "", len(key.get("ctrl", "").split()))) for key in keys)
+def _keyframe(key: Element) -> Keyframe:
+    """Keyframe of an element."""
+    qpos, qvel, ctrl = (
+        tuple(numbers(key, name, "", len(key.get(name, "").split()))) for name in ("qpos", "qvel", "ctrl")
+    )
+    return Keyframe(key.get("name", ""), qpos, qvel, ctrl)
 
 
 def _written_out(element: Element) -> float:
@@ -106,9 +111,11 @@ def _add(
         if len(root.findall("worldbody")) > count:
             _merge_worlds(root)
     contained = names_files_inside(root, file.parent, inside)
-    for part in ("actuator", "extension"):
-        for element in [*root.iter(part)]:
-            element[:] = [child for child in element if part == "actuator" and child.tag != "plugin"]
+    for extension in [*root.iter("extension")]:
+        extension[:] = []
+    for plugin in (plugin for part in root.iter("actuator") for plugin in part.findall("plugin")):
+        plugin.tag, plugin[:] = "general", []  # an actuator with a law of a program's own stays one
+        plugin.attrib = {key: plugin.attrib[key] for key in plugin.attrib.keys() & _PLACES} | {"dyntype": "user"}
     for element in root.iter():
         if element.tag in _UNCOVERED:
             raise InputError("file", path, f"the check does not cover <{element.tag}>")
