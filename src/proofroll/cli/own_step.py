@@ -100,7 +100,7 @@ def _change(made: StepAnswer) -> list[str]:
         lines = own_lines(spec.name, spec.options) if made.advised.holds else []
     except ProofrollError:
         lines = []
-    changed = [f"Change this line: {line}" for line in lines if line.startswith("<option")]
+    changed = [f"Change this line: {line}" for line in lines if line.startswith("<option") or "numberOfSteps" in line]
     return changed or [f"Lines that do, if any: {lines_command(made, spec.name)}"]
 
 

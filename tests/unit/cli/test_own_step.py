@@ -107,3 +107,23 @@ def test_the_line_to_change_is_named(proofroll: Proofroll, model: Callable[[str]
         *asked,
     )
     assert (code, out.partition(": ")[2][:4]) == (0, "Yes:")
+
+
+@pytest.mark.drill
+def test_the_line_of_a_program_is_named(proofroll: Proofroll, tmp_path: Path) -> None:
+    """An Exudyn program with too few steps gets the line that makes enough, with which the answer is yes."""
+    program, asked = tmp_path / "program.py", ["--until", "0.2", "--tolerance", "1e-3", "--out", str(tmp_path)]
+
+    def answered(lines: str) -> tuple[int, str]:
+        program.write_text(
+            f"simulationSettings.timeIntegration.endTime = 2\n{lines}\nmbs.SolveDynamic(simulationSettings)"
+        )
+        code, out, _ = proofroll("compare", "pendulum", "--like", str(program), *asked)
+        return code, " ".join(out.split())
+
+    code, out = answered("simulationSettings.timeIntegration.numberOfSteps = int(2 / 0.05)")
+    assert code == 1
+    assert out.startswith("yours (GeneralizedAlpha, dt 0.05 s, spectral radius 0.9): No: ")
+    line = out.partition("Change this line: ")[2].partition(" Not compared")[0]
+    code, out = answered(line)
+    assert (code, out.partition("0.9): ")[2][:4]) == (0, "Yes:")

@@ -15,6 +15,7 @@ from proofroll.core.plugins import EngineSpec, engine_names, parse_engine, requi
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.verdict import Verdict
+from proofroll.files import exudyn_program
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.files.scene_sources import OwnOptions, ReadsOptions, source_of
 from proofroll.running.case import EngineDescription, EngineFacts
@@ -146,8 +147,11 @@ def own_engine(file: Path, scene: Scene, workers: Workers | None) -> tuple[OwnOp
     """
     source = source_of(str(file))
     own_options = source[0].own_options(file) if source is not None and isinstance(source[0], ReadsOptions) else None
+    if file.suffix == ".py" and file.is_file():
+        own_options = exudyn_program.own_options(file)
     if own_options is None:
-        advice = "give the path of your own MuJoCo model, *.xml" if file.is_file() else "there is no such file"
+        models = "give the path of your own MuJoCo model, *.xml, or Exudyn program, *.py"
+        advice = models if file.is_file() else "there is no such file"
         raise InputError("--like", file, advice)
     formulations = able(scene, workers, names=[own_options.engine])
     if not formulations:
