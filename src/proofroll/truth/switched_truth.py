@@ -22,7 +22,7 @@ from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.record import record_of
-from proofroll.elements.mechanism.run.contacts.bounces import bouncing_bodies, course_of
+from proofroll.elements.mechanism.run.contacts.events import bouncing_bodies, course_of
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts, moments_along
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import contact_sums

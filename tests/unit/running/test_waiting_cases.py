@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from proofroll.running.waiting_cases import WaitingCases
+from proofroll.running.runner import WaitingCases
 
 
 def case(key: str, engine: str) -> Any:

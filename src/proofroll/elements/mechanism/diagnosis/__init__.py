@@ -20,8 +20,12 @@ from proofroll.elements.mechanism.diagnosis.joint_laws import (
     soft_couplings,
     soft_stops,
 )
-from proofroll.elements.mechanism.diagnosis.laws_of_parts import of_applied_forces, of_bushings, rolling_resistance
-from proofroll.elements.mechanism.diagnosis.motions import of_motions
+from proofroll.elements.mechanism.diagnosis.laws_of_parts import (
+    of_applied_forces,
+    of_bushings,
+    of_motions,
+    rolling_resistance,
+)
 from proofroll.elements.mechanism.diagnosis.numbers import (
     FACTORS_OF_ALL,
     damped_motion,

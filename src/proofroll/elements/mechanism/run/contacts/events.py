@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounces import Bounce
+from proofroll.core.bounces import Bounce, Course, bounces_along
 from proofroll.core.columns import Columns
 from proofroll.core.element_abilities import SeenInRun
-from proofroll.core.events import Event, EventKind, wrong_bracket
+from proofroll.core.events import IMPACTS, Event, EventKind, events_of, wrong_bracket
 from proofroll.elements.mechanism.contact.coulomb import largest_friction
-from proofroll.elements.mechanism.run.contacts.bounces import sampled_bounces
+from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.observables import (
     PRESSES,
     Followed,
@@ -25,10 +25,43 @@ from proofroll.elements.mechanism.run.contacts.observables import (
 )
 from proofroll.elements.mechanism.run.contacts.step_events import StepEvent
 from proofroll.elements.mechanism.run.dataset import placed_from
+from proofroll.elements.mechanism.scene.model import Mechanism
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.run.element import MechanismElement
     from proofroll.elements.mechanism.run.sampling import MechanismSample
+
+
+def bouncing_bodies(mechanism: Mechanism) -> dict[str, int]:
+    """Name of a contact -> index of the body that bounces: that of the first geometry, unless it is the world's.
+
+    Empty without gravity, which says what height is.
+    """
+    if not np.any(mechanism.gravity):
+        return {}
+    index = mechanism.body_index
+    pairs = {contact.name: (index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts}
+    return {name: a if a >= 0 else b for name, (a, b) in pairs.items()}
+
+
+def course_of(placed: Placed) -> Course:
+    """Energy along a motion, and heights of the centres of mass against gravity."""
+    mechanism = placed.mechanism
+    gravity = np.array(mechanism.gravity)
+    up = -gravity / (np.linalg.norm(gravity) or 1.0)
+    places = [placed.point(body.name, body.com) @ up for body in mechanism.bodies]
+    rates = [placed.velocity(body.name, body.com) @ up for body in mechanism.bodies]
+    return Course(placed.time, placed.energy(), np.stack(places, axis=1), np.stack(rates, axis=1))
+
+
+def sampled_bounces(mechanism: Mechanism, columns: Columns) -> Sequence[Bounce]:
+    """Energy and height of each impact in the samples of a run; empty where it does not give orientations."""
+    events = events_of(columns)
+    if "q_WB" not in columns or not any(event.kind in IMPACTS for event in events):
+        return ()
+    placed = Placed(mechanism, *(columns[name].values for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB")))
+    return bounces_along(course_of(placed), events, bouncing_bodies(mechanism))
+
 
 _States = NDArray[np.bool_]
 # Slip speed of a contact that counts as sticking, relative to the mechanism's speed: softened contacts creep.
