@@ -340,12 +340,14 @@ def soft_stops(evidence: Evidence) -> Iterator[Cause]:
                 f"{abs(v[first, rated]):.2g} {joint.unit}/s"
             )
             yield Cause(
-                f"soft stop of {joint.name}",
-                says,
-                f"{joint.name} between its stops",
-                joint.unit,
-                float(off[flight].max()),
-                float(np.abs(q[flight, place] - expected).max() + off[times[: flight.stop] < hits[joint.name]].max()),
+                id=f"soft stop of {joint.name}",
+                says=says,
+                quantity=f"{joint.name} between its stops",
+                unit=joint.unit,
+                before=float(off[flight].max()),
+                after=float(
+                    np.abs(q[flight, place] - expected).max() + off[times[: flight.stop] < hits[joint.name]].max()
+                ),
                 remedy="make the stop stiffer, or slow the joint down: a stop of no width is none for a soft one",
                 fitted=2,
                 covers=_COVERS,
