@@ -13,6 +13,7 @@ from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
+pytestmark = pytest.mark.drill  # the first of them compiles a truth
 # A range in degrees, as of somebody who meant radians: the joint crosses it in a few steps.
 ARM = """<mujoco><worldbody><body name="b"><inertial pos="0 0 -0.3" mass="1" diaginertia="0.01 0.01 0.01"/>
 <joint name="j" axis="0 1 0" limited="true" range="-{range} {range}" damping="0.1"/></body></worldbody></mujoco>"""
@@ -32,7 +33,6 @@ def causes(scene: Scene, engine: str, step: float, **settings: str) -> list[Caus
     return diagnose(Evidence(element, [], run, truth(scene, TIMES), step), hypotheses_of(element))
 
 
-@pytest.mark.drill_of("0.001")
 @pytest.mark.parametrize("step", [1e-3, 2.5e-4])
 def test_a_soft_stop_is_named(tmp_path: Path, step: float) -> None:
     """Stops of 0.04 degrees on both sides catch the arm softly in MuJoCo, and that explains what comes after."""
@@ -43,7 +43,6 @@ def test_a_soft_stop_is_named(tmp_path: Path, step: float) -> None:
     assert "stiffer" in cause.remedy
 
 
-@pytest.mark.drill_of("projection-settings0-2.0")
 @pytest.mark.parametrize("half", [0.04, 2.0])
 @pytest.mark.parametrize(("engine", "settings"), [("projection", {"integrator": "rk4"}), ("exudyn", {})])
 def test_an_engine_whose_stops_are_hard_is_not_accused(
