@@ -25,8 +25,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.report.kind import BallReport
-from proofroll.papers.blajer_2006.report.replay import AWAY, LENGTH, SLIPS, STICKS, poses
-from proofroll.papers.blajer_2006.report.replay_wall import middle, wall
+from proofroll.papers.blajer_2006.report.replay import AWAY, LENGTH, SLIPS, STICKS, middle, poses, wall
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, report_content

@@ -14,7 +14,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate_built
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.judging.run_values import observables_of
-from proofroll.studies.versions.difference import numbers_apart
+from proofroll.studies.versions.two_runs import numbers_apart
 
 UNTIL = 2.0
 # The ball turns by more than a whole turn in this time [s], and costs more.

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from proofroll.studies.failure import RunOutcome
-from proofroll.studies.stability.bisection import SearchResult, search
+from proofroll.studies.stability.map import SearchResult, search
 
 
 def found(

@@ -29,9 +29,8 @@ from proofroll.studies.stability.axis_values import axis_values
 from proofroll.studies.stability.claims import Claim, file_for
 from proofroll.studies.stability.map import _refused, stability
 from proofroll.studies.stability.records import Boundary, BoundaryPoint, StabilityStudy, dependence
-from proofroll.studies.stability.reproducers import with_programs
 from proofroll.studies.stability.step_numbers import OSCILLATION, explanation, values
-from proofroll.studies.stability.study import stability_study
+from proofroll.studies.stability.study import stability_study, with_programs
 
 SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": AxisTerm()})
 ENGINE = "projection[formulation=rotating_frame,preset=default]"

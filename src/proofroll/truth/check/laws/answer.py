@@ -2,24 +2,186 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.truth.check.laws.changes import changes_of
-from proofroll.truth.check.laws.record import Array, PublishedValues
-from proofroll.truth.check.laws.residuals import COARSE, LAWS, LawResiduals
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.truth.check.laws.integrals import integral
+from proofroll.truth.check.laws.joint_forces import law_of, target_of
+from proofroll.truth.check.laws.loads import BodyLoads
+from proofroll.truth.check.laws.record import SPREAD, Array, Modes, PublishedEvent, PublishedValues
+from proofroll.truth.check.laws.residuals import COARSE, INSTANT, LAWS, STRUCK, LawResiduals
 from proofroll.truth.check.laws.samples import force_laws, kinetic_energy, on_the_motion
 from proofroll.truth.check.laws.scene import LawScene
-from proofroll.truth.check.laws.tiled import Turns, laws_at_all_times, start_of
+from proofroll.truth.check.laws.signals import value_of
+from proofroll.truth.check.laws.tiled import Turns, changed_velocity, laws_at_all_times, start_of
 from proofroll.truth.check.laws.tiles import Places, Tiles
 from proofroll.truth.check.laws.values import values_follow
-from proofroll.truth.check.laws.works import held_efforts, works_follow
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism
+
+
+_GROWTH = 1e3  # natural accelerations by which velocities may grow in the instant before a slip has a direction
+_ROOM = 1e-11  # accuracy of the time of an event, relative to it and to a second
+_LAST_REBOUNDS = 1e-4  # natural times that rebounds take which are summed, where their ratio is not known
+_BEFORE_END = 1e-6  # part of the time before the end of a motion in which an event may be left out
+
+
+def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residuals: LawResiduals, last: float) -> None:
+    """Checks all events before a ``last`` time [s]."""
+    borders = np.flatnonzero(tiles.stretch[1:] != tiles.stretch[:-1])
+    ends, begins, jumps = tiles.time[borders, -1], tiles.time[borders + 1, 0], changed_velocity(scene, tiles)[borders]
+    hits = list[PublishedEvent]()
+    for number, end, begin, jump in zip(borders.tolist(), ends.tolist(), begins.tolist(), jumps.tolist(), strict=True):
+        if end >= last * (1 - _BEFORE_END):
+            continue
+        room = _ROOM * (1 + begin)
+        near = [
+            item
+            for item in published.changes
+            if item.low - room - _settling_time(scene, published.changes, item) <= begin
+            and end <= item.high + room + (INSTANT / scene.rate if item.jumps else 0.0)  # a rebound that is none
+        ]
+        time = np.array([[begin]])
+        least = STRUCK + _GROWTH * scene.rate * max(begin - end, 0.0)
+        if jump > least and not any(item.jumps for item in near):
+            residuals.note("change", "a jump of velocities", np.ones((1, 1)), 1.0, time)
+        names = _changed(scene, tiles.modes[number], tiles.modes[number + 1])
+        if names and not any(_of(item.name, name) for item in near for name in names):
+            residuals.note("change", min(names), np.ones((1, 1)), 1.0, time)
+        hits += near if jump > least else []
+    contacts = {contact.name for contact in scene.contacts if contact.alone}
+    for item in published.changes:
+        if item.of_effort or item.time >= last * (1 - _BEFORE_END):
+            continue
+        apart = np.maximum(
+            np.maximum(ends - item.high, item.low - _settling_time(scene, published.changes, item) - begins), 0.0
+        )
+        apart = np.append(apart, abs(item.time) if item.time <= 0 else np.inf)
+        off = min(float(apart.min()), 1 + item.time)
+        residuals.note("change", item.name, np.array([[off]]), 1 + abs(item.time), np.array([[item.time]]))
+        if item.strikes and item.name in contacts and item not in hits:
+            residuals.note("change", item.name, np.ones((1, 1)), 1.0, np.array([[item.time]]))
+
+
+def _settling_time(scene: LawScene, changes: Sequence[PublishedEvent], item: PublishedEvent) -> float:
+    """Time before a settling, and what follows it at once, at which the motion may rest already [s].
+
+    That is twice the time that rebounds take in their last ratio.
+    """
+    if not any(other.settles and abs(other.time - item.time) <= _ROOM * (1 + item.time) for other in changes):
+        return 0.0
+    hits = [other.time for other in changes if other.strikes and other.name == item.name and other.time < item.time]
+    spans, least = np.diff(hits[-3:]), _LAST_REBOUNDS / scene.rate
+    if len(spans) < 2 or not 0 < spans[1] < spans[0]:
+        return least
+    ratio = float(spans[1] / spans[0])
+    return max(least, 2 * float(spans[1]) * ratio / (1 - ratio))
+
+
+def _of(event: str, place: str) -> bool:
+    """True if an event of a pair or joint is that of a place, which may be one of several."""
+    return place == event or place.startswith(f"{event}.")
+
+
+def _changed(scene: LawScene, sooner: Modes, later: Modes) -> set[str]:
+    """Names of contacts and joints whose modes differ."""
+    places = zip(scene.contacts, sooner.contacts, later.contacts, strict=True)
+    names = {contact.name for contact, mode, next_mode in places if mode != next_mode}
+    for number, joint in enumerate(scene.mechanism.joints):
+        modes = [(item.friction[number], item.stops[number]) for item in (sooner, later)]
+        names |= {joint.name} if modes[0] != modes[1] else set()
+    return names
+
+
+def works_follow(
+    scene: LawScene, tiles: Tiles, turns: Turns, places: Places, published: PublishedValues, residuals: LawResiduals
+) -> None:
+    """Checks works of drives at samples, whose places in tiles are given."""
+    names = [name for name in published.values if name.startswith("work.")]
+    if not names:
+        return
+    control, bars = scene.mechanism.control, published.bars
+    natural = scene.mass.sum() * scene.speed**2
+    for data in scene.mechanism.actuators:
+        if control is not None and data.name in control.actuators:
+            continue
+        number = scene.mechanism.joint_index[data.joint]
+        rate = scene.free(number, tiles)[0].rate
+        force = law_of(data, value_of(data.target, tiles.time), turns[number, 0], rate)
+        work, size = (_summed(values, tiles) for values in (force * rate, np.abs(force * rate)))
+        name = f"work.effort.{data.name}"
+        _note(
+            name, (published.values[name], places.at(work), natural + places.at(size)), published, residuals, bars[name]
+        )
+    if any({"slip", SPREAD} & {*mode.contacts, *mode.rolling, *mode.spinning} for mode in tiles.modes):
+        return
+    if (changed_velocity(scene, tiles) > STRUCK).any():
+        return
+    energy, parts = kinetic_energy(scene, tiles)
+    loads = BodyLoads(scene, tiles)
+    power, size = loads.power + 0.0, loads.power_size + 0.0
+    for number in range(len(scene.mechanism.joints)):
+        joint_power = _passive_power(scene, tiles, turns, number)
+        power, size = power + joint_power, size + np.abs(joint_power)
+    work = energy - energy[0, 0] - _summed(power, tiles)
+    sizes = natural + places.at(_summed(size, tiles) + parts) + float(parts[0, 0])
+    value = np.sum([published.values[name] for name in names], axis=0)
+    _note("all drives", (value, places.at(work), sizes), published, residuals, sum(bars[name] for name in names))
+
+
+def held_efforts(
+    scene: LawScene, tiles: Tiles, turns: Turns, places: Places, published: PublishedValues, residuals: LawResiduals
+) -> None:
+    """Checks efforts that a controller holds: they follow from the state at the instant at which it sets them."""
+    control, natural = scene.mechanism.control, scene.force * scene.length
+    if control is None or control.held != "effort" or control.policy is not None:
+        return
+    first = np.searchsorted(tiles.stretch, tiles.stretch[places.tile])  # tile with which the stretch begins
+    for k, data in enumerate(scene.mechanism.actuators):
+        if data.name not in control.actuators:
+            continue
+        number = scene.mechanism.joint_index[data.joint]
+        begun, effort = turns[number, 0][first, :1], published.pieces.effort[..., k]
+        rates = scene.free(number, tiles)[0].rate[first, :1]
+        law = law_of(data, target_of(control, data, published.pieces.time), begun, rates)
+        residuals.note("effort", data.name, effort - law, np.abs(effort) + natural, published.pieces.time)
+
+
+def _note(
+    name: str, values: tuple[Array, Array, Array], published: PublishedValues, residuals: LawResiduals, bar: float
+) -> None:
+    """Takes a published work, that of the laws, and its size [J]."""
+    value, work, size = values
+    residuals.note("work", name, (value - work)[:, None], size[:, None], published.pieces.time, bar)
+
+
+def _summed(values: Array, tiles: Tiles) -> Array:
+    """Integral since the start at the points of tiles."""
+    parts = integral(values, tiles.pace)
+    ends = np.concatenate([[0.0], np.cumsum(parts[:, -1])[:-1]])
+    return np.asarray(parts + ends[:, None])
+
+
+def _passive_power(scene: LawScene, tiles: Tiles, turns: Turns, number: int) -> Array:
+    """Power of the spring, the damper, the torque and the dry friction of a joint."""
+    joint, total = scene.mechanism.joints[number], np.zeros(tiles.time.shape)
+    if joint.kind == JointKind.FREE:
+        return total
+    for k, (_, rate, _) in enumerate(scene.free(number, tiles)):
+        force = -joint.damping * rate
+        if joint.nq in {1, 2}:
+            force = force - joint.stiffness * (turns[number, k] - joint.rest)
+        if joint.nq == 1:
+            force = force + value_of(joint.torque, tiles.time) - joint.friction * np.sign(rate)
+        total = total + force * rate
+    return total
+
 
 _BESIDE = 1e-9  # time beside the end of a stretch, relative to it and to a second, that counts as that end
 _UNCERTAIN = 4e-5  # part of the time before a horizon in which what it hangs on may happen, and is no event
