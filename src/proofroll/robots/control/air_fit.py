@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.number_format import error as short
 from proofroll.core.number_format import with_bar
@@ -31,11 +30,10 @@ from proofroll.robots.control.air_rows import (
 from proofroll.robots.control.air_several import several_causes
 from proofroll.robots.control.bookkeeping.air import AirRobot, HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.record import FITTED, ControlRecord, LayerCause
+from proofroll.robots.control.record import ControlRecord, LayerCause
 from proofroll.robots.model import Array
 
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
-_SMALL = 1e-6  # smallest number that is told, in its unit
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
 
 
@@ -133,7 +131,7 @@ def _judged(
     right = LayerCause("", "", None, best.off * scale)  # what no cause may leave, whatever the scheme
     causes: dict[str, LayerCause] = {}
     for _, rows in trials:
-        for cause in _causes(rows, law, robot):
+        for cause in _causes(rows, law):
             if cause.after < causes.get(cause.id, right).after:
                 causes[cause.id] = cause
     bar = SAFETY * best.rounding
@@ -159,9 +157,9 @@ def _fits(rows: AirRows, name: str) -> bool:
     return rms(rows.left - rows.columns[name]) <= SAFETY * rows.rounding
 
 
-def _causes(rows: AirRows, law: ControlLaw, robot: AirRobot) -> list[LayerCause]:
-    """Numbers and bodies that close what the right ones leave, but those that leave more than the best's errors."""
-    causes = [*_numbers(rows, law), *_heavier(rows, robot)]
+def _causes(rows: AirRows, law: ControlLaw) -> list[LayerCause]:
+    """Numbers that close what the right ones leave, but those that leave more than the best's errors."""
+    causes = [*_numbers(rows, law)]
     least = max(min((cause.after for cause in causes), default=0.0), ROUND_OFF)
     return [cause for cause in causes if cause.after <= least * np.sqrt(1 + SAFETY**2 / len(rows.left))]
 
@@ -191,45 +189,3 @@ def _numbers(rows: AirRows, law: ControlLaw) -> Iterator[LayerCause]:
 def _cause(name: str, sentence: str, value: float | None, rows: AirRows, distance: float) -> LayerCause:
     proof = f"forces off by {short(rows.off / rows.size)} of their size, by {short(distance / rows.size, 1)} with that"
     return LayerCause(name, f"{sentence} ({proof})", value, distance / rows.size)
-
-
-def _heavier(rows: AirRows, robot: AirRobot) -> Iterator[LayerCause]:
-    """A body that weighs more: a mass at a point of it, else any inertia."""
-    heavier_bodies: list[tuple[float, str, float | None, str]] = []
-    for body, columns in rows.added.items():
-        sizes = np.linalg.norm(columns, axis=0)
-        seen = sizes > ROUND_OFF * sizes.max()
-        values = np.zeros(10)
-        values[seen] = np.linalg.lstsq(columns[:, seen] / sizes[seen], rows.left, rcond=_SMALL)[0] / sizes[seen]
-        if not rows.explained(rms(rows.left - columns @ values)):
-            continue
-        mass = robot.mechanism.bodies[robot.mechanism.body_index[body]].mass
-        start = np.array([values[0] if values[0] > 0 else 0.05 * mass, *values[1:4]])
-
-        def left(numbers: Array, columns: Array = columns) -> Array:
-            return rows.left - columns @ _point(numbers)
-
-        numbers = least_squares_parameters(left, start, float(np.abs(start).max()) or 1.0)
-        distance = rms(left(numbers))
-        if rows.explained(distance) and numbers[0] > 0:
-            place = ", ".join(f"{x:.3g}" for x in (numbers[1:] / numbers[0]).round(4).tolist())
-            words = f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"
-            heavier_bodies.append((distance, body, float(numbers[0]), words))
-        elif mass + values[0] > 0:
-            moments = columns[:, 4:] @ np.linalg.lstsq(columns[:, 4:], rows.left, rcond=_SMALL)[0]
-            if rows.explained(rms(rows.left - moments)):
-                words = f"the inertia of {body} is another"
-                heavier_bodies.append((SAFETY * rms(rows.left - moments), body, None, words))
-                continue
-            words = f"mass, centre and inertia of {body} are others, {values[0]:+.3g} kg"
-            words = words if seen[0] else f"centre and inertia of {body} are others"
-            heavier_bodies.append((SAFETY * rms(rows.left - columns @ values), body, float(values[0]), words))
-    for distance, _, size, words in sorted(heavier_bodies)[:1]:
-        yield _cause(FITTED, words, size, rows, distance)
-
-
-def _point(numbers: Array) -> Array:
-    """Mass, first moment and inertia (xx, yy, zz, xy, xz, yz) of a point of a mass with a first moment."""
-    m, (x, y, z) = numbers[0], numbers[1:]
-    xx, yy, zz, xy, xz, yz = np.array([x * x, y * y, z * z, x * y, x * z, y * z]) / (m or np.inf)
-    return np.array([m, x, y, z, yy + zz, xx + zz, xx + yy, -xy, -xz, -yz])

@@ -249,12 +249,24 @@ class AirTable:
         new_v = classical_step(rates, np.concatenate([q, v]), self.step)[len(q) :]
         return np.asarray((self.at[row + 1][1] - new_v) / self.step)
 
-    def _slope(self, row: int, rate: Array) -> Array:
-        """Change of the forces of inertia at a row with velocities that change by ``rate``; they are quadratic."""
+    def _slope(self, row: int, rate: Array, *, of_world: bool) -> Array:
+        """Change of the forces of inertia at a row with velocities that change by ``rate``; they are quadratic.
+
+        ``of_world``: True if the velocity of a base that floats has its steps along the world's axes.
+        """
         q, v = self.at[row]
-        size = (np.abs(v).max() or 1.0) / (np.abs(rate).max() or 1.0)
-        forces_after, forces_before = (self.robot.forces(q, v + change * rate)[1] for change in (size, -size))
-        return np.asarray((forces_after - forces_before) / (2 * size))
+        M, place = self._forces(row)[0], self.robot.base[1] if of_world and self.robot.base else slice(0, 0)
+
+        def turning(velocity: Array) -> Array:
+            """Part of the base's acceleration that the turning of its axes makes."""
+            return np.cross(velocity[place][3:], velocity[place][:3]) if place.stop else np.zeros(0)
+
+        change = rate.copy()
+        change[place][:3] += turning(v)
+        size = (np.abs(v).max() or 1.0) / (np.abs(change).max() or 1.0)
+        ends = (v + size * change, v - size * change)
+        after, before = (self.robot.forces(q, end)[1] + M[:, place][:, :3] @ turning(end) for end in ends)
+        return np.asarray((after - before) / (2 * size))
 
     def rows(self, rows: Array, moving: MovingRates, scheme: StepScheme, *, central: bool) -> AirRows:
         """Forces at some rows.
@@ -289,7 +301,7 @@ class AirTable:
             if scheme.stages:
                 acting = M @ self._by_stages(row, held=scheme.held)
             if scheme.whole:
-                acting -= h * self._slope(row, rate)
+                acting -= h * self._slope(row, rate, of_world=moving.axes is not None)
             if scheme.damped:
                 acting += h * robot.damping * rate
             if scheme.implicit:

@@ -121,8 +121,23 @@ def _told(
         place = slice(begin, begin + len(group.where))
         begin = place.stop
         words = _words(group, values[place], bars[place], right)
+        if group.kind == FITTED and len(groups) == 1 and values[0] > 0:
+            words = _carried(rows, group.where[0], values) or words
         if words:
-            yield LayerCause(group.kind, f"{words} ({proof})", None, remainder / rows.size)
+            size = float(values[place][0]) if group.kind == FITTED else None
+            yield LayerCause(group.kind, f"{words} ({proof})", size, remainder / rows.size)
+
+
+def _carried(rows: AirRows, body: str, values: Array) -> str:
+    """Clause on a mass at a point of a body that leaves no more than rounding; empty: it is none."""
+    m, (x, y, z) = values[0], values[1:4]
+    xx, yy, zz, xy, xz, yz = np.array([x * x, y * y, z * z, x * y, x * z, y * z]) / m
+    point = np.array([m, x, y, z, yy + zz, xx + zz, xx + yy, -xy, -xz, -yz])
+    if rms(rows.left - rows.added[body] @ point) > SAFETY * rows.rounding:
+        return ""
+    return (
+        f"{body} carries {m:.4g} kg more, at ({', '.join(f'{number:.3g}' for number in (values[1:4] / m).round(4))}) m"
+    )
 
 
 def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -> str:

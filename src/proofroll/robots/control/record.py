@@ -169,11 +169,18 @@ def _decimal_roundings(columns: Mapping[str, Array], digits: float) -> dict[str,
     """Rounding of each column to a number of decimals that all columns of its kind show; 0 where they show none.
 
     Velocities of a base may have been computed from rounded numbers: they have at least the rounding of its attitude.
+    A kind with few different values, as constant targets, has the rounding of the joints' columns if its values fit it.
     """
     kinds: dict[str, list[Array]] = {}
     for name, values in columns.items():
         kinds.setdefault(name.partition(".")[0], []).append(values)
-    shown = {kind: _decimals(np.unique(np.concatenate(values)), digits) for kind, values in kinds.items()}
+    different = {kind: np.unique(np.concatenate(values)) for kind, values in kinds.items()}
+    shown = {kind: _decimals(values, digits) for kind, values in different.items()}
+    written = [kind for kind in ("q", "v", "action", "effort") if len(different.get(kind, ())) >= _MANY]
+    common = min((shown[kind] for kind in written), default=0.0)  # a base's velocities may be computed from others
+    for kind in [kind for kind, values in different.items() if common and len(values) < _MANY]:
+        steps = different[kind] / (2 * common)
+        shown[kind] = common * float(np.allclose(steps, np.round(steps), rtol=4 * digits, atol=1e-9))
     for kind in shown.keys() & {"v_WB", "w_WB"}:
         shown[kind] = max(shown[kind], shown.get("q_WB", 0.0))
     return {name: shown[name.partition(".")[0]] for name in columns}
