@@ -52,7 +52,9 @@ def interrupted(arguments: list[str], ready: Callable[[int], bool], times: int =
 
 
 @pytest.mark.drill
-@pytest.mark.parametrize("command", [["engines", "--capabilities"], ["run", "sphere_in_cylinder", "--engine", "sleeper"]])
+@pytest.mark.parametrize(
+    "command", [["engines", "--capabilities"], ["run", "sphere_in_cylinder", "--engine", "sleeper"]]
+)
 def test_while_an_engine_is_asked(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

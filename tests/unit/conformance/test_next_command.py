@@ -61,6 +61,8 @@ def test_what_no_run_needed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         name = "provides"
         provides: ClassVar = {"euler": frozenset({"free bodies", "bushings", "gears"})}
 
+    for name in list(checked):
+        monkeypatch.delitem(checked, name)
     monkeypatch.setitem(checked, "provides", True)
 
     def check(known: str, needs: str, error: Exception | None = None) -> Check:
