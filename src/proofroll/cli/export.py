@@ -21,7 +21,7 @@ def export(
     settings: options.Set = None,
     _root: options.Root = None,
 ) -> None:
-    """Write the model that an engine builds; or a robot as a scene.
+    """Write an engine's model of a scene; or a robot as a scene.
 
     With --as scene FILE is the scene's new folder, or the path of its scene.toml.
     """
