@@ -9,13 +9,16 @@ import pytest
 from mechanism_scenes import mechanism_named
 from scipy.integrate import solve_ivp
 
+from proofroll.core.dataset import ENDED, LAWS
 from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.elements.mechanism.scene.signal import Formula, Signal, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
+from proofroll.truth.plug_in import MechanismTruth
 from proofroll.truth.truth_of_mechanism import truth_of
 
 
@@ -186,6 +189,7 @@ def test_a_motion_that_leaves_nothing_free_holds_its_laws(angle: float) -> None:
     body = Body("arm", mass=1.0, com=(0.3, 0.0, 0.0), inertia=((0.03, 0, 0), (0, 0.02, 0), (0, 0, 0.02)))
     motion = Table((0.0, 0.1), (0.0, angle))
     joint = Joint("hinge", "revolute", "world", "arm", axis=(0.0, 1.0, 0.0), motion=motion)
-    truth = truth_of(Mechanism(bodies=(body,), joints=(joint,), gravity=(0.0, 0.0, -9.81)), np.linspace(0, 0.1, 3))
-    assert (truth.ended, truth.laws != "") == ("", True)
-    assert truth.record.q[1, 0] == pytest.approx(angle / 2, rel=1e-14)  # the spline is symmetric
+    mechanism = Mechanism(bodies=(body,), joints=(joint,), gravity=(0.0, 0.0, -9.81))
+    truth = MechanismTruth.truth(MechanismElement(mechanism), np.linspace(0, 0.1, 3), ())
+    assert (ENDED in truth.attrs, "stretches" in truth.attrs[LAWS]) == (False, True)
+    assert truth["q.hinge"][1] == pytest.approx(angle / 2, rel=1e-14)  # the spline is symmetric
