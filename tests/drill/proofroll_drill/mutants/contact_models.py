@@ -62,7 +62,7 @@ class ContactMutant(MechanismMutant):
         state = states_of(self.tree, self.path, at, [number])[0]
         q, v, time = self.dynamics.parts(state)
         record, force, _ = self.dynamics.sample(q, v, self.path.stretches[number].mode, time)
-        force = np.where(np.isnan(force), 0.0, force)
+        force = np.nan_to_num(force[:, :3])
         motion = {name: record[name] for name in ("p_WB", "v_WB", "w_WB", "q_WB")}
         sample: MechanismSample = self.misreport(MechanismSample(**motion, contact_force=force))
         return sample
