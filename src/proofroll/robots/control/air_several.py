@@ -124,7 +124,8 @@ def _told(
         if group.kind == FITTED and len(groups) == 1 and values[0] > 0:
             words = _carried(rows, group.where[0], values) or words
         if words:
-            size = float(values[place][0]) if group.kind == FITTED else None
+            weighs = group.kind == FITTED and abs(values[place][0]) > bars[place][0]
+            size = float(values[place][0]) if weighs else None
             yield LayerCause(group.kind, f"{words} ({proof})", size, remainder / rows.size)
 
 
@@ -146,7 +147,10 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
     if not beyond:
         return ""
     if group.kind == FITTED:
-        return f"mass, centre and inertia of {group.where[0]} are others, {values[0]:+.3g} kg"
+        weight = f", {values[0]:+.3g} kg" if beyond[0] == 0 else ""
+        first = next(k for k, end in enumerate((1, 4, 10)) if beyond[0] < end)
+        what = ("mass, centre and inertia of {} are others", "centre and inertia of {} are others")
+        return (*what, "the inertia of {} is another")[first].format(group.where[0]) + weight
     if group.where == ("",):
         words, unit = NUMBERS[group.kind]
         text, interval = with_bar(right.get(group.kind, 0.0) + values[0], bars[0], 1)
