@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.number_format import error as short
 from proofroll.core.number_format import with_bar
 from proofroll.robots.control.air_rows import BY_JOINT, NUMBERS, ROUND_OFF, SAFETY, AirRows, rms
@@ -15,6 +16,7 @@ from proofroll.robots.control.record import FITTED, LayerCause
 from proofroll.robots.model import Array
 
 _MOST = 0.5  # part of the equations that numbers may be
+_OF_A_POINT = 4  # numbers of a mass at a point
 _SCREENED = 1e-3  # part of what is off that the quick look may leave
 _LISTED = 4  # joints whose numbers are told one by one
 _REST = "torque"  # number of a joint that a spring needs, too: its rest is not known
@@ -51,9 +53,12 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
     groups = [*_groups(rows, joints)]
     screen = _Screen(groups, rows.left)
     sets = [*((k,) for k in range(len(groups))), *itertools.combinations(range(len(groups)), 2)]
+    carried: list[LayerCause] | None = None
     for numbers in sorted(sets, key=lambda item: sum(groups[k].columns.shape[1] for k in item)):
         chosen = [groups[k] for k in numbers]
         count = sum(group.columns.shape[1] for group in chosen)
+        if count > _OF_A_POINT and carried is None and (carried := _carried(rows)):
+            return carried
         if count > _MOST * len(rows.left) or screen.left(numbers) > max(SAFETY * rows.rounding, _SCREENED * rows.off):
             continue
         columns = np.concatenate([group.columns for group in chosen], axis=1)
@@ -121,24 +126,38 @@ def _told(
         place = slice(begin, begin + len(group.where))
         begin = place.stop
         words = _words(group, values[place], bars[place], right)
-        if group.kind == FITTED and len(groups) == 1 and values[0] > 0:
-            words = _carried(rows, group.where[0], values) or words
         if words:
             weighs = group.kind == FITTED and abs(values[place][0]) > bars[place][0]
             size = float(values[place][0]) if weighs else None
             yield LayerCause(group.kind, f"{words} ({proof})", size, remainder / rows.size)
 
 
-def _carried(rows: AirRows, body: str, values: Array) -> str:
-    """Clause on a mass at a point of a body that leaves no more than rounding; empty: it is none."""
-    m, (x, y, z) = values[0], values[1:4]
-    xx, yy, zz, xy, xz, yz = np.array([x * x, y * y, z * z, x * y, x * z, y * z]) / m
-    point = np.array([m, x, y, z, yy + zz, xx + zz, xx + yy, -xy, -xz, -yz])
-    if rms(rows.left - rows.added[body] @ point) > SAFETY * rows.rounding:
-        return ""
-    return (
-        f"{body} carries {m:.4g} kg more, at ({', '.join(f'{number:.3g}' for number in (values[1:4] / m).round(4))}) m"
-    )
+def _carried(rows: AirRows) -> list[LayerCause]:
+    """Cause: the body that carries a mass at a point of it, if that leaves no more than rounding; empty: none does."""
+    causes: list[tuple[float, LayerCause]] = []
+    for body, columns in rows.added.items():
+        values, _ = _solved(columns, rows.left)
+        start = np.array([abs(values[0]) or 1.0, *values[1:4]])
+
+        def left(numbers: Array, columns: Array = columns) -> Array:
+            return rows.left - columns @ _point(numbers)
+
+        numbers = least_squares_parameters(left, start, float(np.abs(start).max()))
+        distance = rms(left(numbers))
+        if distance <= SAFETY * rows.rounding and numbers[0] > 0:
+            place = ", ".join(f"{x:.3g}" for x in (numbers[1:] / numbers[0]).round(4))
+            words = f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"
+            off, rest = short(rows.off / rows.size), short(distance / rows.size, 1)
+            sentence = f"{words} (forces off by {off} of their size, by {rest} with that)"
+            causes.append((distance, LayerCause(FITTED, sentence, float(numbers[0]), distance / rows.size)))
+    return [cause for _, cause in sorted(causes, key=lambda item: item[0])[:1]]
+
+
+def _point(numbers: Array) -> Array:
+    """Mass, first moment and inertia (xx, yy, zz, xy, xz, yz) of a point of a mass with a first moment."""
+    m, (x, y, z) = numbers[0], numbers[1:]
+    xx, yy, zz, xy, xz, yz = np.array([x * x, y * y, z * z, x * y, x * z, y * z]) / (m or np.inf)
+    return np.array([m, x, y, z, yy + zz, xx + zz, xx + yy, -xy, -xz, -yz])
 
 
 def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -> str:
