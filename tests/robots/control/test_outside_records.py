@@ -142,7 +142,7 @@ def test_numbers_of_single_joints_are_named(name: str, program: str, judged: Jud
     assert words in "\n".join(judgement.lines())
 
 
-@pytest.mark.drill_of("sign of spins")
+@pytest.mark.drill_of("sign of spins", "late actions")
 @pytest.mark.parametrize(
     "name",
     [
@@ -254,7 +254,7 @@ def test_a_mistake_of_an_observation_shows_in_actions(name: str, judged: Judged)
     require_first(judged(columns), "action", MISTAKES[name][0])
 
 
-@pytest.mark.drill_of("payload")
+@pytest.mark.drill_of("payload", "dry friction")
 @pytest.mark.parametrize("name", ["damping", "dry friction", "payload"])
 def test_what_no_file_has_is_named_with_what_it_explains(name: str, judged: Judged) -> None:
     """Damping, dry friction and a payload are named at the accelerations with their sizes, and close them."""

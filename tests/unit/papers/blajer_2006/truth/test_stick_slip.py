@@ -159,6 +159,7 @@ def test_the_published_digits_of_the_article_law(paper: xr.Dataset) -> None:
     assert float(paper["z"][-1]) == pytest.approx(-2.297658694, abs=1e-9)
 
 
+@pytest.mark.drill
 def test_resistance_against_turning_falls_elsewhere() -> None:
     """By the law of bodies the first slip is the same, the second 8 ms later, and the fall 38 mm deeper, to 1e-6."""
     (element,) = load_scene("sphere_in_cylinder", **PAPER).elements
