@@ -136,6 +136,9 @@ def _carried(rows: AirRows) -> list[LayerCause]:
     """Cause: the body that carries a mass at a point of it, if that leaves no more than rounding; empty: none does."""
     causes: list[tuple[float, LayerCause]] = []
     for body, columns in rows.added.items():
+        sizes = np.linalg.norm(columns, axis=0)
+        if sizes[0] <= ROUND_OFF * sizes.max():  # about a fixed axis no mass shows
+            continue
         values, _ = _solved(columns, rows.left)
         start = np.array([abs(values[0]) or 1.0, *values[1:4]])
 
