@@ -73,9 +73,9 @@ def moves_as_the_truth(subject: Subject) -> None:
     beside = _beside_events(subject.scene, step or 0.0, true)
     for name, values in moved.items():
         exact = true[name].to_numpy()[1:]
-        known = ~np.isnan(exact)  # forces that the scene does not determine are not
+        mask = ~np.isnan(exact)  # leaves out forces that the scene does not determine
         error, change = (
-            float(np.max(np.abs(values - rival)[known], initial=0.0)) / sizes[name] for rival in (exact, finer[name])
+            float(np.max(np.abs(values - rival)[mask], initial=0.0)) / sizes[name] for rival in (exact, finer[name])
         )
         # Round-off is relative to the value, which may be many times its change by gravity.
         size = float(np.nanmax(np.abs(exact), initial=0.0)) / sizes[name]

@@ -43,14 +43,14 @@ def own_options(path: Path) -> OwnOptions:
         program = ast.parse(path.read_text(encoding="utf-8"))
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise InputError("--like", path, f"it is no Python program: {type(error).__name__}") from None
-    given = dict(_assigned(program))
-    solver = _solver(program) or ("TrapezoidalIndex2" if given.get("useNewmark") else "GeneralizedAlpha")
+    values = dict(_assigned(program))
+    solver = _solver(program) or ("TrapezoidalIndex2" if values.get("useNewmark") else "GeneralizedAlpha")
     if solver not in _SOLVERS:
         advice = f"its solver {solver} is none that can be compared; choose {', '.join(_SOLVERS)}"
         raise InputError("--like", path, advice)
-    if not {"numberOfSteps", "endTime"} & given.keys():
+    if not {"numberOfSteps", "endTime"} & values.keys():
         raise InputError("--like", path, "it gives timeIntegration.numberOfSteps and endTime no numbers")
-    options, integrator = _OWN | given, _SOLVERS[solver]
+    options, integrator = _OWN | values, _SOLVERS[solver]
     step = options["endTime"] / max(options["numberOfSteps"], 1.0)
     settings = {"integrator": integrator, "dt": f"{step:.12g}"}
     words = f"{solver}, dt {number(step, 3)} s"
@@ -61,7 +61,7 @@ def own_options(path: Path) -> OwnOptions:
     if integrator == "generalized_alpha":
         settings["spectral_radius"] = repr(options["spectralRadius"])
         words += f", spectral radius {number(options['spectralRadius'])}"
-    others = ["the adaptive step"] if given.get("adaptiveStep", 1.0) and integrator not in _EXPLICIT else []
+    others = ["the adaptive step"] if values.get("adaptiveStep", 1.0) and integrator not in _EXPLICIT else []
     return OwnOptions(engine="exudyn", words=words, settings=settings, of_contacts={}, others=others)
 
 

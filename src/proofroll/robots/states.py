@@ -78,9 +78,9 @@ def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
     for joint in robot.moving:
         if joint.kind in ONE_COORDINATE:
             reach = np.pi if joint.kind == JointKind.REVOLUTE else 1.0
-            own = (-reach if joint.lower is None else joint.lower, reach if joint.upper is None else joint.upper)
-            near = (max(own[0], -reach), min(own[1], reach))
-            usable = (ends for ends in (near, own) if ends[0] < ends[1])
+            limits = (-reach if joint.lower is None else joint.lower, reach if joint.upper is None else joint.upper)
+            near = (max(limits[0], -reach), min(limits[1], reach))
+            usable = (ends for ends in (near, limits) if ends[0] < ends[1])
             angle[joint.name] = random.uniform(*next(usable, (-reach, reach)), count)
         else:
             rotation[joint.name] = np.asarray(Rotation.random(count, rng=random).as_matrix())

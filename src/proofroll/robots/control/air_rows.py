@@ -265,8 +265,8 @@ class AirTable:
         change[place][:3] += turning(v)
         size = (np.abs(v).max() or 1.0) / (np.abs(change).max() or 1.0)
         ends = (v + size * change, v - size * change)
-        after, before = (self.robot.forces(q, end)[1] + M[:, place][:, :3] @ turning(end) for end in ends)
-        return np.asarray((after - before) / (2 * size))
+        forces_after, forces_before = (self.robot.forces(q, end)[1] + M[:, place][:, :3] @ turning(end) for end in ends)
+        return np.asarray((forces_after - forces_before) / (2 * size))
 
     def rows(self, rows: Array, moving: MovingRates, scheme: StepScheme, *, central: bool) -> AirRows:
         """Forces at some rows.

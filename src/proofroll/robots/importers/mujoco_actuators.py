@@ -28,8 +28,8 @@ def is_off(model: Any, flag: str) -> bool:
 def reflected(model: Any, law: str, joint: int) -> float:
     """Armature or damping of all motors of a joint, reflected to it [kg m² or kg; N m s/rad or N s/m]."""
     of_joint = [index for index in range(len(model.actuator_gear)) if _joint(model, index) == joint]
-    own = getattr(model, f"actuator_{law}", None)  # MuJoCo has it from version 4 on
-    return 0.0 if own is None else float(model.actuator_gear[of_joint, 0] ** 2 @ own[of_joint])
+    values = getattr(model, f"actuator_{law}", None)  # MuJoCo has it from version 4 on
+    return 0.0 if values is None else float(model.actuator_gear[of_joint, 0] ** 2 @ values[of_joint])
 
 
 def _joint(model: Any, index: int) -> int:

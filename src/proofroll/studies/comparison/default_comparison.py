@@ -161,8 +161,8 @@ def own_engine(file: Path, scene: Scene, workers: Workers | None) -> tuple[OwnOp
     choices = [preset, without_contacts, {**without_contacts, **own_options.of_contacts}]
     usual, _, with_contacts = resolve([(own_options.engine, options) for options in choices], workers)
     taken = choices[1 if isinstance(with_contacts, InputError) else 2]
-    known = usual.settings if isinstance(usual, EngineFacts) else {}
-    unusual = {key: value for key, value in taken.items() if key in preset or str(known.get(key, value)) != value}
+    defaults = usual.settings if isinstance(usual, EngineFacts) else {}
+    unusual = {key: value for key, value in taken.items() if key in preset or str(defaults.get(key, value)) != value}
     return own_options, str(EngineSpec(own_options.engine, unusual))
 
 

@@ -144,8 +144,8 @@ class LawRecorder:
             elif isinstance(contact, JointContact):
                 joint = contact.joint.number
                 unit = units.force if m.joints[joint].kind == JointKind.PRISMATIC else self._moment
-                along = pieces.stops[0, 0, joint] if contact.side else pieces.friction[0, 0, joint : joint + 1]
-                along[1 if contact.side < 0 else 0] = unit * float(force @ contact.direction)
+                efforts = pieces.stops[0, 0, joint] if contact.side else pieces.friction[0, 0, joint : joint + 1]
+                efforts[1 if contact.side < 0 else 0] = unit * float(force @ contact.direction)
         pieces.force[0, 0] = forces[:count] * units.force
         for k, touch in enumerate(touching[:count]):
             pieces.place[0, 0, k], pieces.normal[0, 0, k] = touch.place * units.length, touch.normal

@@ -439,8 +439,8 @@ class ContactDynamics:
 
         moved = np.abs(summed(np.moveaxis(solution.undetermined, 2, 0))).max(axis=0, initial=0.0)
         sums = np.where(moved <= RANK, summed(pressed), np.nan)
-        known = np.where(solution.determinate, solution.force, np.nan)
-        return fields, with_moments(known[:count], self.turning, known[count + len(self._of_joints) :]), sums
+        forces = np.where(solution.determinate, solution.force, np.nan)
+        return fields, with_moments(forces[:count], self.turning, forces[count + len(self._of_joints) :]), sums
 
     def _borne(self, state: ContactsNow, shift: Array) -> Array:
         """Part of a change of all forces, (contacts, 3), that friction against turning can bear about its axes."""
