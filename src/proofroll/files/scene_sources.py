@@ -7,12 +7,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from proofroll.core.entry_points import loaded
 from proofroll.core.errors import InputError
 
 GROUP = "proofroll.scene_sources"
+# Entry points of functions of a path, such as ``own_options``, by the ending of their files without its dot.
+OPTIONS = "proofroll.option_readers"
 
 
 # Variable that names the folder of robot files and of all that they name, for a process and its workers.
@@ -157,13 +160,14 @@ class OwnOptions:
     others: list[str]
 
 
-@runtime_checkable
-class ReadsOptions(Protocol):
-    """Ability of a reader whose files have options of an engine."""
+def options_of(path: Path) -> OwnOptions | None:
+    """Options of an engine in a person's own file; None: no reader knows its ending, or its format has none.
 
-    @staticmethod
-    def own_options(path: Path) -> OwnOptions | None:
-        """Options of a file; None: its format has none. Raises InputError if it has none that can be compared."""
+    Raises:
+        InputError: the file has no options that can be compared.
+    """
+    readers = loaded(OPTIONS, of=FunctionType, name=path.suffix.removeprefix(".").lower()) if path.suffix else []
+    return next((reader(path) for _, reader in readers), None)
 
 
 @dataclass(frozen=True)

@@ -51,11 +51,6 @@ class RobotScenes:
         return ControlledScenes(control)
 
     @staticmethod
-    def own_options(path: Path) -> OwnOptions | None:
-        """See :class:`proofroll.files.scene_sources.ReadsOptions`."""
-        return own_options(path)
-
-    @staticmethod
     def content(path: Path) -> dict[str, Any]:
         """Title, source and parameters of a robot's scene."""
         file, robot = read_robot(path, "fixed")

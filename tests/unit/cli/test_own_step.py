@@ -11,7 +11,7 @@ import pytest
 from robot_templates import urdf
 
 from proofroll.core.errors import InputError
-from proofroll.files.scene_sources import ReadsOptions, source_of
+from proofroll.files.scene_sources import options_of
 from proofroll.studies.comparison.default_comparison import default_comparison
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -36,20 +36,17 @@ def model(tmp_path: Path) -> Callable[[str], Path]:
 
 def test_options_of_a_model_are_settings(model: Callable[[str], Path]) -> None:
     """Integrator, step and cone are read, MuJoCo's own where the file has none; other options are named."""
-    source = source_of(str(model("timestep='0.004' integrator='RK4' solver='CG' iterations='7'")))
-    assert source is not None
-    reader, path = source
-    assert isinstance(reader, ReadsOptions)
-    own = reader.own_options(path)
+    own = options_of(model("timestep='0.004' integrator='RK4' solver='CG' iterations='7'"))
+    assert own is not None
     assert (own.engine, own.settings) == ("mujoco", {"integrator": "RK4", "dt": "0.004"})
     assert own.of_contacts == {"cone": "pyramidal"}
     assert (own.words, own.others) == ("RK4, dt 4e-3 s", ["7 iterations", "solver CG"])
-    assert reader.own_options(model("")).settings == {"integrator": "Euler", "dt": "0.002"}
+    assert options_of(model("")).settings == {"integrator": "Euler", "dt": "0.002"}
     softened = "<flag refsafe='disable'/></option><default><joint solreffriction='0.03 1'/></default><option"
-    others = reader.own_options(model(f"noslip_iterations='3'>{softened}")).others
+    others = options_of(model(f"noslip_iterations='3'>{softened}")).others
     assert others == ["noslip_iterations 3", "flag refsafe", "solreffriction of 1 joint"]
     with pytest.raises(InputError, match="integrator is none that can be compared; choose Euler, RK4, implicitfast"):
-        reader.own_options(model("integrator='implicit'"))
+        options_of(model("integrator='implicit'"))
 
 
 def test_another_file_is_no_model(proofroll: Proofroll, tmp_path: Path) -> None:
@@ -57,7 +54,7 @@ def test_another_file_is_no_model(proofroll: Proofroll, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("dt = 2e-3")
     code, out, err = proofroll("compare", "pendulum", "--like", str(tmp_path / "mine.txt"), "--out", str(tmp_path))
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "give the path of your own MuJoCo model, *.xml" in err
+    assert "give the path of your own model or program of an engine, *.py or *.xml" in err
     err = proofroll("compare", "pendulum", "--like", str(tmp_path / "none.xml"), "--out", str(tmp_path))[2]
     assert "there is no such file" in err
 

@@ -8,6 +8,7 @@ from typing import Any
 from proofroll.core.bounds import require_bounds
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.engine_abilities import offered
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.multi_element import represents
 from proofroll.core.observable import Role
@@ -15,9 +16,8 @@ from proofroll.core.plugins import EngineSpec, engine_names, parse_engine, requi
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.verdict import Verdict
-from proofroll.files import exudyn_program
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
-from proofroll.files.scene_sources import OwnOptions, ReadsOptions, source_of
+from proofroll.files.scene_sources import OPTIONS, OwnOptions, options_of, parts_of, source_of
 from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.engine_questions import describe_each, resolve
 from proofroll.running.idle_workers import Workers
@@ -145,14 +145,11 @@ def own_engine(file: Path, scene: Scene, workers: Workers | None) -> tuple[OwnOp
     Raises:
         InputError: the file has no options that can be compared, or no formulation represents the scene.
     """
-    source = source_of(str(file))
-    own_options = source[0].own_options(file) if source is not None and isinstance(source[0], ReadsOptions) else None
-    if file.suffix == ".py" and file.is_file():
-        own_options = exudyn_program.own_options(file)
-    if own_options is None:
-        models = "give the path of your own MuJoCo model, *.xml, or Exudyn program, *.py"
-        advice = models if file.is_file() else "there is no such file"
-        raise InputError("--like", file, advice)
+    if not file.is_file():
+        raise InputError("--like", file, "there is no such file")
+    if (own_options := options_of(file)) is None:
+        endings = " or ".join(f"*.{point.name}" for point in announced(OPTIONS))
+        raise InputError("--like", file, f"give the path of your own model or program of an engine, {endings}")
     formulations = able(scene, workers, names=[own_options.engine])
     if not formulations:
         raise InputError("--like", file, f"no formulation of {own_options.engine} represents {scene.name}")
@@ -168,13 +165,12 @@ def own_engine(file: Path, scene: Scene, workers: Workers | None) -> tuple[OwnOp
 
 def _own_rows(name: str, scene: Scene, workers: Workers | None) -> tuple[list[Row], dict[str, str]]:
     """Row of the engine's options in the file of a scene, if its format has any; or the reason why there is none."""
-    source = source_of(name)
-    if source is None or not isinstance(source[0], ReadsOptions):
+    if source_of(name) is None or parts_of(name)[1]:  # no file of its own, or a controller beside it
         return [], {}
     try:
-        if source[0].own_options(source[1]) is None:
+        if options_of(Path(name)) is None:
             return [], {}
-        own_options, engine = own_engine(source[1], scene, workers)
+        own_options, engine = own_engine(Path(name), scene, workers)
     except InputError as error:
         return [], {"the file's own options": error.advice}
     but = f", but for {', '.join(own_options.others)}" if own_options.others else ""
