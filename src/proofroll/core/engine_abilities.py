@@ -166,6 +166,25 @@ class TellsLines(Protocol):
         """Lines of the engine's own file or program that make the settings; a comment for what none can set."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class OwnOptions:
+    """Options of an engine in a person's own file, as settings of its adapter.
+
+    Attributes:
+        engine: name of the engine.
+        words: options for a reader.
+        settings: setting -> its value, as text.
+        of_contacts: further settings, of formulations that have contacts.
+        others: clauses on options that the adapter sets otherwise.
+    """
+
+    engine: str
+    words: str
+    settings: Mapping[str, str]
+    of_contacts: Mapping[str, str]
+    others: list[str]
+
+
 def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:
     """Order of convergence for a scene: the declared one, or the lowest that a required capability causes.
 

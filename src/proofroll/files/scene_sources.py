@@ -10,6 +10,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
+from proofroll.core.engine_abilities import OwnOptions
 from proofroll.core.entry_points import loaded
 from proofroll.core.errors import InputError
 
@@ -139,25 +140,6 @@ class JudgesRecords(Protocol):
         Raises:
             InputError: a file is wrong, or they do not fit.
         """
-
-
-@dataclass(frozen=True, kw_only=True)
-class OwnOptions:
-    """Options of an engine in a person's own file, as settings of its adapter.
-
-    Attributes:
-        engine: name of the engine.
-        words: options for a reader.
-        settings: setting -> its value, as text.
-        of_contacts: further settings, of formulations that have contacts.
-        others: clauses on options that the adapter sets otherwise.
-    """
-
-    engine: str
-    words: str
-    settings: Mapping[str, str]
-    of_contacts: Mapping[str, str]
-    others: list[str]
 
 
 def options_of(path: Path) -> OwnOptions | None:

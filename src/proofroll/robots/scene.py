@@ -12,9 +12,9 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
+from proofroll.core.engine_abilities import OwnOptions
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, number
-from proofroll.files.scene_sources import OwnOptions
 from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.opening import BASES

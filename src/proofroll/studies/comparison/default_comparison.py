@@ -7,7 +7,7 @@ from typing import Any
 
 from proofroll.core.bounds import require_bounds
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
-from proofroll.core.engine_abilities import offered
+from proofroll.core.engine_abilities import OwnOptions, offered
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.multi_element import represents
@@ -17,7 +17,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
-from proofroll.files.scene_sources import OPTIONS, OwnOptions, options_of, parts_of, source_of
+from proofroll.files.scene_sources import OPTIONS, options_of, parts_of, source_of
 from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.engine_questions import describe_each, resolve
 from proofroll.running.idle_workers import Workers

@@ -9,9 +9,10 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from proofroll.core.engine_abilities import OwnOptions
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import number
-from proofroll.files.scene_sources import OwnOptions
+from proofroll.engines.exudyn.settings import EXPLICIT, OWN
 
 _OPERATIONS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -21,12 +22,14 @@ _FUNCTIONS: Mapping[str, Callable[[float], float]] = {
     "int": int, "float": float, "round": round, "ceil": math.ceil, "floor": math.floor,
 }  # fmt: skip
 # Exudyn's own values of what a program leaves out [s, 1].
-_OWN = {"numberOfSteps": 100.0, "endTime": 1.0, "spectralRadius": 0.9, "relativeTolerance": 1e-8}
+_OWN = {
+    "numberOfSteps": 100.0, "endTime": 1.0, "spectralRadius": OWN["spectral_radius"],
+    "relativeTolerance": OWN["newton_tolerance"],
+}  # fmt: skip
 # Solver types that the adapter has, as it names them; explicit ones move its kinematic tree.
 _SOLVERS = {
     "GeneralizedAlpha": "generalized_alpha", "TrapezoidalIndex2": "trapezoidal_index2", "RK44": "rk44", "RK67": "rk67",
 }  # fmt: skip
-_EXPLICIT = ("rk44", "rk67")
 # Options of exu.SimulationSettings() that are read, by their last name.
 _READ = (*_OWN, "useNewmark", "adaptiveStep")
 
@@ -54,14 +57,14 @@ def own_options(path: Path) -> OwnOptions:
     step = options["endTime"] / max(options["numberOfSteps"], 1.0)
     settings = {"integrator": integrator, "dt": f"{step:.12g}"}
     words = f"{solver}, dt {number(step, 3)} s"
-    if integrator in _EXPLICIT:
+    if integrator in EXPLICIT:
         settings["formulation"] = "tree"
     else:
         settings["newton_tolerance"] = repr(options["relativeTolerance"])
     if integrator == "generalized_alpha":
         settings["spectral_radius"] = repr(options["spectralRadius"])
         words += f", spectral radius {number(options['spectralRadius'])}"
-    others = ["the adaptive step"] if values.get("adaptiveStep", 1.0) and integrator not in _EXPLICIT else []
+    others = ["the adaptive step"] if values.get("adaptiveStep", 1.0) and integrator not in EXPLICIT else []
     return OwnOptions(engine="exudyn", words=words, settings=settings, of_contacts={}, others=others)
 
 

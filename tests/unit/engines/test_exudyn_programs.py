@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.files.exudyn_program import own_options
+from proofroll.engines.exudyn.own_program import own_options
 
 PROGRAM = """
 import exudyn as exu
