@@ -115,7 +115,7 @@ class ControlledScenes:
         """
         controller = read_controller(self._path)
         file, robot = self._robot(path, controller, _base(controller, int(values["ground"])))
-        tables = self._tables(file, robot, controller, values)
+        tables = self._tables(file, robot, controller, values, always=bool(values["ground"]))
         return self._grounded(file, robot, controller, tables, GROUNDS[int(values["ground"])])
 
     def of_record(self, path: Path, *, free: bool) -> RecordedRobot:
