@@ -23,6 +23,7 @@ from proofroll.core.errors import Missing, Refused
 from proofroll.core.events import JUMPS, Event, with_events
 from proofroll.core.multi_element import copied, events_of_engine, watch_events
 from proofroll.core.number_format import number
+from proofroll.core.observable import Role
 from proofroll.core.pace import PACE
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
@@ -62,9 +63,11 @@ def reference_by_steps(element: MechanismElement, times: FloatArray) -> xr.Datas
     for event in events:
         if event.kind in JUMPS:
             beside |= (event.time_low <= times) & (times <= event.time_high)
+    # a force of a step is its impulse over its length: beside a touch no two steps have the same
+    reactions = {item.name for item in element.observables if item.role is Role.REACTION}
     variables = {}
     for name, item in fine.columns.variables.items():
-        bar = _bar(name, coarse.columns.variables[name], item, beside)
+        bar = math.inf if name in reactions else _bar(name, coarse.columns.variables[name], item, beside)
         variables[name] = item if bar is None else item._replace(attrs={**item.attrs, "error_bar": bar})
     words = ", ".join(number(run.step, 3) for run in runs)
     attrs = {
@@ -119,7 +122,7 @@ def _run(element: MechanismElement, times: FloatArray, step: float) -> _Run:
 
 
 def _bar(name: str, coarse: Variable, fine: Variable, beside: npt.NDArray[np.bool_]) -> float | None:
-    """Error bar of a variable; samples ``beside`` an impact do not count for what jumps there. None: it has no times."""
+    """Error bar of a variable; None: it has no times. Samples ``beside`` an impact do not count for jumps."""
     if name == "time" or fine.dims[:1] != ("time",) or fine.values.dtype.kind != "f":
         return None
     change = np.abs(fine.values - coarse.values)

@@ -240,9 +240,7 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
             else:
                 wrong.append(f"{names} ({reasons[0]})")
             continue
-        ends = [
-            shape.table(pair.margin if place == pair.grown else 0.0) for place, shape in enumerate(pair.shapes)
-        ]
+        ends = [shape.table(pair.margin if place == pair.grown else 0.0) for place, shape in enumerate(pair.shapes)]
         geometries |= {end["name"]: end for end in ends}
         rows.append({"name": f"{ends[0]['name']} on {ends[1]['name']}", "geometries": [end["name"] for end in ends]})
         rows[-1] |= pair.table(friction)
@@ -250,7 +248,9 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
         more = f" and {counted(len(wrong) - 1, 'other pairs')}" if len(wrong) > 1 else ""
         raise InputError("ground", file.path, f"a scene has no contact of {wrong[0]}{more}; {_ANOTHER_WAY}")
     if not rows:
-        advice = "no shape of it comes near a floor or another shape within a second; give [ground] feet = {LINK = radius}"
+        advice = (
+            "no shape of it comes near a floor or another shape within a second; give [ground] feet = {LINK = radius}"
+        )
         raise InputError("ground", file.path, f"{advice}, or take --ground plane")
     return GroundTables(list(geometries.values()), rows, _about(geometries, rows), left_out)
 

@@ -97,9 +97,7 @@ def _compiled(path: Path, base_joint: str, *, floor: bool) -> Any:
     return spec.compile()
 
 
-def _put(
-    model: Any, data: Any, start: Mapping[str, Sequence[float]], servos: Mapping[str, Sequence[float]]
-) -> None:
+def _put(model: Any, data: Any, start: Mapping[str, Sequence[float]], servos: Mapping[str, Sequence[float]]) -> None:
     """Sets the start, and the springs and dampers of joints in place of actuators."""
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)

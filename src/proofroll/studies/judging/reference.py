@@ -132,6 +132,12 @@ class Reference:
         """Engine and formulation, as a setting, whose finer and finer steps lead to this; empty: it is a truth."""
         return str(self.dataset.attrs.get(BY_STEPS, ""))
 
+    def tells(self, name: str, tolerance: float) -> bool:
+        """True if the error bar of an observable is within a tolerance, in its unit."""
+        if name not in self.curves:
+            return False
+        return self.true(name, self.curves[name]).error_bar <= tolerance
+
     @property
     def ended(self) -> str:
         """Clause on the time and reason of an early end of the truth, behind which nothing is judged; or empty."""

@@ -1,8 +1,8 @@
 """Impulses of a step by blocks: Gauss-Seidel over contacts with their exact cones, dry friction and stops of joints.
 
-It takes Pinocchio's matrices, and finds impulses where Pinocchio's own solvers stop, as with dry friction in joints. Each
-block is solved exactly for the impulses of the others: a contact sticks, or slips along a direction that is the root of
-one equation.
+It takes Pinocchio's matrices, and finds impulses where Pinocchio's own solvers stop, as with dry friction in joints.
+Each block is solved exactly for the impulses of the others: a contact sticks, or slips along a direction that is the
+root of one equation.
 """
 
 from __future__ import annotations
@@ -71,7 +71,9 @@ def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array
             if any(steps):
                 u += steps @ G[rows]
                 f[rows] = new
-                changed = max(changed, *(abs(step * row[k]) for k, (step, row) in enumerate(zip(steps, own, strict=True))))
+                changed = max(
+                    changed, *(abs(step * row[k]) for k, (step, row) in enumerate(zip(steps, own, strict=True)))
+                )
         if not changed > _SETTLED * speed:
             break
     return f, changed / speed
@@ -118,9 +120,7 @@ def _sticking(G: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[float, 
     )
 
 
-def _slipping(
-    G: Sequence[Sequence[float]], b: Sequence[float], mu: float, angle: float
-) -> tuple[list[float], float]:
+def _slipping(G: Sequence[Sequence[float]], b: Sequence[float], mu: float, angle: float) -> tuple[list[float], float]:
     """Impulse N (-mu cos, -mu sin, 1) of a slip in the direction of an angle near this one, and the slip across it.
 
     N stops the approach; the direction is that of the slip that is left. The slip across is inf where none is found.
