@@ -40,7 +40,7 @@ _ON_STEP = 1e-6  # part of a step by which a time may be beside its end
 
 
 @dataclass(frozen=True)
-class _Run:
+class _SteppedRun:
     """Run with one step: its variables at the times that were asked for, and the events."""
 
     step: float
@@ -86,7 +86,7 @@ def _steps(element: MechanismElement) -> list[float]:
     return [longest / 2**rung for rung in range(_RUNGS)]
 
 
-def _run(element: MechanismElement, times: FloatArray, step: float) -> _Run:
+def _run(element: MechanismElement, times: FloatArray, step: float) -> _SteppedRun:
     """Run of a mechanism with one step; between two steps its variables are interpolated."""
     scene = Scene(name=element.name, title=element.name, elements=(element,))
     try:
@@ -118,7 +118,9 @@ def _run(element: MechanismElement, times: FloatArray, step: float) -> _Run:
         between = item.values[first] + weight * (item.values[last] - item.values[first])
         variables[name] = item._replace(values=times if name == "time" else between)
     found = events_of_engine(engine, element) or ()
-    return _Run(step, Columns(variables, columns.attrs), tuple(event for event in found if event.time <= times[-1]))
+    return _SteppedRun(
+        step, Columns(variables, columns.attrs), tuple(event for event in found if event.time <= times[-1])
+    )
 
 
 def _bar(name: str, coarse: Variable, fine: Variable, beside: npt.NDArray[np.bool_]) -> float | None:
