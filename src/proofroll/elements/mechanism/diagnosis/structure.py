@@ -8,12 +8,13 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis.fitting import Residuals, Row
 from proofroll.core.diagnosis.lines import differing, scale_of
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import InputError
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of, stretch
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED, residuals_of
+from proofroll.elements.mechanism.diagnosis.residuals import COVERED, by_rows
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
@@ -178,26 +179,21 @@ _OPEN = 1e-4
 _BALANCED = 1e-3
 
 
-@hypothesis(
+@by_rows(
     "tree out of order",
     "the equations balance without the terms that an algorithm for depth-first order loses",
 )
-def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: the mass matrix lacks terms between a body and its descendants."""
-    mechanism = evidence.element.mechanism
+def lost_coupling(evidence: Evidence, _: Residuals[Change]) -> Iterator[Row[Change]]:
+    """Rows: the mass matrix lacks terms between a body and its descendants, all or one pair."""
+    mechanism: Mechanism = evidence.element.mechanism
     pairs = _ancestry(mechanism)
-    if not np.any(pairs):
-        return
     says = "the mass matrix lacks terms between a body and those that hang on it, as when a tree is not depth-first"
     remedy = "add bodies depth-first, or take the mass matrix from an algorithm that does not need that order"
-    for residuals in residuals_of(evidence):
-        singles = []
-        for row, column in np.argwhere(np.triu(pairs)):
-            single = np.zeros_like(pairs)
-            single[row, column] = single[column, row] = 1.0
-            singles.append(single)
-        for lost in [pairs, *singles]:
-            yield residuals.cause("tree out of order", says, Change(mechanism, coupling=lost), remedy, 0)
+    singles = [np.zeros_like(pairs) for _ in range(int(np.sum(pairs)) // 2)]
+    for single, (row, column) in zip(singles, np.argwhere(np.triu(pairs)), strict=True):
+        single[row, column] = single[column, row] = 1.0
+    for lost in [pairs, *singles] if singles else ():
+        yield Row("tree out of order", says, Change(mechanism, coupling=lost), remedy)
 
 
 def _ancestry(mechanism: Mechanism) -> FloatArray:
