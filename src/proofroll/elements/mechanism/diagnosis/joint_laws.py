@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import CLOSES_EXACTLY, Cause, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis import CLOSES_EXACTLY, Cause, Difference, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.fitting import Residuals, Row, change_by, least_squares_parameter
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import EventKind, events_of
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, is_one_motion, of_start, placed_of
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED, by_rows
+from proofroll.elements.mechanism.diagnosis.residuals import MOTION, by_rows
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
@@ -21,7 +21,7 @@ from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.signal import value_at
 
 Effort = Callable[[Actuator, float, float, float], float]
-_COVERS = ("motion", *COVERED, "effort")
+_COVERS = (*MOTION, "effort")
 _UNLIMITED = "has no limit on the efforts of actuators"
 _STILL = 1e-9
 _AT_STOP = 1e-3  # largest distance from a stop of rebounds found by parabolas, relative to the joint's range
@@ -139,19 +139,10 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
         says = f"the coupling {coupling.name} has the ratio {ratio:.6g}, not {ratio_true:.6g}"
         remedy = "the scene's ratio is that of joint_b's rate to joint_a's"
         name = "accelerations at time 0" if alone else f"rate of {coupling.joint_b} by its coupling"
-        what = name, "1/s^2" if alone else "1/s", difference, remainder
+        off = Difference(name, "1/s^2" if alone else "1/s", difference, _COVERS)
         change = np.inf if remainder <= CLOSES_EXACTLY * difference else change_by(ratio / ratio_true)
         count = len(moving[0]) if alone else None
-        yield Cause(
-            f"ratio of {coupling.name}",
-            says,
-            *what,
-            remedy=remedy,
-            fitted=1,
-            covers=_COVERS,
-            explains=count,
-            change=change,
-        )
+        yield off.cause(f"ratio of {coupling.name}", says, remainder, remedy, 1, explains=count, change=change)
 
 
 @hypothesis(
@@ -202,10 +193,8 @@ def soft_couplings(evidence: Evidence) -> Iterator[Cause]:
             f"make the couplings stiffer (their impedance is {1 / (1 + part):.4g}; 1 is rigid), give light joints an "
             "armature, or relate heavy joints by one coupling without the light ones"
         )
-        what = "accelerations at time 0", "1/s^2", difference, remainder
-        yield Cause(
-            "soft couplings", says, *what, remedy=remedy, fitted=1, covers=_COVERS, explains=len(rates), change=part
-        )
+        off = Difference("accelerations at time 0", "1/s^2", difference, _COVERS)
+        yield off.cause("soft couplings", says, remainder, remedy, 1, explains=len(rates), change=part)
         return
 
 
@@ -274,18 +263,9 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
                 count = 2  # place and rate
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
-            unit = joint.unit
-            what, change = (f"{joint.name} at its stop", unit, difference, remainder), abs(shift) / size
-            yield Cause(
-                f"stop of {joint.name}",
-                says,
-                *what,
-                remedy=remedy,
-                fitted=1,
-                covers=_COVERS,
-                explains=count,
-                change=change,
-            )
+            at_stop = Difference(f"{joint.name} at its stop", joint.unit, difference, _COVERS)
+            name, change = f"stop of {joint.name}", abs(shift) / size
+            yield at_stop.cause(name, says, remainder, remedy, 1, explains=count, change=change)
 
 
 @hypothesis(
@@ -332,21 +312,13 @@ def soft_stops(evidence: Evidence) -> Iterator[Cause]:
                 f"where its stops are {high - low:.2g} {joint.unit} apart, and throws it back at "
                 f"{abs(v[first, rated]):.2g} {joint.unit}/s"
             )
-            yield Cause(
-                id=f"soft stop of {joint.name}",
-                says=says,
-                quantity=f"{joint.name} between its stops",
-                unit=joint.unit,
-                before=float(off[flight].max()),
-                after=float(
-                    np.abs(q[flight, place] - expected).max() + off[times[: flight.stop] < hits[joint.name]].max()
-                ),
-                remedy="make the stop stiffer, or slow the joint down: a stop of no width is none for a soft one",
-                fitted=2,
-                covers=_COVERS,
-                explains=len(expected) - 1,
-                change=abs(v[first, rated]) / float(np.abs(v[:first, rated]).max()),
-            )
+            earlier = float(off[times[: flight.stop] < hits[joint.name]].max())
+            remainder = float(np.abs(q[flight, place] - expected).max()) + earlier
+            remedy = "make the stop stiffer, or slow the joint down: a stop of no width is none for a soft one"
+            change = abs(v[first, rated]) / float(np.abs(v[:first, rated]).max())
+            name, count = f"soft stop of {joint.name}", len(expected) - 1
+            between = Difference(f"{joint.name} between its stops", joint.unit, float(off[flight].max()), _COVERS)
+            yield between.cause(name, says, remainder, remedy, 2, explains=count, change=change)
             break
 
 

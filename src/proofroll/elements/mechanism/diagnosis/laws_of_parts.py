@@ -7,12 +7,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis import Cause, Difference, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.fitting import Residuals, Row
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.pressing import Resisting
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED, by_rows
+from proofroll.elements.mechanism.diagnosis.residuals import MOTION, by_rows
 from proofroll.elements.mechanism.scene.bushing import Bushing, Six
 from proofroll.elements.mechanism.scene.checks import WORLD, ZERO
 from proofroll.elements.mechanism.scene.joint import Joint
@@ -23,7 +23,7 @@ from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.rotations import Array, to_rpy
 from proofroll.elements.mechanism.scene.signal import delayed, varies
 
-_COVERS = ("motion", *COVERED, "drive")
+_COVERS = (*MOTION, "drive")
 _DEGREE = np.pi / 180
 _DEPENDENT = 1e-6  # relative singular value of a direction along which a force may be moved without effect
 
@@ -57,17 +57,8 @@ def of_motions(evidence: Evidence) -> Iterator[Cause]:
             continue
         for says, factor, delay, remedy in _mistakes(joint, evidence.step):
             remainder = float(np.max(np.abs(values - _values(joint, factor, delay, times)[part])))
-            yield Cause(
-                id=f"motion of {joint.name}",
-                says=f"the motion of {joint.name} {says}",
-                quantity=what,
-                unit=units,
-                before=difference,
-                after=remainder,
-                remedy=remedy,
-                fitted=0,
-                covers=_COVERS,
-            )
+            name = f"motion of {joint.name}"
+            yield Difference(what, units, difference, _COVERS).cause(name, f"the {name} {says}", remainder, remedy)
 
 
 def _values(joint: Joint, factor: float, delay: float, times: FloatArray) -> FloatArray:

@@ -186,7 +186,7 @@ def of_each_joint(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[
         numbers = np.array([getattr(joint, law) for joint in mechanism.joints for _ in range(joint.nv)])
 
         def more(value: FloatArray, which: FloatArray = which, law: str = law) -> Change:
-            return Change(mechanism, **{f"added_{law}": value[0] * which})  # type: ignore[arg-type]  # by its name
+            return Change(mechanism, **{f"added_{law}": value[0] * which})
 
         value = residuals.numbers_of(more, 1)
         if value[0] and np.all(numbers + value[0] * which >= 0):

@@ -23,7 +23,9 @@ from proofroll.elements.mechanism.diagnosis.equations import (
 
 # Equations with a larger relative residual for the true run prove nothing.
 _TELLS = 1e-4
+# Quantities that follow from built numbers, and from the motion.
 COVERED = ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque")
+MOTION = ("motion", *COVERED)
 # Quantities of the certificate that follow from the motion.
 _FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for when in ("", OF_FIRST_STEPS)}
 
@@ -147,15 +149,13 @@ def _residuals_at(
     def left(change: Change | None) -> FloatArray:
         return np.asarray(states.left(change or plain)[tells])
 
-    quantity = f"balance of the equations of motion {place}, relative,"
-    covers = ("motion", *COVERED)
     return Residuals(
         left=left,
-        quantity=quantity,
+        quantity=f"balance of the equations of motion {place}, relative,",
         unit="1",
         before=difference,
         closes=closes,
-        covers=covers,
+        covers=MOTION,
         plain=plain,
         others=lambda: _others(plain),
         contradicted=contradicted,
