@@ -31,6 +31,7 @@ def run(
     settings: options.Set = None,
     _root: options.Root = None,
     control: options.Control = None,
+    ground: options.Ground = None,
     until: options.Until = None,
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default 0.01, or near it in whole steps.")
@@ -70,6 +71,7 @@ def run(
     from proofroll.running.engine_questions import prepare
     from proofroll.running.idle_workers import Workers
 
+    settings = options.with_ground(settings, control, ground)
     question, scene = scene, options.controlled(scene, control)
     if matrices:
         _show_matrices(scene, engine, options.assignments(settings), as_json)
