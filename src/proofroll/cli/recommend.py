@@ -148,9 +148,9 @@ def _answer(
                 f"searching {', '.join(names)} in {place}: at most {WHOLE.engine:g} s of processor time each"
             )
 
-    def tell(item: EngineAnswer) -> None:
+    def tell(item: EngineAnswer, until: float) -> None:
         if not quiet:
-            options.complain(sentence(item, question.until))
+            options.complain(sentence(item, until))
 
     with options.progress_bar(f"{question.scene}: the truth") as advance:
         (made,) = answer(question, [asked], engines, runner, begin, tell, lambda engine: advance(f"runs of {engine}"))

@@ -10,10 +10,35 @@ import numpy as np
 from proofroll.robots.hypotheses import LEAST, WRITE_INERTIALS, RobotEvidence, hypothesis, with_weightless
 from proofroll.robots.model import Array, Robot, RobotBody
 
+# Attributes of the <inertia> of a URDF; its specification requires all.
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def incomplete_inertias(root: Element) -> dict[str, list[str]]:
+    """Links of a URDF whose <inertia> lacks attributes, each with those that it lacks."""
+    lacking = {
+        str(link.get("name")): [name for name in _MOMENTS if moments.get(name) is None]
+        for link in root.findall("link")
+        for moments in link.findall("inertial/inertia")
+    }
+    return {name: missing for name, missing in lacking.items() if missing}
+
+
+@hypothesis({"pinocchio": "4.1.0"}, "write all of ixx, ixy, ixz, iyy, iyz, izz, also those that are zero")
+def incomplete_inertia_zeroed(evidence: RobotEvidence) -> Robot | None:
+    """An <inertia> that lacks one of its six attributes is read as zero."""
+    bodies = evidence.robot.bodies
+    names = [name for name in incomplete_inertias(evidence.root) if name in bodies and np.any(bodies[name].inertia)]
+    zeroed = [dataclasses.replace(bodies[name], inertia=np.zeros((3, 3))) for name in names]
+    return evidence.robot.with_bodies(zeroed) if zeroed else None
+
 
 def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
-    """Bodies whose inertia differs in the engine and may count as impossible there, by whatever rule."""
-    robot, reading = evidence.robot, evidence.reading
+    """Bodies whose inertia differs in the engine and may count as impossible there, by whatever rule.
+
+    One that is written incompletely is possible as far as it is known.
+    """
+    robot, reading, incomplete = evidence.robot, evidence.reading, incomplete_inertias(evidence.root)
     scale = max((float(np.abs(group.inertia).max()) for group in robot.groups.values()), default=1.0)
     unlike = {
         name
@@ -25,7 +50,8 @@ def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
         alone = sum(carrier == home for carrier, _, _ in robot.welded.values()) == 1
         if body is not None and home in unlike:
             impossible = body.breaks_triangle or body.moments[0] <= 0
-            if alone or (impossible and np.any(body.inertia)) or (not body.mass and np.any(body.inertia)):
+            suspect = alone or (impossible and np.any(body.inertia)) or (not body.mass and np.any(body.inertia))
+            if suspect and (impossible or name not in incomplete):
                 yield body
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray, cross, known_difference, longest
-from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
+from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import delay_text, in_steps
 from proofroll.core.diagnosis.fitting import factor_text, known_factor, least_squares_parameter
 from proofroll.core.diagnosis.vectors import ReportedVector
@@ -115,8 +115,8 @@ def _along_earlier_normals(vector: ReportedVector, touch: SeenContact, finite: N
     says = f"contact_forces are along the normal of {moment} {'before' if delay > 0 else 'later'}"
     remedy, change = "take the normal where the bodies are when the force is read", in_steps(delay, touch.evidence.step)
     remainder = known_difference(vector.reported, turned(delay))
-    proof = f"stale normal.{vector.name}", says, vector.name, vector.unit, vector.before, remainder, remedy
-    yield Cause(*proof, fitted=1, change=change)
+    off = Difference(vector.name, vector.unit, vector.before)
+    yield off.cause(f"stale normal.{vector.name}", says, remainder, remedy, 1, change=change)
 
 
 REPORTED_FORCES = (contact_forces, forces_at_start)
