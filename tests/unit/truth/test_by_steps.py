@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from proofroll import Refused, simulate
-from proofroll.core.dataset import BY_STEPS
+from proofroll.core.dataset import BY_STEPS, ENDS, HORIZON
 from proofroll.core.errors import Missing
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
@@ -70,3 +71,31 @@ def test_without_its_engine_there_is_none(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(by_steps, "load_engine", missing)
     with pytest.raises(Refused, match="contacts under held targets yet, and pinocchio is not installed"):
         simulate(hopper(held=True), until=0.01)
+
+
+@pytest.mark.parametrize(
+    ("apart", "change", "words", "end"),
+    [
+        ([0, 1e-4, 2e-4, 3e-4], [0, 0, 0, 0], "1 mm to the end, 10 mm to the end", None),
+        ([0, 5e-4, 5e-3, 9e-3], [0, 0, 0, 0], "1 mm until 0.1 s, 10 mm to the end", None),
+        ([0, 1e-4, 1e-4, 1e-4], [0, 5e-4, 5e-4, 5e-3], "1 mm until 0 s, 10 mm until 0.2 s", 0.3),
+        ([0, 1e-4, 2e-2, 3e-2], [0, 0, 0, 0], "1 mm until 0.1 s, 10 mm until 0.1 s", 0.2),
+    ],
+)
+def test_a_reference_ends_at_its_horizon(
+    apart: list[float], change: list[float], words: str, end: float | None
+) -> None:
+    """Where twins part by a centimetre, or shorter steps still change a third of it, nothing is judged any more."""
+    whole = xr.Dataset({"x": ("time", np.arange(4.0))}, coords={"time": 0.1 * np.arange(4)})
+    cut = by_steps._to_horizon(whole, np.array(apart), np.array(change))
+    assert words in cut.attrs[HORIZON]
+    assert cut.attrs.get(ENDS) == (None if end is None else pytest.approx(end))
+    assert cut.sizes["time"] == (4 if end is None else round(end / 0.1))
+
+
+@pytest.mark.drill
+def test_twins_of_a_pressed_ball_stay_together() -> None:
+    """Twins start a tenth of a millimetre apart and come to rest on the same floor."""
+    pytest.importorskip("mujoco")
+    attrs = simulate(hopper(held=True), until=0.05).attrs
+    assert "1 mm to the end, 10 mm to the end" in attrs[HORIZON]
