@@ -12,6 +12,7 @@ from proofroll.core.arrays import longest
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
+from proofroll.core.number_format import number
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -46,8 +47,8 @@ class ImpulseRun(MechanismRun):
     @override
     def advance(self, t: float) -> None:
         start, steps = self.steps.t, self.steps
-        for number in range(whole_steps(start, t, self._dt)):
-            steps.t = start + number * self._dt
+        for count in range(whole_steps(start, t, self._dt)):
+            steps.t = start + count * self._dt
             steps.step()
             if not np.isfinite(steps.v.sum()):
                 raise Diverged(f"the state is not finite at t = {steps.t:.6g} s")
@@ -100,7 +101,11 @@ class ImpulseRun(MechanismRun):
 
     def remarks(self) -> Sequence[str]:
         """See :class:`proofroll.core.engine_abilities.TellsRemarks`."""
-        return [_BLOCKS] if self.steps.blocks.solved else []
+        blocks = self.steps.blocks
+        if not blocks.solved:
+            return []
+        rough = blocks.worst > float(self._settings.solver_tolerance or 0.0)
+        return [f"{_BLOCKS}, to {number(blocks.worst, 1)} of the largest speed" if rough else _BLOCKS]
 
     def events(self) -> Sequence[Event] | None:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""

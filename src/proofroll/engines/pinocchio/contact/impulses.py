@@ -432,8 +432,7 @@ class ImpulseSteps:
             else:
                 rubs = k < count + len(rubbing)
                 parts[k] = Block(end - 1, None, span * rubbing[k - count].joint.friction if rubs else math.inf)
-        impulses = self.blocks.impulses(G, g, parts)
-        return self._found(which, G, g, terms, span, convex=convex) if impulses is None else impulses
+        return self.blocks.impulses(G, g, parts, lambda: self._found(which, G, g, terms, span, convex=convex))
 
     def _found(
         self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool
