@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable
@@ -20,10 +19,9 @@ from proofroll.core.controlled_engine import commanded
 from proofroll.core.dataset import BY_STEPS, CONTINUOUS, ENDED, ENDS, HORIZON, columns_of
 from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Diverged, Missing, Refused
-from proofroll.core.events import JUMPS, Event, with_events
+from proofroll.core.events import Event, with_events
 from proofroll.core.multi_element import copied, events_of_engine, watch_events
 from proofroll.core.number_format import number
-from proofroll.core.observable import Role
 from proofroll.core.pace import PACE
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
@@ -66,15 +64,9 @@ def reference_by_steps(element: MechanismElement, times: FloatArray) -> xr.Datas
     coarse, fine = runs[-2:]
     near = _SAFETY * coarse.step
     events = [replace(item, time_low=item.time_low - near, time_high=item.time_high + near) for item in fine.events]
-    beside = np.zeros(len(times), dtype=bool)
-    for event in events:
-        if event.kind in JUMPS:
-            beside |= (event.time_low <= times) & (times <= event.time_high)
-    # a force of a step is its impulse over its length: beside a touch no two steps have the same
-    reactions = {item.name for item in element.observables if item.role is Role.REACTION}
     variables = {}
     for name, item in fine.columns.variables.items():
-        bar = math.inf if name in reactions else _bar(name, coarse.columns.variables[name], item, beside)
+        bar = _bar(name, coarse.columns.variables[name], item)
         variables[name] = item if bar is None else item._replace(attrs={**item.attrs, "error_bar": bar})
     words = ", ".join(number(run.step, 3) for run in runs)
     attrs = {
@@ -180,14 +172,17 @@ def _run(
     )
 
 
-def _bar(name: str, coarse: Variable, fine: Variable, beside: npt.NDArray[np.bool_]) -> float | None:
-    """Error bar of a variable; None: it has no times. Samples ``beside`` an impact do not count for jumps."""
+def _bar(name: str, coarse: Variable, fine: Variable) -> float | None:
+    """Error bar of a variable; None: it has no times.
+
+    It is inf for velocities, forces and what follows from them: beside a touch no two steps have the same.
+    """
     if name == "time" or fine.dims[:1] != ("time",) or fine.values.dtype.kind != "f":
         return None
+    if fine.attrs.get("units") not in CONTINUOUS:
+        return math.inf
     change = np.abs(fine.values - coarse.values)
     if fine.dims[-1:] == ("wxyz",):  # of two signs of a quaternion
         change = np.minimum(change, np.abs(fine.values + coarse.values))
-    if fine.attrs.get("units") not in CONTINUOUS:
-        change = change[~beside]
     known = change[np.isfinite(change)]
     return _SAFETY * float(known.max(initial=0.0)) if known.size else math.inf

@@ -50,7 +50,8 @@ def test_the_reference_is_within_its_bar_of_the_truth() -> None:
     error = float(np.abs(truth["p_WB"].values - reference["p_WB"].values).max())
     bar = float(reference["p_WB"].attrs["error_bar"])
     assert 0 < error <= bar < 1e-3
-    assert np.isinf(reference["contact_forces"].attrs["error_bar"])
+    for name in ("v_WB", "contact_forces"):  # which no two steps have alike beside a touch
+        assert np.isinf(reference[name].attrs["error_bar"])
 
 
 def test_steps_lie_between_instants() -> None:
