@@ -158,9 +158,12 @@ def _run(scene: str) -> tuple[str, Any]:
     for key in ("ended", "ill_posed"):
         if found.attrs.get(key):
             return "refused", str(found.attrs[key])
-    return "values", {
-        str(name): (np.array(item.values), _bar(str(name), item, found)) for name, item in found.variables.items()
-    }
+    return "values", values_and_bars(found)
+
+
+def values_and_bars(found: Any) -> dict[str, Any]:
+    """Values and bar of each variable of a truth."""
+    return {str(name): (np.array(item.values), _bar(str(name), item, found)) for name, item in found.variables.items()}
 
 
 def _bar(name: str, item: Any, found: Any) -> float:

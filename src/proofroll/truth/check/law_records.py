@@ -119,7 +119,7 @@ class LawRecorder:
             turned = of_quaternion(quaternions)
         return np.concatenate([p, turned.reshape(*p.shape[:2], 9), v, w], -1).reshape(len(states), -1)
 
-    def _moving(self, of_bodies: Array) -> dict[str, Array]:
+    def _moving(self, of_bodies: Array) -> dict[str, Any]:
         """Poses and velocities in SI units, the world last, from values (pieces, points, bodies, 18)."""
         length, shape = self._units.length, of_bodies.shape[:2]
         world = np.broadcast_to(np.concatenate([np.zeros(3), np.eye(3).ravel(), np.zeros(6)]), (*shape, 1, 18))

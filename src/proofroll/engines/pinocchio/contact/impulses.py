@@ -22,6 +22,7 @@ from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK, States
 from proofroll.elements.mechanism.scene.rotations import Array, carried, frame_of_axis
+from proofroll.engines.pinocchio.contact.blocks import Block, impulses_by_blocks
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
 from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION, SolverParts, solver_of
 from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningImpulses
@@ -112,6 +113,7 @@ class ImpulseSteps:
         restitution: of each contact [1].
         events: of the contacts.
         joints: joint rows, numbered after the contacts.
+        by_blocks: number of problems of impulses solved by blocks, as Pinocchio's ADMM stopped at one.
     """
 
     def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
@@ -138,6 +140,7 @@ class ImpulseSteps:
         self._moments = TurningImpulses(tree, float(settings.solver_tolerance or 0.0))
         self._pressed_by = [friction.pressed_by for friction in self._moments.frictions]
         self._solvers: dict[tuple[int, ...], SolverParts] = {}
+        self.by_blocks, self._last = 0, dict[int, Array]()  # the last impulses of each contact and joint row
         nv, self._all = tree.model.nv, tuple(range(len(self.contacts)))
         ends = list(accumulate([3] * len(self.contacts) + [1] * len(self.joints.J), initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
@@ -429,7 +432,7 @@ class ImpulseSteps:
             rows = all_rows[chosen]
             to_joints = inverse @ rows.T
             g = rows @ free + all_shifts[chosen]
-            got = self._found(which, rows @ to_joints, g, terms, span, convex=convex)
+            got = self._by_any(which, rows @ to_joints, g, terms, span, convex=convex)
             v, pushed = free + to_joints @ got, rows.T @ got
             impulse[:], along_rows[:] = 0.0, 0.0
             for end, k in zip(self._ends(which), which, strict=True):
@@ -443,6 +446,38 @@ class ImpulseSteps:
     def _ends(self, which: tuple[int, ...]) -> list[int]:
         """Ends of some contacts and joint rows among the rows of these alone."""
         return list(accumulate(len(self._rows[k]) for k in which))
+
+    def _by_any(
+        self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool
+    ) -> Array:
+        """Impulses as by :meth:`_found`, or by blocks, which go first from where Pinocchio's ADMM stopped.
+
+        Raises:
+            Diverged: neither finds them.
+        """
+        if not self.by_blocks:
+            try:
+                return self._found(which, G, g, terms, span, convex=convex)
+            except Diverged:
+                if convex or self._settings.solver != "admm":
+                    raise
+        blocks, count, bounds = list[Block](), len(self.contacts), self.joints.friction
+        for k, end in zip(which, self._ends(which), strict=True):
+            if k < count:
+                self._check(k, G[end - 3 : end, end - 3 : end], terms.touching[k].flat)
+                blocks.append(Block(end - 3, self._friction(k)))
+            else:
+                rubs = k < count + len(bounds)
+                blocks.append(Block(end - 1, None, span * bounds[k - count].joint.friction if rubs else math.inf))
+        guess = np.concatenate([self._last.get(k, np.zeros(len(self._rows[k]))) for k in which])
+        impulses, changed = impulses_by_blocks(G, g, blocks, guess)
+        if not changed <= float(self._settings.solver_tolerance or 0.0):
+            impulses = self._found(which, G, g, terms, span, convex=convex)
+        else:
+            self.by_blocks += 1
+        ends = self._ends(which)
+        self._last = {k: impulses[end - len(self._rows[k]) : end] for k, end in zip(which, ends, strict=True)}
+        return impulses
 
     def _found(
         self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool

@@ -54,6 +54,8 @@ LAWS: dict[str, tuple[float, str]] = {
     "power": (5e-11, "rate of the energy = power of the published forces"),
     "value": (1e-13, "a published value follows from places and velocities"),
     "spelling": (1e-13, "two variables of one quantity are equal"),
+    "strike": (1e-12, "what is told of an impact follows from the motion beside it"),
+    "rebound": (1e-11, "the rate of a gap or coordinate turns at an impact with the restitution"),
     "work": (1e-11, "work = integral of force times rate"),
     "change": (1e-11, "an event lies where the motion changes, and each change has its event"),
 }
