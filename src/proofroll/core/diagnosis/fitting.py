@@ -163,7 +163,7 @@ class Residuals(Generic[M]):
         """Value of the free parameter for which the residual is smallest, in a family of models."""
         return least_squares_parameter(lambda x: self.left(model(x)), start, 1.0)
 
-    def cause(self, row: Row[M]) -> Cause:
+    def cause(self, row: CauseRow[M]) -> Cause:
         """Cause: the engine behaves as a row says."""
         remainder = self.largest(row.model)
         closes = remainder <= self.closes * self.before
@@ -183,7 +183,7 @@ class Residuals(Generic[M]):
         *,
         signed: bool = True,
         linear: bool = True,
-    ) -> Iterator[Row[M]]:
+    ) -> Iterator[CauseRow[M]]:
         """Row of a number with the factor that closes the residual best, one of a known mistake if that closes it.
 
         With a single equation any factor would fit, so that only those of known mistakes are tried.
@@ -193,7 +193,7 @@ class Residuals(Generic[M]):
             says: behaviour, which the words of the factor follow.
             model: model for a factor.
             remedy: advice to an author.
-            quantity: see :class:`Row`.
+            quantity: see :class:`CauseRow`.
             signed: True if a known mistake may give the number the wrong sign.
             linear: True if the residual is linear in the factor.
         """
@@ -212,8 +212,15 @@ class Residuals(Generic[M]):
         elif fitted:
             factor = self.fit(model, 1.0)
         if possible(factor, signed):
-            says = f"{says} {factor_text(factor)}"
-            yield Row(name, says, model(factor), remedy, quantity, int(fitted), change_by(factor))
+            yield CauseRow(
+                id=name,
+                says=f"{says} {factor_text(factor)}",
+                model=model(factor),
+                remedy=remedy,
+                quantity=quantity,
+                fitted=int(fitted),
+                change=change_by(factor),
+            )
 
     def numbers_of(self, model: Callable[[FloatArray], M], count: int, cutoff: float | None = None) -> FloatArray:
         """Numbers, in which the residual is linear, that leave least; ``cutoff``: of singular values, relative."""
@@ -223,7 +230,7 @@ class Residuals(Generic[M]):
 
 
 @dataclass(frozen=True)
-class Row(Generic[M]):
+class CauseRow(Generic[M]):
     """A behaviour that an engine may have, as a change of the model.
 
     Attributes:

@@ -86,14 +86,14 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
             delay, difference, remainder = moved
             says = f"every sample is {delay_text(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
-            state_off = Difference("state", "m", difference, covers, _CLOCK)
+            state_off = Difference("state", "m", difference, covers, closes=_CLOCK)
             yield state_off.cause("late", says, remainder, remedy, 1, change=in_steps(delay, evidence.step))
         if (paced := best_clock_factor(time, reported, true)) is not None:
             rate, difference, remainder = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
             remedy = "the step that the engine takes is not the one that is counted"
             fitted, change = (0, np.inf) if mistaken_rate(rate) else (1, change_by(rate))
-            state_off = Difference("state", "m", difference, covers, _CLOCK)
+            state_off = Difference("state", "m", difference, covers, closes=_CLOCK)
             yield state_off.cause("clock", says, remainder, remedy, fitted, change=change)
 
     return test

@@ -7,7 +7,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES_EXACTLY, Cause, Difference, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, Row, change_by, least_squares_parameter
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals, change_by, least_squares_parameter
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Refused
@@ -61,7 +61,7 @@ def _swapped(a: Actuator, t: float, q: float, v: float) -> float:
 @by_rows(
     "actuators", "the equations of motion balance at every state of the run with that law, and not with the scene's"
 )
-def of_actuators(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Row[Change]]:
+def of_actuators(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: gains, gears and limits of all actuators."""
     mechanism = evidence.element.mechanism
     actuators = mechanism.actuators
@@ -90,7 +90,7 @@ def of_actuators(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[R
     unlimited = False
     for asked, name, says, effort in laws:
         if asked:
-            row = Row(f"actuators: {name}", f"the engine {says}", Change(mechanism, effort=effort), remedy)
+            row = CauseRow(f"actuators: {name}", f"the engine {says}", Change(mechanism, effort=effort), remedy)
             unlimited |= says == _UNLIMITED and residuals.cause(row).proven
             yield row
     for asked, what, law in numbers:

@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Difference, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, Row
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.pressing import Resisting
@@ -109,17 +109,19 @@ def _with(mechanism: Mechanism, table: str, number: int, part: Force | Bushing) 
 
 def _exchanged(
     mechanism: Mechanism, table: str, mistakes: Callable[[PartT], Iterator[tuple[str, PartT, str]]]
-) -> Iterator[Row[Change]]:
+) -> Iterator[CauseRow[Change]]:
     """Rows: one of the parts of a table has one of its mistakes: words, other part, remedy."""
     for number, part in enumerate(getattr(mechanism, table)):
         for says, other_part, remedy in mistakes(part):
             name = f"{table.removesuffix('s')} {part.name}"
             kind = getattr(part, "kind", "bushing")
-            yield Row(name, f"{kind} {part.name} {says}", Change(_with(mechanism, table, number, other_part)), remedy)
+            yield CauseRow(
+                name, f"{kind} {part.name} {says}", Change(_with(mechanism, table, number, other_part)), remedy
+            )
 
 
 @by_rows("bushing", _PROOF)
-def of_bushings(evidence: Evidence, _: Residuals[Change]) -> Iterator[Row[Change]]:
+def of_bushings(evidence: Evidence, _: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: one bushing with its axes in another order, along those of a body, or without its dampers."""
     return _exchanged(evidence.element.mechanism, "bushings", _of_bushing)
 
@@ -155,7 +157,7 @@ def _less(bushing: Bushing) -> tuple[float, float, float]:
 
 
 @by_rows("applied force", _PROOF)
-def of_applied_forces(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Row[Change]]:
+def of_applied_forces(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: one applied force with a factor, in other axes, at another place, without reaction, or late."""
     mechanism: Mechanism = evidence.element.mechanism
     yield from _exchanged(mechanism, "forces", lambda force: _of_force(mechanism, force, evidence.step))
@@ -171,7 +173,7 @@ def of_applied_forces(evidence: Evidence, residuals: Residuals[Change]) -> Itera
             yield _elsewhere(residuals, mechanism, number, evidence.element.length)
 
 
-def _elsewhere(residuals: Residuals[Change], mechanism: Mechanism, number: int, length: float) -> Row[Change]:
+def _elsewhere(residuals: Residuals[Change], mechanism: Mechanism, number: int, length: float) -> CauseRow[Change]:
     """Row: the force acts along another line, through its nearest place that balances the equations."""
     force = mechanism.forces[number]
 
@@ -185,7 +187,7 @@ def _elsewhere(residuals: Residuals[Change], mechanism: Mechanism, number: int, 
     says = f"force {force.name} acts along a line through ({words}) m of {force.body}, not through its place"
     remedy = f"give its place in the axes of {force.body}, from the origin of its frame"
     model, change = moved(place - force.position), float(np.linalg.norm(shift)) / length
-    return Row(f"place of {force.name}", says, model, remedy, fitted=3, change=change)
+    return CauseRow(f"place of {force.name}", says, model, remedy, fitted=3, change=change)
 
 
 def _of_force(mechanism: Mechanism, force: Force, step: float | None) -> Iterator[tuple[str, Force, str]]:
@@ -211,14 +213,14 @@ def _of_force(mechanism: Mechanism, force: Force, step: float | None) -> Iterato
 
 
 @by_rows("rolling resistance", _PROOF)
-def rolling_resistance(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Row[Change]]:
+def rolling_resistance(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: rolling resistance has a factor, is against the whole spin, or is by the weight."""
     mechanism, name = evidence.element.mechanism, "rolling resistance"
     if not any(contact.rolling_resistance for contact in mechanism.contacts):
         return
     moves = any(contact.bend for contact in mechanism.contacts)
     for law, says in _LAWS if moves else _LAWS[1:]:
-        yield Row(name, says, Change(mechanism, resisting=law), _REMEDY)
+        yield CauseRow(name, says, Change(mechanism, resisting=law), _REMEDY)
     says = "the engine moves it with rolling resistance"
 
     def changed(factor: float) -> Change:

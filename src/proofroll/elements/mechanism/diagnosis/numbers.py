@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Evidence
-from proofroll.core.diagnosis.fitting import Residuals, Row
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import by_rows
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
@@ -30,13 +30,13 @@ _OF_JOINTS = (
 
 
 @by_rows("numbers of all", _ONE_FACTOR)
-def factors_of_all(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Row[Change]]:
+def factors_of_all(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: the engine moves all bodies, joints or springs with one factor on a number."""
     mechanism: Mechanism = evidence.element.mechanism
     mass, _, inertia = _of_bodies(mechanism)
     model = partial(Change, mechanism)
 
-    def of_all(name: str, what: str, model: Any, remedy: str, quantity: str = "") -> Iterator[Row[Change]]:
+    def of_all(name: str, what: str, model: Any, remedy: str, quantity: str = "") -> Iterator[CauseRow[Change]]:
         signed = name not in _UNSIGNED
         return residuals.scaled(name, f"the engine moves it with {what}", model, remedy, quantity, signed=signed)
 
@@ -76,7 +76,7 @@ def _of_bodies(mechanism: Mechanism) -> tuple[FloatArray, FloatArray, FloatArray
 
 
 @by_rows("body", "one body has another mass or inertia, or its inertia about other axes or another point")
-def of_each_body(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Row[Change]]:
+def of_each_body(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows of one body: a factor on its mass or inertia, inertia in other axes or about another point."""
     mechanism: Mechanism = evidence.element.mechanism
     mass, com, inertia = _of_bodies(mechanism)
@@ -91,18 +91,18 @@ def of_each_body(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[R
             yield from residuals.scaled(f"{what} of {body.name}", says, change, remedy, what, signed=False)
     for says, other_inertia in _reordered(inertia):
         remedy = "look at the order of moments and products of inertia, and at the sign of the products"
-        yield Row("order of inertia", says, Change(mechanism, inertia=other_inertia), remedy, "inertia")
+        yield CauseRow("order of inertia", says, Change(mechanism, inertia=other_inertia), remedy, quantity="inertia")
     if not np.any(com):
         return
     for says, other_inertia in _about_origin(mass, com, inertia):
         remedy = "the scene's inertia is about the centre of mass, in the body's axes"
-        yield Row("point of inertia", says, Change(mechanism, inertia=other_inertia), remedy, "inertia")
+        yield CauseRow("point of inertia", says, Change(mechanism, inertia=other_inertia), remedy, quantity="inertia")
     says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
     model = Change(mechanism, weight_at_origin=True)
-    yield Row("place of weight", says, model, "put the weight at the centre of mass")
+    yield CauseRow("place of weight", says, model, "put the weight at the centre of mass")
     says = "the centres of mass are taken to be at the origins of the bodies' frames"
     model = Change(mechanism, com=np.zeros_like(com))
-    yield Row("centre of mass", says, model, "give the centres of mass", "centre of mass")
+    yield CauseRow("centre of mass", says, model, "give the centres of mass", quantity="centre of mass")
 
 
 def _reordered(inertia: FloatArray) -> Iterator[tuple[str, FloatArray]]:
@@ -129,7 +129,7 @@ def _about_origin(mass: FloatArray, com: FloatArray, inertia: FloatArray) -> Ite
 
 
 @by_rows("damped motion", "the equations are linear in it: one rate balances them at every state of the run")
-def damped_motion(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Row[Change]]:
+def damped_motion(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: velocities or spins of bodies, or both, decay at one rate, as engines for games have it.
 
     Only free bodies tell it from damping in joints.
@@ -146,11 +146,11 @@ def damped_motion(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[
         rate = residuals.numbers_of(decaying, 1)
         if rate[0] > 0:
             says = f"{what} of all bodies are damped at a rate of {rate[0]:.4g} per second"
-            yield Row("damped motion", says, decaying(rate), remedy, fitted=1, change=float(rate[0]) * period)
+            yield CauseRow("damped motion", says, decaying(rate), remedy, fitted=1, change=float(rate[0]) * period)
 
 
 @by_rows("friction of one joint", _ONE_FACTOR)
-def friction_of_each_joint(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Row[Change]]:
+def friction_of_each_joint(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: one of several joints has dry friction with a factor."""
     mechanism: Mechanism = evidence.element.mechanism
     joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
@@ -167,7 +167,7 @@ def friction_of_each_joint(evidence: Evidence, residuals: Residuals[Change]) -> 
 
 
 @by_rows("joint", "the equations are linear in it: one coefficient balances them at every state of the run")
-def of_each_joint(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Row[Change]]:
+def of_each_joint(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: one joint, or every joint, has additional damping or armature.
 
     Coarse steps have the same effect. So the row states how large the change is: the armature, or damping times
@@ -193,11 +193,11 @@ def of_each_joint(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[
             says = f"{owner} has {what} of {value[0]:.4g} more than the scene gives it"
             remedy = f"set {law} of the joints yourself, also where it is zero"
             change = abs(float(value[0]) * size) / float(np.min(inertia[which > 0]))
-            yield Row(f"{what} in {owner}", says, more(value), remedy, fitted=1, change=change)
+            yield CauseRow(f"{what} in {owner}", says, more(value), remedy, fitted=1, change=change)
 
 
 @by_rows("direction of gravity", "the equations are linear in gravity: one vector closes them at every state")
-def any_gravity(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Row[Change]]:
+def any_gravity(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: gravity has another direction or magnitude."""
     mechanism: Mechanism = evidence.element.mechanism
     g, name, remedy = np.array(mechanism.gravity), "direction of gravity", "look at the axes of gravity"
@@ -205,12 +205,12 @@ def any_gravity(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[Ro
     for axis in (*np.eye(3), *-np.eye(3)):
         if np.any(np.cross(axis, g)):
             says = f"the engine's gravity is ({_shown(size * axis)}) m/s^2, along another axis"
-            yield Row(name, says, Change(mechanism, gravity=size * axis), remedy, "gravity")
+            yield CauseRow(name, says, Change(mechanism, gravity=size * axis), remedy, quantity="gravity")
     gravity = g + residuals.numbers_of(lambda more: Change(mechanism, gravity=g + more), 3)
     gravity = np.where(np.abs(gravity) < 1e-6 * max(float(np.max(np.abs(gravity))), 1e-300), 0.0, gravity)
     change, says = float(np.linalg.norm(gravity - g)), f"the engine's gravity is ({_shown(gravity)}) m/s^2"
     model, change = Change(mechanism, gravity=gravity), change / size if size else np.inf
-    yield Row(name, says, model, remedy, "gravity", fitted=3, change=change)
+    yield CauseRow(name, says, model, remedy, quantity="gravity", fitted=3, change=change)
 
 
 def _shown(gravity: FloatArray) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, Row
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals
 from proofroll.core.diagnosis.lines import differing, scale_of
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import InputError
@@ -164,7 +164,7 @@ _BALANCED = 1e-3
     "tree out of order",
     "the equations balance without the terms that an algorithm for depth-first order loses",
 )
-def lost_coupling(evidence: Evidence, _: Residuals[Change]) -> Iterator[Row[Change]]:
+def lost_coupling(evidence: Evidence, _: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: the mass matrix lacks terms between a body and its descendants, all or one pair."""
     mechanism: Mechanism = evidence.element.mechanism
     pairs = _ancestry(mechanism)
@@ -174,7 +174,7 @@ def lost_coupling(evidence: Evidence, _: Residuals[Change]) -> Iterator[Row[Chan
     for single, (row, column) in zip(singles, np.argwhere(np.triu(pairs)), strict=True):
         single[row, column] = single[column, row] = 1.0
     for lost in [pairs, *singles] if singles else ():
-        yield Row("tree out of order", says, Change(mechanism, coupling=lost), remedy)
+        yield CauseRow("tree out of order", says, Change(mechanism, coupling=lost), remedy)
 
 
 def _ancestry(mechanism: Mechanism) -> FloatArray:
