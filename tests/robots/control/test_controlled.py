@@ -263,3 +263,13 @@ def test_degrees_in_a_controller_are_doubted(written: Any, capsys: pytest.Captur
         robot, control = written(f'pose = {{j1 = {pose}}}\n[[gains]]\njoints = "*"\nkp = 5\n')
         options.doubt_numbers(with_control(robot, Path(control)), None)
         assert said in capsys.readouterr().err
+
+
+def test_a_ground_is_a_parameter_of_the_scene() -> None:
+    """--ground sets the parameter, after what --set says, and needs a controller."""
+    walk = Path("walk.toml")
+    assert options.with_ground(["damping=0"], walk, "plane") == ["damping=0", "ground=2"]
+    assert options.with_ground(None, walk, "none") == ["ground=0"]
+    assert options.with_ground(None, None, None) is None
+    with pytest.raises(InputError, match=r"--ground = 'file': a robot stands under a controller"):
+        options.with_ground(None, None, "file")
