@@ -167,7 +167,7 @@ def with_ground(settings: list[str] | None, control: Path | None, ground: str | 
     if ground is None:
         return settings
     if control is None:
-        raise InputError("--ground", ground, "a robot stands by its servos; give its controller with --control, too")
+        raise InputError("--ground", ground, "a robot stands under a controller; give that with --control, too")
     return [*(settings or ()), f"ground={('none', 'file', 'plane').index(ground)}"]
 
 

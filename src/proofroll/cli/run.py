@@ -71,8 +71,11 @@ def run(
     from proofroll.running.engine_questions import prepare
     from proofroll.running.idle_workers import Workers
 
-    settings = options.with_ground(settings, control, ground)
-    question, scene = scene, options.controlled(scene, control)
+    settings, question, scene = (
+        options.with_ground(settings, control, ground),
+        scene,
+        options.controlled(scene, control),
+    )
     if matrices:
         _show_matrices(scene, engine, options.assignments(settings), as_json)
         return

@@ -17,9 +17,9 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable
 from proofroll.core.controlled_engine import commanded
-from proofroll.core.dataset import BY_STEPS, CONTINUOUS, columns_of
+from proofroll.core.dataset import BY_STEPS, CONTINUOUS, ENDED, ENDS, HORIZON, columns_of
 from proofroll.core.engine_abilities import require_provided
-from proofroll.core.errors import Missing, Refused
+from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.core.events import JUMPS, Event, with_events
 from proofroll.core.multi_element import copied, events_of_engine, watch_events
 from proofroll.core.number_format import number
@@ -28,6 +28,7 @@ from proofroll.core.pace import PACE
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,12 +36,15 @@ if TYPE_CHECKING:
 NO_ROUTE = "no route of the truth follows contacts under held targets yet"
 # Engine and formulation of the steps, the longest of them [s], and how many there are.
 _ENGINE, _FORMULATION, _LONGEST, _RUNGS = "pinocchio", "impulses", 1e-3, 3
+# Engine and formulation of twins, which cost a tenth of that; how many, how far apart they start [m, rad], and the
+# distances up to which a motion is told [m].
+_OF_TWINS, _TWINS, _NUDGE, _TOLD = ("mujoco", "geoms"), 5, 1e-4, (1e-3, 1e-2)
 _SAFETY = 3.0  # times the last change of the finest run
 _ON_STEP = 1e-6  # part of a step by which a time may be beside its end
 
 
 @dataclass(frozen=True)
-class _Run:
+class _SteppedRun:
     """Run with one step: its variables at the times that were asked for, and the events."""
 
     step: float
@@ -55,7 +59,10 @@ def reference_by_steps(element: MechanismElement, times: FloatArray) -> xr.Datas
         Refused: the engine of the steps is not installed, or cannot represent the mechanism.
         Diverged: a run ends early.
     """
-    runs = [_run(element, times, step) for step in _steps(element)]
+    try:
+        runs = [_run(element, times, step) for step in _steps(element)]
+    except Missing as error:
+        raise Refused(f"{NO_ROUTE}, and {error}, whose steps would be a reference") from None
     coarse, fine = runs[-2:]
     near = _SAFETY * coarse.step
     events = [replace(item, time_low=item.time_low - near, time_high=item.time_high + near) for item in fine.events]
@@ -76,7 +83,58 @@ def reference_by_steps(element: MechanismElement, times: FloatArray) -> xr.Datas
         BY_STEPS: f"{_ENGINE}[formulation={_FORMULATION}]",
     }
     dataset = Columns(variables, {**fine.columns.attrs, **attrs}).dataset()
-    return with_events(dataset, events) if element.mechanism.has_events else dataset
+    dataset = with_events(dataset, events) if element.mechanism.has_events else dataset
+    apart = _twins_apart(element, times, runs[0].step)
+    return dataset if apart is None else _to_horizon(dataset, apart, _distances(coarse, fine))
+
+
+def _twins_apart(element: MechanismElement, times: FloatArray, step: float) -> FloatArray | None:
+    """Largest distance so far of any body of twins, whose starts are a little apart [m]; None: they cannot be run."""
+    random, mechanism = np.random.default_rng(0), element.mechanism
+    twins = [element]
+    for _ in range(_TWINS):
+        joints = []
+        for joint in mechanism.joints:
+            moved = np.array(joint.q0)
+            places = slice(0, 0 if joint.kind == JointKind.SPHERICAL else 3)  # an attitude stays a unit quaternion
+            moved[places] += _NUDGE * random.uniform(-1, 1, moved[places].size)
+            joints.append(replace(joint, q0=tuple(moved.tolist())))
+        twins.append(replace(element, mechanism=replace(mechanism, joints=tuple(joints))))
+    try:
+        runs = [_run(twin, times, step, *_OF_TWINS) for twin in twins]
+    except (Missing, Refused, Diverged):
+        return None
+    apart: FloatArray = np.max([_distances(runs[0], run) for run in runs[1:]], axis=0)
+    return apart
+
+
+def _distances(run: _SteppedRun, other_run: _SteppedRun) -> FloatArray:
+    """Largest distance so far between the places of any body in two runs [m], shape (time,)."""
+    places, other_places = (item.columns.variables["p_WB"].values for item in (run, other_run))
+    apart = np.linalg.norm(places - other_places, axis=-1).reshape(len(places), -1).max(axis=1)
+    return np.maximum.accumulate(apart)
+
+
+def _to_horizon(dataset: xr.Dataset, apart: FloatArray, change: FloatArray) -> xr.Dataset:
+    """The reference up to where it tells the motion, with the words about it.
+
+    Args:
+        dataset: the reference.
+        apart: largest distance of twins so far [m], shape (time,).
+        change: last change of places by a shorter step, the largest so far [m], shape (time,).
+    """
+    times = dataset["time"].to_numpy()
+    words = []
+    for told in _TOLD:
+        beyond = np.flatnonzero((apart > told) | (change > told / _SAFETY))
+        until = "to the end" if not beyond.size else f"until {times[max(beyond[0] - 1, 0)]:.3g} s"
+        words.append(f"{1e3 * told:g} mm {until}")
+    text = f"starts {number(_NUDGE, 1)} m or rad apart, and shorter steps, stay within {', '.join(words)}"
+    dataset.attrs[HORIZON] = text
+    if not beyond.size or beyond[0] < 1:
+        return dataset
+    cut = dataset.isel(time=slice(0, int(beyond[0])))
+    return cut.assign_attrs({ENDS: float(times[beyond[0]]), ENDED: f"it is too sensitive from there on: {text}"})
 
 
 def _steps(element: MechanismElement) -> list[float]:
@@ -86,14 +144,13 @@ def _steps(element: MechanismElement) -> list[float]:
     return [longest / 2**rung for rung in range(_RUNGS)]
 
 
-def _run(element: MechanismElement, times: FloatArray, step: float) -> _Run:
-    """Run of a mechanism with one step; between two steps its variables are interpolated."""
+def _run(
+    element: MechanismElement, times: FloatArray, step: float, name: str = _ENGINE, formulation: str = _FORMULATION
+) -> _SteppedRun:
+    """Run of a mechanism in an engine with one step; between two steps its variables are interpolated."""
     scene = Scene(name=element.name, title=element.name, elements=(element,))
-    try:
-        kind = load_engine(_ENGINE)
-    except Missing as error:
-        raise Refused(f"{NO_ROUTE}, and {error}, whose steps would be a reference") from None
-    settings = resolve_settings(kind, {"formulation": _FORMULATION, "preset": "matched", "dt": step})
+    kind = load_engine(name)
+    settings = resolve_settings(kind, {"formulation": formulation, "preset": "matched", "dt": step})
     require_provided(kind, settings.formulation, scene)
     engine = commanded(kind.build(scene.for_an_engine, settings), element, step)
     watch_events(engine)
@@ -110,15 +167,17 @@ def _run(element: MechanismElement, times: FloatArray, step: float) -> _Run:
     columns = columns_of(scene, counts * step, samples)
     first, last = np.searchsorted(counts, before), np.searchsorted(counts, before + (part > 0))
     variables = {}
-    for name, item in columns.variables.items():
+    for key, item in columns.variables.items():
         if item.dims[:1] != ("time",):
-            variables[name] = item
+            variables[key] = item
             continue
         weight = part.reshape(-1, *[1] * (item.values.ndim - 1))
         between = item.values[first] + weight * (item.values[last] - item.values[first])
-        variables[name] = item._replace(values=times if name == "time" else between)
+        variables[key] = item._replace(values=times if key == "time" else between)
     found = events_of_engine(engine, element) or ()
-    return _Run(step, Columns(variables, columns.attrs), tuple(event for event in found if event.time <= times[-1]))
+    return _SteppedRun(
+        step, Columns(variables, columns.attrs), tuple(event for event in found if event.time <= times[-1])
+    )
 
 
 def _bar(name: str, coarse: Variable, fine: Variable, beside: npt.NDArray[np.bool_]) -> float | None:

@@ -116,6 +116,7 @@ SCENES: dict[str, tuple[Callable[[], Mechanism], float]] = {
     "rod": (lambda: _model("falling_rod"), 0.6),
     "sled": (lambda: _model("sled"), 0.05),
     "stops": (lambda: _model("sled"), 0.6),
+    "loops": (lambda: _model("four_bar"), 0.2),
     "stop": (lambda: _model("stop"), 0.6),
 }
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from proofroll.core.comparison import Comparison, Tolerance
+from proofroll.core.dataset import HORIZON
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
 from proofroll.core.element_abilities import step_bound
 from proofroll.core.number_format import number
@@ -128,7 +129,9 @@ def _by_steps_words(reference: Reference, bounds: Mapping[str, Tolerance]) -> st
         key for key, bound in bounds.items() if not reference.tells(key, bound.absolute(reference.sizes.get(key, 1.0)))
     ]
     leaves = f" Not told by it to the tolerance: {', '.join(_shortened(untold))}." if untold else ""
-    return f"Judged by a {reference.dataset.attrs['route']}, which is no truth{known}.{leaves}"
+    horizon = str(reference.dataset.attrs.get(HORIZON, ""))
+    horizon = f" Horizon: {horizon}." if horizon else ""
+    return f"Judged by a {reference.dataset.attrs['route']}, which is no truth{known}.{horizon}{leaves}"
 
 
 def _with_unit(reference: Reference, name: str) -> str:

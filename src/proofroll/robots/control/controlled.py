@@ -14,11 +14,10 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, error_location
 from proofroll.core.parameters import Parameters
-from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.contact.start import touches
-from proofroll.elements.mechanism.dynamics.kinematics import Tree
 from proofroll.elements.mechanism.reading.reader import made_mechanism
-from proofroll.elements.mechanism.scene.checks import WORLD, Z
+from proofroll.elements.mechanism.scene.checks import Z
 from proofroll.elements.mechanism.scene.control import TARGET, Control
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import TOGETHER
@@ -28,7 +27,7 @@ from proofroll.robots.control.bookkeeping.air import HeldRobot, links_of
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
 from proofroll.robots.control.imported import imported_robots
 from proofroll.robots.files.actuators import scene_actuators
-from proofroll.robots.files.feet import GROUNDS, NO_GROUND, OF_FILE, Standing, ground_tables
+from proofroll.robots.files.feet import GROUNDS, NO_GROUND, OF_FILE, StandingRobot, ground_tables
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.scene_tables import (
     CONTACTS,
@@ -204,7 +203,14 @@ class ControlledScenes:
             row["joint"]: (row["kp"], row["kd"], _first_target(row["target"], float(start.angle[row["joint"]][0])))
             for row in tables["actuators"]
         }
-        standing = Standing(file, robot, names_of_bodies(robot), start, servos, controller.start.drop)
+        standing = StandingRobot(
+            file=file,
+            robot=robot,
+            bodies=names_of_bodies(robot),
+            start=start,
+            servos=servos,
+            drop=controller.start.drop,
+        )
         with error_location(str(self._path)):
             touching = ground_tables(standing, ground, asked.feet, asked.friction)
         tables = tables | {"geometries": touching.geometries, "pairs": touching.pairs, "impacts": TOGETHER}

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.number_format import counted
-from proofroll.elements.mechanism.scene.checks import WORLD
+from proofroll.elements.mechanism import WORLD
 from proofroll.elements.mechanism.scene.rotations import to_rpy
 from proofroll.files.json_data import plain
 from proofroll.robots.files import reading
@@ -70,7 +70,7 @@ class GroundTables(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Standing:
+class StandingRobot:
     """A robot at its start, with what holds its joints.
 
     Attributes:
@@ -100,7 +100,7 @@ class Standing:
 
 
 def ground_tables(
-    standing: Standing, ground: str, feet: str | Mapping[str, float], friction: float | None
+    standing: StandingRobot, ground: str, feet: str | Mapping[str, float], friction: float | None
 ) -> GroundTables:
     """Shapes and pairs of a robot on a ground.
 
@@ -235,7 +235,7 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
     for pair in pairs:
         names = " and ".join(shape.name for shape in pair.shapes)
         if reasons := list(pair.reasons()):
-            if pair.distance > 0:
+            if pair.distance > max(pair.margin, 0.0):
                 left_out.append(f"contact of {names}, {1e3 * pair.distance:.0f} mm apart ({reasons[0]})")
             else:
                 wrong.append(f"{names} ({reasons[0]})")
@@ -255,7 +255,7 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
     return GroundTables(list(geometries.values()), rows, _about(geometries, rows), left_out)
 
 
-def _balls(standing: Standing, feet: Mapping[str, float], friction: float) -> GroundTables:
+def _balls(standing: StandingRobot, feet: Mapping[str, float], friction: float) -> GroundTables:
     """Balls at the origins of links, on the plane z = 0."""
     geometries: dict[str, dict[str, Any]] = {}
     for link, radius in feet.items():
@@ -282,7 +282,7 @@ def _about(geometries: Mapping[str, Mapping[str, Any]], pairs: Sequence[Mapping[
     return f"{stands}; {counted(others, 'other pairs')}" if others else stands
 
 
-def _shape(standing: Standing, row: Mapping[str, Any]) -> _Shape:
+def _shape(standing: StandingRobot, row: Mapping[str, Any]) -> _Shape:
     """A shape that MuJoCo's process described."""
     body, p, R = standing.place(row["body"])
     name = row["name"] or f"{row['body'] or WORLD} shape {row['number']}"

@@ -8,7 +8,7 @@ root of one equation.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -34,53 +34,73 @@ class Block(NamedTuple):
     friction: float | None
     bound: float = math.inf
 
+    @property
+    def rows(self) -> slice:
+        """All rows."""
+        return slice(self.first, self.first + (1 if self.friction is None else 3))
+
+
+class BlockSolver:
+    """Solver of a run, which begins each time with the impulses of the last.
+
+    Attributes:
+        solved: number of problems that it has solved.
+    """
+
+    def __init__(self, tolerance: float) -> None:
+        """``tolerance``: largest change of velocity in the last sweep, relative to the largest speed."""
+        self._tolerance, self._last, self.solved = tolerance, dict[int, Array](), 0
+
+    def impulses(self, G: Array, g: Array, blocks: Mapping[int, Block]) -> Array | None:
+        """Impulses of the rows; None: the sweeps do not reach the tolerance.
+
+        Args:
+            G: Delassus matrix of the rows.
+            g: their velocities without impulses, with shifts.
+            blocks: all rows, by a number that a contact or joint keeps from step to step.
+        """
+        guess = np.zeros(len(g))
+        for number, block in blocks.items():
+            guess[block.rows] = self._last.get(number, 0.0)
+        impulses, change = impulses_by_blocks(G, g, list(blocks.values()), guess)
+        self._last = {number: impulses[block.rows] for number, block in blocks.items()}
+        if not change <= self._tolerance:
+            return None
+        self.solved += 1
+        return impulses
+
 
 def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array) -> tuple[Array, float]:
-    """Impulses of the rows, and the change of velocity in the last sweep relative to the largest speed.
+    """Impulses, and the change of velocity in the last sweep relative to the largest speed; see :class:`BlockSolver`.
 
-    Args:
-        G: Delassus matrix of the rows.
-        g: their velocities without impulses, with shifts.
-        blocks: all rows.
-        guess: impulses to begin with.
+    ``guess``: impulses to begin with.
     """
     f, speed = guess.copy(), float(np.abs(g).max()) or 1.0
-    u, changed = g + G @ f, math.inf
-    small = [(block, G[rows, rows].tolist()) for block in blocks for rows in [_rows(block)]]
+    u, change = g + G @ f, math.inf
+    mobilities = [G[block.rows, block.rows].tolist() for block in blocks]
     for _ in range(_SWEEPS):
-        changed = 0.0
-        for block, own in small:
-            first = block.first
+        change = 0.0
+        for block, mobility in zip(blocks, mobilities, strict=True):
+            rows = block.rows
+            old, velocities = f[rows].tolist(), u[rows].tolist()
             if block.friction is None:
-                mobility, before = own[0][0], float(f[first])
-                after = before - float(u[first]) / mobility
-                after = max(after, 0.0) if math.isinf(block.bound) else min(max(after, -block.bound), block.bound)
-                if after != before:
-                    u += G[first] * (after - before)
-                    f[first] = after
-                    changed = max(changed, abs(after - before) * mobility)
-                continue
-            rows = _rows(block)
-            old = f[rows].tolist()
-            apart = [
-                velocity - sum(row[k] * old[k] for k in range(3))
-                for velocity, row in zip(u[rows].tolist(), own, strict=True)
-            ]
-            new = _contact(own, apart, block.friction, old, speed)
+                impulse = old[0] - velocities[0] / mobility[0][0]
+                new = [max(impulse, 0.0 if math.isinf(block.bound) else -block.bound)]
+                new = [min(new[0], block.bound)]
+            else:
+                free = [
+                    velocity - sum(row[k] * old[k] for k in range(3))
+                    for velocity, row in zip(velocities, mobility, strict=True)
+                ]
+                new = _contact(mobility, free, block.friction, old, speed)
             steps = [a - b for a, b in zip(new, old, strict=True)]
             if any(steps):
                 u += steps @ G[rows]
                 f[rows] = new
-                changed = max(
-                    changed, *(abs(step * row[k]) for k, (step, row) in enumerate(zip(steps, own, strict=True)))
-                )
-        if not changed > _SETTLED * speed:
+                change = max(change, *(abs(step * mobility[k][k]) for k, step in enumerate(steps)))
+        if not change > _SETTLED * speed:
             break
-    return f, changed / speed
-
-
-def _rows(block: Block) -> slice:
-    return slice(block.first, block.first + (1 if block.friction is None else 3))
+    return f, change / speed
 
 
 def _contact(
@@ -96,12 +116,12 @@ def _contact(
         return [x, y, normal]
     best, least = list(guess), math.inf
     directions = [(-guess[0], -guess[1]), (b[0], b[1]), (-x, -y)]
-    for along, across in directions:
-        if not (along or across):
+    for x, y in directions:
+        if not (x or y):
             continue
-        found, off = _slipping(G, b, mu, math.atan2(across, along))
+        impulse, off = _slipping(G, b, mu, math.atan2(y, x))
         if off < least:
-            best, least = found, off
+            best, least = impulse, off
         if least < _ALONG * speed:
             break
     return best
@@ -145,5 +165,5 @@ def _slipping(G: Sequence[Sequence[float]], b: Sequence[float], mu: float, angle
             break
         step = min(max(-(c * y - s * x) / slope, -_LONGEST_TURN), _LONGEST_TURN)
         angle += step
-    found = [-mu * normal * c, -mu * normal * s, normal]
-    return found, abs(c * y - s * x) if c * x + s * y >= 0 else math.inf
+    impulse = [-mu * normal * c, -mu * normal * s, normal]
+    return impulse, abs(c * y - s * x) if c * x + s * y >= 0 else math.inf

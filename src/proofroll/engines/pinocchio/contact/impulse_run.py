@@ -15,7 +15,8 @@ from proofroll.core.events import Event
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.engines.pinocchio.contact.impulses import Impulses, ImpulseSteps
+from proofroll.engines.pinocchio.contact.impulses import ImpulseSteps
+from proofroll.engines.pinocchio.contact.step_terms import Impulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
@@ -99,7 +100,7 @@ class ImpulseRun(MechanismRun):
 
     def remarks(self) -> Sequence[str]:
         """See :class:`proofroll.core.engine_abilities.TellsRemarks`."""
-        return [_BLOCKS] if self.steps.by_blocks else []
+        return [_BLOCKS] if self.steps.blocks.solved else []
 
     def events(self) -> Sequence[Event] | None:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""

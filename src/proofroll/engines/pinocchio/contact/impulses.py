@@ -8,7 +8,7 @@ contacts separate.
 import math
 from collections.abc import Mapping, Sequence
 from itertools import accumulate, pairwise, starmap
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -20,11 +20,12 @@ from proofroll.elements.mechanism.contact.touching import AT_REST, ONE_POINT, Mo
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
-from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK, States
+from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK
 from proofroll.elements.mechanism.scene.rotations import Array, carried, frame_of_axis
-from proofroll.engines.pinocchio.contact.blocks import Block, impulses_by_blocks
+from proofroll.engines.pinocchio.contact.blocks import Block, BlockSolver
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
 from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION, SolverParts, solver_of
+from proofroll.engines.pinocchio.contact.step_terms import Impulses, StepTerms
 from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningImpulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
@@ -67,44 +68,6 @@ def family(settings: PinocchioSettings) -> Mapping[str, str]:
     return of_contact(Family.CONVEX if settings.convex else Family.HARD)
 
 
-class Impulses(NamedTuple):
-    """Impulses of a step.
-
-    Attributes:
-        v: velocity after it, shape (nv,).
-        impulse: on body a of each contact, world axes [N s], shape (contacts, 3).
-        states: of the contacts: open, sticking or with their impulse on the cone.
-        moment: of friction against turning on body a of each contact, world axes [N m s], shape (contacts, 3).
-        along: impulses of joint rows [N s, N m s], shape (rows,).
-        driving: impulses that impose motions [N s, N m s], shape (motions,).
-    """
-
-    v: Array
-    impulse: Array
-    states: States
-    moment: Array
-    along: Array
-    driving: Array
-
-
-class StepTerms(NamedTuple):
-    """Terms of a step's equations.
-
-    Attributes:
-        J: contact rows, (contacts, 3, nv): slip velocities along the normal's :func:`frame_of_axis`, the normal last.
-        free: velocity after the step without impulses, (nv,).
-        inverse: of the mass matrix, (nv, nv).
-        touching: geometry of the contacts.
-        frames: of their normals.
-    """
-
-    J: Array
-    free: Array
-    inverse: Array
-    touching: list[Touching]
-    frames: list[Array]
-
-
 class ImpulseSteps:
     """Steps of a tree with contacts, dry friction and stops of joints.
 
@@ -113,7 +76,7 @@ class ImpulseSteps:
         restitution: of each contact [1].
         events: of the contacts.
         joints: joint rows, numbered after the contacts.
-        by_blocks: number of problems of impulses solved by blocks, as Pinocchio's ADMM stopped at one.
+        blocks: solver that goes on where Pinocchio's ADMM stops.
     """
 
     def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
@@ -140,7 +103,7 @@ class ImpulseSteps:
         self._moments = TurningImpulses(tree, float(settings.solver_tolerance or 0.0))
         self._pressed_by = [friction.pressed_by for friction in self._moments.frictions]
         self._solvers: dict[tuple[int, ...], SolverParts] = {}
-        self.by_blocks, self._last = 0, dict[int, Array]()  # the last impulses of each contact and joint row
+        self.blocks = BlockSolver(float(settings.solver_tolerance or 0.0))
         nv, self._all = tree.model.nv, tuple(range(len(self.contacts)))
         ends = list(accumulate([3] * len(self.contacts) + [1] * len(self.joints.J), initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
@@ -310,7 +273,7 @@ class ImpulseSteps:
         point.joint2_placement = data.oMi[point.joint2_id].actInv(place)
         point.calc(self._model, data, solver.point_datas[number])
         rows: Array = point.jacobian(self._model, data, solver.point_datas[number])
-        return rows
+        return rows.reshape(3, -1)  # of a model of one velocity Pinocchio gives a vector
 
     def _solver(self, which: tuple[int, ...]) -> SolverParts:
         if which not in self._solvers:
@@ -455,29 +418,22 @@ class ImpulseSteps:
         Raises:
             Diverged: neither finds them.
         """
-        if not self.by_blocks:
+        if not self.blocks.solved:
             try:
                 return self._found(which, G, g, terms, span, convex=convex)
             except Diverged:
                 if convex or self._settings.solver != "admm":
                     raise
-        blocks, count, bounds = list[Block](), len(self.contacts), self.joints.friction
+        count, rubbing, parts = len(self.contacts), self.joints.friction, dict[int, Block]()
         for k, end in zip(which, self._ends(which), strict=True):
             if k < count:
                 self._check(k, G[end - 3 : end, end - 3 : end], terms.touching[k].flat)
-                blocks.append(Block(end - 3, self._friction(k)))
+                parts[k] = Block(end - 3, self._friction(k))
             else:
-                rubs = k < count + len(bounds)
-                blocks.append(Block(end - 1, None, span * bounds[k - count].joint.friction if rubs else math.inf))
-        guess = np.concatenate([self._last.get(k, np.zeros(len(self._rows[k]))) for k in which])
-        impulses, changed = impulses_by_blocks(G, g, blocks, guess)
-        if not changed <= float(self._settings.solver_tolerance or 0.0):
-            impulses = self._found(which, G, g, terms, span, convex=convex)
-        else:
-            self.by_blocks += 1
-        ends = self._ends(which)
-        self._last = {k: impulses[end - len(self._rows[k]) : end] for k, end in zip(which, ends, strict=True)}
-        return impulses
+                rubs = k < count + len(rubbing)
+                parts[k] = Block(end - 1, None, span * rubbing[k - count].joint.friction if rubs else math.inf)
+        impulses = self.blocks.impulses(G, g, parts)
+        return self._found(which, G, g, terms, span, convex=convex) if impulses is None else impulses
 
     def _found(
         self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool

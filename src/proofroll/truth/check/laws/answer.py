@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.truth.check.laws.determinacy import determinate_reactions
 from proofroll.truth.check.laws.integrals import integral
 from proofroll.truth.check.laws.joint_forces import law_of, target_of
 from proofroll.truth.check.laws.loads import BodyLoads
@@ -258,6 +259,7 @@ class AnswerCheck:
         self.held = len(rows)
         if rows.size:
             published, places = self._of(published, turns, places, rows)
+            determinate_reactions(scene, published, residuals)
             works_follow(scene, tiles, turns, places, published, residuals)
             values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
             self._forces(published, tiles, places)

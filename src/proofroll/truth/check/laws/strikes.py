@@ -16,6 +16,7 @@ from proofroll.truth.check.laws.tiled import Turns, changed_velocity
 from proofroll.truth.check.laws.tiles import Tiles
 from proofroll.truth.check.laws.values import energy_of
 
+_ARRAYS = ("time", "pace", "p", "R", "v", "w")
 _BESIDE = 1e-13  # time between an event and the border of its stretches, relative to it and to a second
 _ROUND = 1e-11  # part of the natural energy and length by which a value beside an impact may be off
 _BEGINS: Array = (-1.0) ** np.arange(len(TO_SERIES)) * -(np.arange(len(TO_SERIES)) ** 2) @ TO_SERIES
@@ -25,7 +26,7 @@ _ENDS: Array = np.arange(len(TO_SERIES)) ** 2 @ TO_SERIES  # weights of points f
 def strikes_follow(
     scene: LawScene, tiles: Tiles, turns: Turns, published: PublishedValues, residuals: LawResiduals, last: float
 ) -> None:
-    """Checks impacts before a ``last`` time [s]: what is told of each, and v+ = -e v- of one that strikes alone."""
+    """Checks impacts before a ``last`` time [s]: energies, heights, and v+ = -e v- of one that strikes alone."""
     values, bars, changes = published.values, published.bars, published.changes
     events = [(number, item) for number, item in enumerate(changes) if item.strikes and 0 < item.time < last]
     borders = struck_borders(scene, tiles)
@@ -40,7 +41,11 @@ def strikes_follow(
     heights = values.get("event_height", np.full(len(changes), np.nan))[numbers]
     for name, chosen, point in (("event_energy_before", before, -1), ("event_energy_after", after, 0)):
         if name in values and chosen.size:
-            moving = _beside(scene, tiles, turns, chosen, point)
+            arrays = {key: getattr(tiles, key)[chosen][:, [point]] for key in _ARRAYS}
+            whole = np.zeros((len(chosen), 1, len(scene.mechanism.joints), 2))
+            for (joint, k), coordinates in turns.items():
+                whole[:, 0, joint, k] = coordinates[chosen, point]
+            moving = BodyPoses(**arrays, turns=whole)
             energy, size = energy_of(scene, moving, kinetic_energy(scene, moving))
             off = values[name][numbers][:, None] - energy
             residuals.note("strike", name, off, size + scene.mass.sum() * scene.speed**2, moving.time, bars[name])
@@ -73,15 +78,6 @@ def kicked(scene: LawScene, tiles: Tiles) -> Array:
     return works
 
 
-def _beside(scene: LawScene, tiles: Tiles, turns: Turns, chosen: NDArray[np.intp], point: int) -> BodyPoses:
-    """One point of each of these tiles."""
-    whole = np.zeros((len(chosen), 1, len(scene.mechanism.joints), 2))
-    for (number, k), coordinates in turns.items():
-        whole[:, 0, number, k] = coordinates[chosen, point]
-    arrays = {name: getattr(tiles, name)[chosen][:, [point]] for name in ("time", "pace", "p", "R", "v", "w")}
-    return BodyPoses(**arrays, turns=whole)
-
-
 def _restitution(
     scene: LawScene, tiles: Tiles, sides: tuple[int, int], item: PublishedEvent, residuals: LawResiduals
 ) -> None:
@@ -106,10 +102,10 @@ def _restitution(
 
 
 def _height(
-    scene: LawScene, tiles: Tiles, later: int, told: tuple[PublishedEvent, float, float], residuals: LawResiduals
+    scene: LawScene, tiles: Tiles, later: int, published: tuple[PublishedEvent, float, float], residuals: LawResiduals
 ) -> None:
-    """The centre of mass of what bounced has its next apex at the height that is told above its place at the impact."""
-    (item, height, bar), world = told, len(scene.mechanism.bodies)
+    """The centre of mass of what bounced has its next apex at the published height above its place at the impact."""
+    (item, height, bar), world = published, len(scene.mechanism.bodies)
     body = next(
         (contact.a if contact.a < world else contact.b for contact in scene.contacts if contact.name == item.name),
         world,
