@@ -8,7 +8,7 @@ import numpy as np
 from air_robots import start_of
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.robots.control.bookkeeping.air import AirRobot, Scheme, Treatment, steps_in_air
+from proofroll.robots.control.bookkeeping.air import AirRobot, AirScheme, Treatment, steps_in_air
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import ControlRecord, record_of
 
@@ -28,7 +28,7 @@ def recorded(
     ``digits``: of the file: ``single`` precision, a number of decimals, or all.
     """
     robot = AirRobot(mechanism, law)
-    steps = steps_in_air(robot, law, robot.coordinates(*start_of(right)), step, Scheme(scheme))
+    steps = steps_in_air(robot, law, robot.coordinates(*start_of(right)), step, AirScheme(scheme))
     run, times = [*itertools.islice(steps, count + 1)], step * np.arange(count + 1)
     states = [robot.state(time, item.q, item.v) for time, item in zip(times, run, strict=True)]
     columns = {}

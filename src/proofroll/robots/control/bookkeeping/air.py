@@ -28,7 +28,7 @@ Treatment = Literal["explicit", "implicit", "rk4"]
 TREATMENTS: tuple[Treatment, ...] = ("explicit", "implicit", "rk4")
 
 
-class Scheme(NamedTuple):
+class AirScheme(NamedTuple):
     """Steps of a program.
 
     Attributes:
@@ -43,7 +43,7 @@ class Scheme(NamedTuple):
 
 
 _KINDS = itertools.product((False, True), (False, True), TREATMENTS[:2])
-SCHEMES = (*(Scheme(treatment, along_base, damped) for damped, along_base, treatment in _KINDS), Scheme("rk4"))
+SCHEMES = (*(AirScheme(treatment, along_base, damped) for damped, along_base, treatment in _KINDS), AirScheme("rk4"))
 _STOP = 1e6  # rad/s or m/s: a run that is faster has blown up
 
 
@@ -224,7 +224,7 @@ class AirStep:
 
 
 def steps_in_air(
-    robot: AirRobot, law: ControlLaw, start: tuple[Array, Array], step: float, scheme: Scheme
+    robot: AirRobot, law: ControlLaw, start: tuple[Array, Array], step: float, scheme: AirScheme
 ) -> Iterator[AirStep]:
     """Motion of a robot in the air without an end, at the first instant and after each step [s].
 
@@ -258,7 +258,12 @@ def steps_in_air(
 
 
 def _stepped(
-    robot: AirRobot, law: ControlLaw, state: tuple[Array, Array], acting: tuple[Array, Array], h: float, scheme: Scheme
+    robot: AirRobot,
+    law: ControlLaw,
+    state: tuple[Array, Array],
+    acting: tuple[Array, Array],
+    h: float,
+    scheme: AirScheme,
 ) -> tuple[Array, Array]:
     """Coordinates and velocities after a step of ``h`` [s], for efforts at its begin and targets."""
     q, v = state
