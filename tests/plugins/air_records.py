@@ -8,7 +8,7 @@ import numpy as np
 from air_robots import start_of
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.robots.control.bookkeeping.air import AirRobot, Scheme, steps_in_air
+from proofroll.robots.control.bookkeeping.air import AirRobot, AirScheme, Treatment, steps_in_air
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import ControlRecord, record_of
 
@@ -20,7 +20,7 @@ def recorded(
     *,
     step: float = 1e-3,
     count: int = 100,
-    scheme: Scheme = "explicit",
+    scheme: Treatment = "explicit",
     digits: str = "",
 ) -> ControlRecord:
     """Record of a run under a law, started as the right law starts.
@@ -28,7 +28,7 @@ def recorded(
     ``digits``: of the file: ``single`` precision, a number of decimals, or all.
     """
     robot = AirRobot(mechanism, law)
-    steps = steps_in_air(robot, law, robot.coordinates(*start_of(right)), step, scheme)
+    steps = steps_in_air(robot, law, robot.coordinates(*start_of(right)), step, AirScheme(scheme))
     run, times = [*itertools.islice(steps, count + 1)], step * np.arange(count + 1)
     states = [robot.state(time, item.q, item.v) for time, item in zip(times, run, strict=True)]
     columns = {}

@@ -13,7 +13,7 @@ from air_records import recorded
 from air_robots import law_of, legged, solo12
 from robot_templates import urdf
 
-from proofroll.robots.control.bookkeeping.air import HeldRobot, Scheme
+from proofroll.robots.control.bookkeeping.air import HeldRobot, Treatment
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, orders
 from proofroll.robots.control.columns import readings_of_early_rates
@@ -28,7 +28,7 @@ LAW = law_of(ROBOT)
 
 @pytest.mark.parametrize("scheme", ["explicit", "implicit", "rk4"])
 @pytest.mark.parametrize("digits", ["", "single", "3"])
-def test_a_clean_record_holds(scheme: Scheme, digits: str) -> None:
+def test_a_clean_record_holds(scheme: Treatment, digits: str) -> None:
     """Every layer of a right record holds, to 1e-9 with all digits, whatever the scheme and the digits."""
     layers = record_layers(recorded(ROBOT, LAW, LAW, scheme=scheme, digits=digits), LAW, ROBOT, grounded=False)
     assert [layer.name for layer in layers if not layer.holds] == []

@@ -1,6 +1,5 @@
 """Hypotheses of contacts: a wrong coefficient, a missing contact, another law of friction."""
 
-import functools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -8,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray, longest
-from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis import Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.fitting import cached_on_evidence, change_by, factor_text
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
@@ -33,7 +32,6 @@ _HELD = 1e-6  # slip speed of the truth that counts as sticking, relative to the
 FORCES_AT_START = "forces of contact"  # line of the certificate
 # A wrong contact changes all of the motion, so that no further cause of the motion is looked for.
 COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
-contact_cause = functools.partial(Cause, covers=COVERS)
 
 
 @dataclass(frozen=True)
@@ -149,9 +147,9 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
             off = abs(factor) <= _OFF
             says = f"friction of {name} is {'off' if off else factor_text(factor)}"
             remainder = longest(T - (0.0 if off else factor) * full)
-            proof = "friction of what slides", "N", longest(T - full), remainder
             remedy, change = "give each pair its own coefficient", change_by(factor)
-            yield contact_cause("friction", says, *proof, remedy, 0 if off else 1, change=change)
+            friction = Difference("friction of what slides", "N", longest(T - full), COVERS)
+            yield friction.cause("friction", says, remainder, remedy, 0 if off else 1, change=change)
 
 
 @hypothesis("contact left out", "a contact never presses, and its shapes overlap where the truth presses them apart")
@@ -164,8 +162,8 @@ def left_out(evidence: Evidence) -> Iterator[Cause]:
             if sunk and not touch.presses[:, k].any():
                 difference, remainder = float(np.nanmax(np.abs(true[1:, k]))), float(np.abs(touch.N[1:, k]).max())
                 says = f"the contact {contact.name} is left out"
-                force = f"normal force of {contact.name}"
-                yield contact_cause("left out", says, force, "N", difference, remainder, "let the pair touch")
+                force = Difference(f"normal force of {contact.name}", "N", difference, COVERS)
+                yield force.cause("left out", says, remainder, "let the pair touch")
 
 
 @hypothesis(
@@ -183,9 +181,9 @@ def convex_cone(evidence: Evidence) -> Iterator[Cause]:
             continue
         # a flight from a closed gap: gap = w t - a t²/2 and its rate w - a t
         began = 2 * touch.found.gap[1, which] / (t[1] - t[0]) - touch.u_n[1, which]
-        says, name = "convex cone: the sliding contact hops at u_n = μ|u_t|", "speed along the normal at the start"
-        remainder = float(np.abs(began - rises[which]).max())
-        yield contact_cause("convex cone", says, name, "m/s", float(rises[which].max()), remainder, _UNCONVEX)
+        says, remainder = "convex cone: the sliding contact hops at u_n = μ|u_t|", np.abs(began - rises[which]).max()
+        speed = Difference("speed along the normal at the start", "m/s", float(rises[which].max()), COVERS)
+        yield speed.cause("convex cone", says, float(remainder), _UNCONVEX)
 
 
 @hypothesis(
@@ -212,10 +210,9 @@ def convex_cone_from_rest(evidence: Evidence) -> Iterator[Cause]:
     if which.any():
         rate = np.sum(of_run.normal * of_run.slide, axis=-1)[0, which]
         says = "convex cone: a body that starts to slide with the acceleration a rises with μa, and hops"
-        difference, remainder = float(rises[which].max()), float(np.abs(rate - rises[which]).max())
-        yield contact_cause(
-            "convex cone", says, "acceleration along the normal at time 0", "m/s^2", difference, remainder, _UNCONVEX
-        )
+        name, difference = "acceleration along the normal at time 0", float(rises[which].max())
+        remainder = float(np.abs(rate - rises[which]).max())
+        yield Difference(name, "m/s^2", difference, COVERS).cause("convex cone", says, remainder, _UNCONVEX)
 
 
 def _as_velocities(start: Placed, rates: list[FloatArray]) -> dict[str, FloatArray]:
@@ -255,9 +252,8 @@ def _of_a_square(
     sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)
     remainder = float(np.abs(sides - bound).max(axis=1).min())
     says = "friction pyramid: friction is bounded by a square about two axes, not by a circle"
-    yield contact_cause(
-        "pyramid", says, "friction of what slides", "N", against, remainder, "choose the elliptic cone", 1
-    )
+    friction = Difference("friction of what slides", "N", against, COVERS)
+    yield friction.cause("pyramid", says, remainder, "choose the elliptic cone", 1)
 
 
 @hypothesis("friction pyramid at time 0", "friction of what slides at time 0 lies on the sides of a square")
@@ -307,8 +303,8 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
         speed = float(np.sum(slip * used) / np.sum(used * used))
         says = f"contacts that stick creep at {speed:.3g} m/s times T/(μN): friction is regularised"
         remainder = float(np.abs(slip - speed * used).max())
-        proof = "slip of what sticks", "m/s", float(slip.max()), remainder
-        yield contact_cause("creep", says, *proof, "make that speed smaller", 1)
+        creeping = Difference("slip of what sticks", "m/s", float(slip.max()), COVERS)
+        yield creeping.cause("creep", says, remainder, "make that speed smaller", 1)
 
 
 HYPOTHESES = (

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, longest
-from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
+from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.fitting import (
     change_by,
     factor_text,
@@ -18,7 +18,7 @@ from proofroll.core.diagnosis.fitting import (
 from proofroll.core.errors import Refused
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.contact.start import TOUCHING
-from proofroll.elements.mechanism.diagnosis.contacts import FORCE, contact_cause
+from proofroll.elements.mechanism.diagnosis.contacts import COVERS, FORCE
 from proofroll.elements.mechanism.diagnosis.equations import of_start
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.run.element import MechanismElement
@@ -74,9 +74,9 @@ class _FirstAccelerations:
         self, says: str, remainder: float, remedy: str, number: int = 0, change: float = np.inf, closes: float = CLOSES
     ) -> Cause:
         """Cause that leaves ``remainder`` of the accelerations, with ``number`` fitted values."""
-        proof = "contacts at time 0", says, "acceleration at time 0", "m/s^2", self.before, remainder, remedy, number
-        change = np.inf if self._wrong else change
-        return contact_cause(*proof, explains=self._found.size, change=change, closes=closes)
+        off = Difference("acceleration at time 0", "m/s^2", self.before, COVERS, closes=closes)
+        change, explains = np.inf if self._wrong else change, self._found.size
+        return off.cause("contacts at time 0", says, remainder, remedy, number, explains=explains, change=change)
 
 
 @hypothesis(

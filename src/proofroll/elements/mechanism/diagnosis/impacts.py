@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
+from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import delay_text
 from proofroll.core.diagnosis.fitting import (
     ABOVE,
@@ -22,7 +22,7 @@ from proofroll.core.diagnosis.fitting import (
 )
 from proofroll.core.errors import InputError, NotUnique
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
-from proofroll.elements.mechanism.diagnosis.contacts import COVERS, contact_cause, touch_of
+from proofroll.elements.mechanism.diagnosis.contacts import COVERS, touch_of
 from proofroll.elements.mechanism.diagnosis.equations import is_one_motion, placed_of
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.observables import PRESSES, Followed, normal_forces
@@ -63,29 +63,26 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
             steps = np.round(2 * np.mean(delays) / evidence.step) / 2
             says = f"impacts come {delay_text(float(np.mean(delays)), evidence.step)}"
             remainder = float(np.max(np.abs(delays - steps * evidence.step) + delay_bars))
-            proof = "time of impacts", "s", size, remainder
             remedy = "let the impact act in the step in which the gap closes"
             closes = CLOSES * min(1.0, evidence.step / size)  # any delay is near some multiple of half a step
-            yield contact_cause("late impact", says, *proof, remedy, 1, closes=closes, explains=len(met))
+            late = Difference("time of impacts", "s", size, COVERS, closes=closes)
+            yield late.cause("late impact", says, remainder, remedy, 1, explains=len(met))
         coefficients = np.array([law[k] for k, _ in met])
         difference = float(np.abs(seen - coefficients).max())
         if difference <= _RATIO:
             continue
-        of_each = sorted({k for k, _ in met})
+        restitution, of_each = Difference("restitution", "1", difference, COVERS), sorted({k for k, _ in met})
         for order in itertools.permutations(of_each):
             moved = dict(zip(of_each, order, strict=True))
             remainder = float(np.max(np.abs(seen - [law[moved[k]] for k, _ in met]) + seen_bars))
             swaps = "; ".join(f"{names[a]} has that of {names[b]}" for a, b in moved.items() if a != b)
             says = f"restitution is of another pair: {swaps}"
-            yield contact_cause(
-                "restitution", says, "restitution", "1", difference, remainder, "give each pair its own"
-            )
+            yield restitution.cause("restitution", says, remainder, "give each pair its own")
         factor = float(seen @ coefficients / (coefficients @ coefficients)) if coefficients.any() else np.nan
         says = f"restitution of all pairs is {factor_text(factor)}"
         remainder = float(np.max(np.abs(seen - factor * coefficients) + seen_bars))
-        proof = "restitution", "1", difference, remainder
-        remedy, change = _REMEDY, change_by(factor)
-        yield contact_cause("restitution", says, *proof, remedy, 1, explains=len(met), change=change)
+        change = change_by(factor)
+        yield restitution.cause("restitution", says, remainder, _REMEDY, 1, explains=len(met), change=change)
 
 
 class _Impact(NamedTuple):
@@ -184,7 +181,8 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
         )
         says, remedy = "convex cone: contacts part after an impact by μ|u_t| too fast", "take Coulomb's own law"
         remainder = float(np.max(np.abs(_missed(mechanism, seen, convex=True))))
-        yield contact_cause("convex cone", says, residuals.quantity, residuals.unit, difference, remainder, remedy)
+        velocities = Difference(residuals.quantity, residuals.unit, difference, COVERS)
+        yield velocities.cause("convex cone", says, remainder, remedy)
         for law in ("friction", "restitution"):
             factor = residuals.fit(functools.partial(_scaled, mechanism, law), 1.0)
             model, says = _scaled(mechanism, law, factor), f"{law} of impacts is {factor_text(factor)}"
@@ -200,8 +198,8 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
             remainder, off = float(np.max(np.abs(missed(by)))), float(np.linalg.norm(by))
             says, remedy = f"the normal of {plane.name} is turned by {off:.4g} rad", "look at the axes of geometries"
             explains = int(np.sum(np.abs(missed(np.zeros(2))) > CLOSES * difference))
-            proof = "normal of a plane", says, residuals.quantity, residuals.unit, difference, remainder, remedy, 2
-            yield contact_cause(*proof, explains=explains, change=np.inf if remainder <= _EXACT * difference else off)
+            change = np.inf if remainder <= _EXACT * difference else off
+            yield velocities.cause("normal of a plane", says, remainder, remedy, 2, explains=explains, change=change)
 
 
 def _struck(mechanism: Mechanism, dataset: Any, followed: Followed, presses: Any) -> Iterator[_Struck]:

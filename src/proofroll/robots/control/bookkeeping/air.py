@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -23,29 +23,27 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.robots.control.bookkeeping.law import ControlLaw, RobotState
 from proofroll.robots.model import NO_BODY, Robot
 
-DAMPED = "_damped"  # end of the name of a scheme whose damping of joints acts at the velocity after the step
-Scheme = Literal[
-    "explicit",
-    "implicit",
-    "explicit_base",
-    "implicit_base",
-    "explicit_damped",
-    "implicit_damped",
-    "explicit_base_damped",
-    "implicit_base_damped",
-    "rk4",
-]
-SCHEMES: Mapping[Scheme, str] = {
-    "explicit": "semi-implicit Euler with kd at the state before the step",
-    "implicit": "semi-implicit Euler with kd at the velocity after the step",
-    "explicit_base": "the same, whose floating base has its velocity along its own axes",
-    "implicit_base": "the same with kd at the velocity after the step",
-    "explicit_damped": "semi-implicit Euler with the joints' own damping at the velocity after the step",
-    "implicit_damped": "the same with kd at the velocity after the step",
-    "explicit_base_damped": "the same, whose floating base has its velocity along its own axes",
-    "implicit_base_damped": "the same with kd at the velocity after the step",
-    "rk4": "RK4",
-}
+# Treatments of gains: semi-implicit Euler with kd at the velocity before a step, or after it; RK4.
+Treatment = Literal["explicit", "implicit", "rk4"]
+TREATMENTS: tuple[Treatment, ...] = ("explicit", "implicit", "rk4")
+
+
+class AirScheme(NamedTuple):
+    """Steps of a program.
+
+    Attributes:
+        treatment: of gains.
+        along_base: True if a floating base has its velocity along its own axes, not along the world's.
+        damped: True if the joints' own damping acts at the velocity after the step.
+    """
+
+    treatment: Treatment = "explicit"
+    along_base: bool = False
+    damped: bool = False
+
+
+_KINDS = itertools.product((False, True), (False, True), TREATMENTS[:2])
+SCHEMES = (*(AirScheme(treatment, along_base, damped) for damped, along_base, treatment in _KINDS), AirScheme("rk4"))
 _STOP = 1e6  # rad/s or m/s: a run that is faster has blown up
 
 
@@ -226,7 +224,7 @@ class AirStep:
 
 
 def steps_in_air(
-    robot: AirRobot, law: ControlLaw, start: tuple[Array, Array], step: float, scheme: Scheme
+    robot: AirRobot, law: ControlLaw, start: tuple[Array, Array], step: float, scheme: AirScheme
 ) -> Iterator[AirStep]:
     """Motion of a robot in the air without an end, at the first instant and after each step [s].
 
@@ -260,23 +258,28 @@ def steps_in_air(
 
 
 def _stepped(
-    robot: AirRobot, law: ControlLaw, state: tuple[Array, Array], acting: tuple[Array, Array], h: float, scheme: Scheme
+    robot: AirRobot,
+    law: ControlLaw,
+    state: tuple[Array, Array],
+    acting: tuple[Array, Array],
+    h: float,
+    scheme: AirScheme,
 ) -> tuple[Array, Array]:
     """Coordinates and velocities after a step of ``h`` [s], for efforts at its begin and targets."""
     q, v = state
     efforts, target = acting
-    if scheme == "rk4":
+    if scheme.treatment == "rk4":
         return _rk4(robot, law, state, (efforts, target), h)
     acceleration = robot.solved(q, v, efforts).acceleration
-    damping = robot.damping if scheme.endswith(DAMPED) else np.zeros(len(v))
-    if scheme.startswith("implicit"):
+    damping = robot.damping if scheme.damped else np.zeros(len(v))
+    if scheme.treatment == "implicit":
         # What is clamped or held does not follow the velocity.
         free = (np.abs(efforts) < law.limit) & (not law.hold_effort)
         damping = damping + robot.load(np.where(free, law.kd, 0.0))
     if damping.any():
         M = robot.equations.inertial(robot.equations.tree.at(q, v))[1]
         acceleration = np.asarray(np.linalg.solve(M + h * np.diag(damping), M @ acceleration), float)
-    return _moved(robot, q, v, acceleration, h, along_base="_base" in scheme)
+    return _moved(robot, q, v, acceleration, h, along_base=scheme.along_base)
 
 
 def _moved(

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from proofroll.core.integrators import classical_step
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.robots.control.bookkeeping.air import AirRobot
+from proofroll.robots.control.bookkeeping.air import TREATMENTS, AirRobot, Treatment
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import Mistake
 
@@ -23,9 +22,6 @@ _FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that a
 _AT_ONCE = 500  # laws that move at once: some 100 MB
 _SLOPE, _ROUNDS = 1e-3, 3  # part of a size for slopes, and rounds of a fit
 _AT_LIMIT, _BEYOND = 0.99, 2.5  # part of the limit of an effort that is clamped; and of the least offset that does so
-# Treatments of gains: kd at the velocity before a step, or after it; or at four stages.
-Treatment = Literal["explicit", "implicit", "rk4"]
-TREATMENTS: tuple[Treatment, ...] = ("explicit", "implicit", "rk4")
 
 
 @dataclass(frozen=True)

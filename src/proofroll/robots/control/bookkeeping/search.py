@@ -15,10 +15,10 @@ import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.robots.control.bookkeeping.air import AirRobot, Scheme, steps_in_air
+from proofroll.robots.control.bookkeeping.air import TREATMENTS, AirRobot, AirScheme, steps_in_air
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import Mistake, SearchTime, fitted, mistakes, offsets_told
-from proofroll.robots.control.bookkeeping.screen import TREATMENTS, MistakeScreen, Screened
+from proofroll.robots.control.bookkeeping.screen import MistakeScreen, Screened
 from proofroll.robots.control.bookkeeping.seen import LawMotions, SeenMotion
 from proofroll.robots.control.record import LayerCause
 
@@ -176,7 +176,7 @@ class MotionSearch:
     @property
     def explicit(self) -> float:
         """Distance without a mistake, with kd at the velocity before a step."""
-        return self._best[0].distance(self.law, "explicit")
+        return self._best[0].distance(self.law, AirScheme())
 
     @cached_property
     def imitated(self) -> bool:
@@ -277,7 +277,7 @@ class MotionSearch:
                     if self._settles(explanation):
                         return
 
-    def _clamped(self, motions: LawMotions, offsets: Array, scheme: Scheme, distance: float) -> list[int]:
+    def _clamped(self, motions: LawMotions, offsets: Array, scheme: AirScheme, distance: float) -> list[int]:
         """Joints for which half of the offset explains a motion as well as all of it."""
         halved = [_moved(self.law, offsets * (1 - 0.5 * row)) for row in np.eye(len(offsets))]
         bound = max(2 * distance, self.seen.bar)
@@ -300,7 +300,7 @@ def explained_start(
 
     def off(trial: ControlLaw) -> Array:
         robot = AirRobot(mechanism, trial)
-        step = next(steps_in_air(robot, trial, (q, v), 1 / trial.rate, "explicit"))
+        step = next(steps_in_air(robot, trial, (q, v), 1 / trial.rate, AirScheme()))
         return robot.solved(q, v, step.efforts).acceleration - acceleration
 
     distance = float(np.abs(off(law)).max())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.robots.control.bookkeeping.air import DAMPED, SCHEMES, AirRobot, Scheme, steps_in_air
+from proofroll.robots.control.bookkeeping.air import SCHEMES, AirRobot, AirScheme, Treatment, steps_in_air
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 
 SHOWN = 0.1  # s: a mistake of bookkeeping shows in the air within it
@@ -23,7 +23,7 @@ _RATES = 0.05  # s: weight of velocities beside places, the time in which a mist
 _SMALL = 1e-3  # least size that slopes are scaled by [rad, m, kg m² or 1]
 # Distance that is none; the same in parts of the rounding of the motion's numbers.
 _NOTHING, _OF_ROUNDING = 1e-9, 30.0
-_OPPOSITE: tuple[Scheme, ...] = ("explicit", "implicit")  # schemes that differ most
+_OPPOSITE = (AirScheme("explicit"), AirScheme("implicit"))  # schemes that differ most
 
 
 @dataclass(frozen=True)
@@ -82,13 +82,11 @@ class LawMotions:
                 self.quaternions.append(slice(place.stop - 4, place.stop))
         damped = any(joint.damping for joint in self.mechanism.joints)
         floats = bool(self.quaternions)
-        self.schemes: list[Scheme] = [
-            name for name in SCHEMES if floats >= ("_base" in name) and damped >= name.endswith(DAMPED)
-        ]
+        self.schemes = [item for item in SCHEMES if floats >= item.along_base and damped >= item.damped]
 
-    def schemes_of(self, treatment: str) -> list[Scheme]:
+    def schemes_of(self, treatment: Treatment) -> list[AirScheme]:
         """Schemes that treat gains in one way."""
-        return [name for name in self.schemes if name.startswith(treatment)]
+        return [scheme for scheme in self.schemes if scheme.treatment == treatment]
 
     def robot(self, law: ControlLaw) -> AirRobot:
         """Robot with the armature and the gravity of a law."""
@@ -105,7 +103,7 @@ class LawMotions:
             off[place] = 2 * (q[place] * np.sign(q[place] @ self.seen.q[row][place]) - self.seen.q[row][place])
         return np.concatenate([off, _RATES * (v - self.seen.v[row])])
 
-    def differences(self, law: ControlLaw, scheme: Scheme, bound: float = math.inf) -> list[Array]:
+    def differences(self, law: ControlLaw, scheme: AirScheme, bound: float = math.inf) -> list[Array]:
         """Differences at the samples, until one exceeds the bound or the motion blows up."""
         count = len(self.seen.time)
         differences: list[Array] = []
@@ -120,7 +118,7 @@ class LawMotions:
             pass
         return differences
 
-    def left(self, law: ControlLaw, scheme: Scheme, bound: float = math.inf) -> Array:
+    def left(self, law: ControlLaw, scheme: AirScheme, bound: float = math.inf) -> Array:
         """Differences at all samples, one after another; NaN if one exceeds the bound or is lacking."""
         differences = self.differences(law, scheme, bound)
         if len(differences) < len(self.seen.time) or not np.abs(differences[-1]).max() <= bound:
@@ -129,27 +127,21 @@ class LawMotions:
 
     def spread(self) -> float:
         """Distance between motions under the law by explicit and by implicit steps; infinite if one blows up."""
-        apart = float(np.abs(np.subtract(*(self.left(self.law, name) for name in _OPPOSITE))).max())
+        apart = float(np.abs(np.subtract(*(self.left(self.law, scheme) for scheme in _OPPOSITE))).max())
         return apart if math.isfinite(apart) else math.inf
 
-    def imitated(self, scheme: Scheme) -> bool:
+    def imitated(self, scheme: AirScheme) -> bool:
         """True if explicit kd with an armature of h kd more moves as implicit kd does."""
         armed = self.law.change(armature=self.law.armature + self.step * self.law.kd)
-        by_armature: Mapping[Scheme, Scheme] = {
-            "implicit": "explicit",
-            "implicit_base": "explicit_base",
-            "implicit_damped": "explicit_damped",
-            "implicit_base_damped": "explicit_base_damped",
-        }
-        same = scheme in by_armature and self.law.kd.any()
-        return bool(same and self.distance(armed, by_armature[scheme]) <= self.seen.bar)
+        same = scheme.treatment == "implicit" and self.law.kd.any()
+        return bool(same and self.distance(armed, scheme._replace(treatment="explicit")) <= self.seen.bar)
 
-    def distance(self, law: ControlLaw, scheme: Scheme, bound: float = math.inf) -> float:
+    def distance(self, law: ControlLaw, scheme: AirScheme, bound: float = math.inf) -> float:
         """Largest difference at all samples; infinite if it exceeds the bound."""
         largest = float(np.abs(self.left(law, scheme, bound)).max())
         return largest if math.isfinite(largest) else math.inf
 
-    def fit(self, law: Callable[[Array], ControlLaw], start: Array, scheme: Scheme, rounds: int) -> Array:
+    def fit(self, law: Callable[[Array], ControlLaw], start: Array, scheme: AirScheme, rounds: int) -> Array:
         """Numbers of a law with which the samples fit best."""
         scale = np.maximum(np.abs(start), _SMALL)
 
