@@ -64,7 +64,8 @@ class _Window(NamedTuple):
         if self.recorded is None:
             return _Piece(places, half, states.T, coarse=self.coarse)
         record, pace = self.recorded(states)
-        return _Piece(states[-1], half * pace, states.T, record.T if len(record) else None, self.coarse)
+        recorded = record.T if len(record) else None
+        return _Piece(time=states[-1], pace=half * pace, states=states.T, record=recorded, coarse=self.coarse)
 
     def halves(self) -> tuple[_Window, _Window]:
         """Both of its halves."""
