@@ -32,7 +32,7 @@ PROTOCOLS = set(table("What an engine may say besides"))
 NAMES = table("Names to build on")
 # Modules from which an engine as a package may import; robots' readers have a face of their own.
 FACES = ("proofroll", "proofroll.adapter", "proofroll.testing", "proofroll.conformance")
-FACES += ("proofroll.robots.protocol", "proofroll.robots.model")
+FACES += ("proofroll.robots.protocol", "proofroll.robots.model", "proofroll.engines.mujoco")
 
 
 def test_every_optional_protocol_is_named() -> None:

@@ -16,6 +16,7 @@ from proofroll.elements.mechanism.dynamics.loop_points import held_points
 from proofroll.elements.mechanism.dynamics.point_loads import loads_at, targets_at
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.run.mujoco_arrays import MujocoArrays
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of, unsaid
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_AXIS, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_quaternion, skew, to_quaternion
@@ -30,9 +31,9 @@ __all__ = [
     "ALL_OF_A_BALL", "ROLLS", "WITH_AXIS", "WORLD", "Array", "BallBuilt", "BallSample", "Body", "BodyMotion",
     "ContactDynamics", "Diverged", "Engine", "Event", "Family", "Force", "Formulation", "HalfSpace", "InputError",
     "Joint", "JointKind", "Level", "Loop", "Mechanism", "MechanismBuilt", "MechanismCapability", "MechanismSample",
-    "Point", "Refused", "Regularised", "RollingBall", "RunOnBody", "Sample", "Scene", "Scheme", "Settings",
-    "SphereShape", "Spring", "Term", "Tree", "drive", "frame_of_axis", "from_quaternion", "held_points", "loads_at",
-    "mechanism_of", "natural_acceleration", "newton_euler", "of_contact", "on_body", "require_provided",
+    "MujocoArrays", "Point", "Refused", "Regularised", "RollingBall", "RunOnBody", "Sample", "Scene", "Scheme",
+    "Settings", "SphereShape", "Spring", "Term", "Tree", "drive", "frame_of_axis", "from_quaternion", "held_points",
+    "loads_at", "mechanism_of", "natural_acceleration", "newton_euler", "of_contact", "on_body", "require_provided",
     "resistance_moment", "rolling_ball", "skew", "targets_at", "terms_held", "to_quaternion", "unsaid", "value_at",
     "whole_steps",
 ]  # fmt: skip

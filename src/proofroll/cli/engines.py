@@ -76,7 +76,9 @@ def listed(
 
 @engines.command()
 def add(
-    name: Annotated[str, typer.Argument(help="Name of the engine, e.g. mujoco.")],
+    name: Annotated[
+        str, typer.Argument(help="Name of the engine, e.g. mujoco, or rapier, whose package examples/engines has.")
+    ],
     requirement: Annotated[
         list[str] | None, typer.Option(help="What is installed, as pip reads it, e.g. mujoco==3.8.1.")
     ] = None,
@@ -85,10 +87,19 @@ def add(
 ) -> None:
     """Make an environment with an engine of another version and this proofroll, and remember it.
 
-    It is kept below PROOFROLL_ENGINES, by default XDG_DATA_HOME/proofroll/engines.
+    It is kept below PROOFROLL_ENGINES, by default XDG_DATA_HOME/proofroll/engines. Without --requirement, the package
+    of an engine in examples/engines of a checkout is installed into this Python.
     """
+    from proofroll.core.plugins import engine_names
     from proofroll.running.make_environment import add as made
 
+    if not requirement and name.isidentifier() and name not in engine_names():
+        from proofroll.running.example_packages import example_packages, install
+
+        with options.spinner(f"{name}: installing its package"):
+            version, folder = install(name, example_packages())
+        sys.stdout.write(f"{name}: version {version}, installed from {folder}\n")
+        return
     with options.spinner(f"{name}: making an environment") as say:
         added = made(name, requirement or (), label, python, lambda text: say(f"{name}: {text}"))
     sys.stdout.write(f"{name}@{added.label}: {name} {added.version}, Python {added.interpreter}, in {added.folder}\n")

@@ -126,19 +126,19 @@ def _made(
     python = venv / "bin" / "python"
     tell(f"making {venv}")
     try:
-        _call([sys.executable, "-m", "virtualenv", "--quiet", "--python", base or sys.executable, venv])
+        output_of([sys.executable, "-m", "virtualenv", "--quiet", "--python", base or sys.executable, venv])
     except ProofrollError as error:
         raise InputError("--python", base or sys.executable, f"no environment can be made from it: {error}") from None
     carried = _carried(name, next(venv.glob("lib/python*/site-packages")))
     tell("installing by pip")
-    _call([python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *carried, *requirements])
+    output_of([python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *carried, *requirements])
     tell(f"importing {name}")
     try:
         version = describe(f"{name}@{python}").version
     except ProofrollError as error:
         reason = str(error).replace(f"{name}@{python}: ", "")
         raise ProofrollError(f"{name} does not work with {', '.join(requirements)}: {reason}") from None
-    inspected = json.loads(_call([python, "-m", "pip", "inspect"]))
+    inspected = json.loads(output_of([python, "-m", "pip", "inspect"]))
     return Environment(
         name=name,
         label=label,
@@ -168,7 +168,7 @@ def _carried(name: str, site: Path) -> list[str]:
     return requirements
 
 
-def _call(command: Sequence[str | Path]) -> str:
+def output_of(command: Sequence[str | Path]) -> str:
     """Output of a program; when this process is interrupted, the program and all that it started are killed."""
     try:
         code, printed, errors_printed = printed_by(command, environment_of_another())

@@ -103,7 +103,7 @@ class Mujoco:
         return mechanism_source(cls.model_file(scene, settings), mechanism_of(scene))
 
 
-def mjspec(scene: Scene, *, portable: bool = False, **settings: Any) -> mujoco.MjSpec:
+def mjspec(scene: Scene, *, portable: bool = False, sensors: bool = True, **settings: Any) -> mujoco.MjSpec:
     """MjSpec of a scene as ``proofroll export`` writes it; its keyframe ``start`` is time 0.
 
     Bodies and joints of a mechanism have the scene's names; of several MuJoCo joints that make up one, .0, .1 … follow.
@@ -113,7 +113,8 @@ def mjspec(scene: Scene, *, portable: bool = False, **settings: Any) -> mujoco.M
     Args:
         scene: one that the formulation represents.
         portable: False keeps a state that is not finite as it is; True leaves MuJoCo's automatic reset on, for readers
-            that refuse the flag (mujoco_warp).
+            that refuse the flag (mujoco_warp), and takes targets held between instants, whose ``ctrl`` the reader sets.
+        sensors: False leaves out the sensors of reactions.
         **settings: settings of the adapter (``formulation``, ``dt``, ``preset`` …), by default those of ``run``.
 
     Raises:
@@ -121,7 +122,9 @@ def mjspec(scene: Scene, *, portable: bool = False, **settings: Any) -> mujoco.M
         Refused: MuJoCo cannot represent the scene, or only with values that the adapter sets anew in every step.
     """
     engine = load_engine(Mujoco.name)
-    spec = engine.build(scene, resolve_settings(engine, settings, scene.requires)).spec()
+    spec = engine.build(scene, resolve_settings(engine, settings, scene.requires)).spec(portable)
+    for sensor in () if sensors else tuple(spec.sensors):
+        spec.delete(sensor)
     if portable:
         spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return spec

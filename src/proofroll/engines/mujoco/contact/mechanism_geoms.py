@@ -101,7 +101,7 @@ class MujocoGeoms(MujocoMechanism):
         self._data.qvel[:] = velocities
         evaluate_behind(self._data, self._evaluate_step, self._settings.velocity_lag, share, _LAGS)
 
-    def spec(self) -> Any:
+    def spec(self, portable: bool = False) -> Any:
         """MjSpec, whose keyframe ``start`` is time 0. Raises Refused if each step poses or edits the contacts."""
         if self._walls:
             raise Refused("the plane that stands for a curved wall is posed in every step, and in no MJCF")
@@ -109,7 +109,7 @@ class MujocoGeoms(MujocoMechanism):
             raise Refused("the correction of the cone is made in every step, and in no MJCF; set cone_correction=false")
         if self._resistance:
             raise Refused("the torque of rolling resistance is computed in every step, and in no MJCF")
-        return super().spec()
+        return super().spec(portable)
 
     def _run(self, steps: int) -> None:
         edits = self._settings.cone_correction or self._settings.curvature

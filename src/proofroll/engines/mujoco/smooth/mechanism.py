@@ -117,13 +117,14 @@ class MujocoMechanism(SteppedModel):
         with silent():
             mujoco.mj_forward(self._model, self._data)
 
-    def spec(self) -> Any:
-        """MjSpec, whose keyframe ``start`` is time 0.
+    def spec(self, portable: bool = False) -> Any:
+        """MjSpec, whose keyframe ``start`` is time 0; ``portable``: with targets that its reader sets between instants.
 
         Raises:
             Refused: a drive or the target of an actuator changes in time: MuJoCo keeps these in the state.
         """
-        if self._moving or self._set or self._loads.any or self._motions:
+        held = [field for _, field, _ in self._set if not portable or field != "ctrl"]
+        if self._moving or held or self._loads.any or self._motions:
             advice = "is set from outside in every step, and in no MJCF"
             raise Refused(
                 f"an applied force, a bushing, a prescribed motion, and a drive or target that changes, {advice}"

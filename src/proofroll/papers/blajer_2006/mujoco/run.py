@@ -146,8 +146,8 @@ class MujocoBall(SteppedModel):
         with silent():
             start(model, self._data, body, settings, self._formulation)
 
-    def spec(self) -> Any:
-        """MjSpec of the scene, whose keyframe ``start`` is the present state."""
+    def spec(self, portable: bool = False) -> Any:  # noqa: ARG002
+        """MjSpec of the scene, whose keyframe ``start`` is the present state; nothing is set from outside."""
         spec = _spec(self._scene, self._body, self._settings)
         for key in list(spec.keys):
             spec.delete(key)

@@ -1,0 +1,1 @@
+"""Jolt Physics for proofroll."""

@@ -1,0 +1,1 @@
+"""MJX for proofroll."""

@@ -1,0 +1,94 @@
+"""Engine MuJoCo Warp: MuJoCo's equations as kernels of Warp, in single precision; one world."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+import mujoco
+import mujoco_warp
+import numpy as np
+import warp
+
+from proofroll.adapter import (
+    Array,
+    Diverged,
+    MechanismBuilt,
+    MechanismSample,
+    MujocoArrays,
+    Scene,
+    drive,
+    mechanism_of,
+    targets_at,
+    whole_steps,
+)
+from proofroll.engines.mujoco import mjspec
+from proofroll_mujoco_warp.settings import INTEGRATORS, LACKING, PRESETS, PROVIDES, MujocoWarpSettings
+
+warp.config.quiet = True
+
+
+class MujocoWarp:
+    """MuJoCo Warp. See :class:`proofroll.core.engine.Engine`."""
+
+    name: ClassVar[str] = "mujoco_warp"
+    title: ClassVar[str] = "MuJoCo Warp"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, PROVIDES)
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = dict.fromkeys(PRESETS, LACKING)
+    settings: ClassVar[type[MujocoWarpSettings]] = MujocoWarpSettings
+    presets: ClassVar[Mapping[str, Mapping[str, MujocoWarpSettings]]] = PRESETS
+
+    @staticmethod
+    def version() -> str:
+        """Version of the package."""
+        return importlib.metadata.version("mujoco-warp")
+
+    @classmethod
+    def build(cls, scene: Scene, settings: MujocoWarpSettings) -> MujocoWarp:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return cls(scene, settings)
+
+    def __init__(self, scene: Scene, settings: MujocoWarpSettings) -> None:
+        self._mechanism, self._dt, self._count = mechanism_of(scene), settings.dt, 0
+        integrator = INTEGRATORS[settings.formulation]
+        host = mjspec(scene, portable=True, sensors=False, dt=settings.dt, integrator=integrator).compile()
+        start = mujoco.MjData(host)
+        mujoco.mj_resetDataKeyframe(host, start, host.key("start").id)
+        mujoco.mj_forward(host, start)
+        self._arrays = MujocoArrays.of(self._mechanism, host)
+        self._model, rows = mujoco_warp.put_model(host), max(256, 4 * start.nefc)
+        mujoco_warp.step(self._model, mujoco_warp.put_data(host, start, njmax=rows))  # compiles
+        self._data = mujoco_warp.put_data(host, start, njmax=rows)
+        warp.synchronize()
+
+    def drive(self, values: Iterable[float]) -> None:
+        """See :class:`proofroll.core.engine_abilities.TakesTargets`."""
+        drive(self._mechanism, values)
+        controls, targets = self._data.ctrl.numpy(), targets_at(self._mechanism, self._count * self._dt)
+        controls[0, : len(targets)] = targets
+        self._data.ctrl.assign(controls)
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        for _ in range(whole_steps(self._count * self._dt, t, self._dt)):
+            mujoco_warp.step(self._model, self._data)
+            self._count += 1
+        warp.synchronize()
+        if not np.isfinite(self._data.qvel.numpy()).all():
+            raise Diverged(f"MuJoCo Warp's velocities are not finite at t = {t:g} s")
+
+    def sample(self) -> MechanismSample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        for refresh in (mujoco_warp.kinematics, mujoco_warp.com_pos, mujoco_warp.com_vel):
+            refresh(self._model, self._data)
+        return self._arrays.sample(lambda name: _first(getattr(self._data, name)))
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return self._arrays.built(lambda name: _first(getattr(self._model, name)), _first(self._model.opt.gravity))
+
+
+def _first(values: object) -> Array:
+    """Values of the first world."""
+    return np.asarray(values.numpy()[0])  # type: ignore[attr-defined]
