@@ -165,5 +165,5 @@ class _Walk:
             if self._working and (part := parts[-1]) is not None:
                 self.work.take(part)
             goes_on = stretch is not route.path.stretches[-1] and (stretch.end < end or self._working)
-            ending = route.ending(stretch) if goes_on else None
+            ending = route.ending(number) if goes_on else None
         return parts

@@ -64,7 +64,8 @@ class _Window(NamedTuple):
         if self.recorded is None:
             return _Piece(places, half, states.T, coarse=self.coarse)
         record, pace = self.recorded(states)
-        return _Piece(states[-1], half * pace, states.T, record.T if len(record) else None, self.coarse)
+        recorded = record.T if len(record) else None
+        return _Piece(time=states[-1], pace=half * pace, states=states.T, record=recorded, coarse=self.coarse)
 
     def halves(self) -> tuple[_Window, _Window]:
         """Both of its halves."""
@@ -158,9 +159,12 @@ class LawRecorder:
             "w": of_bodies[..., 15:] / self._units.time,
         }
 
-    def ending(self, stretch: Stretch[ContactMode]) -> Pieces:
-        """End of a stretch, with all forces of contacts, stops and dry friction."""
+    def ending(self, number: int) -> Pieces:
+        """End of a stretch before another; if something is decided there, with forces of contacts, stops, friction."""
+        stretch, later = self.path.stretches[number : number + 2]
         mode, m, count = self._route.acting(stretch, stretch.last), self._mechanism, len(self._mechanism.contacts)
+        if stretch.guard is None and np.array_equal(stretch.last, later.first):  # as at an instant of a controller
+            return stated(m, self._modes(mode), **self._point(stretch.end, stretch.last))
         touching, forces = self._route.in_stretch(stretch, lambda: self._route.borne(stretch.last, mode))
         fields, units = self._point(stretch.end, stretch.last), self._units
         pieces = stated(m, self._modes(mode), **fields)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.truth.check.laws.integrals import dot, norm, turned
+from proofroll.truth.check.laws.integrals import cross, dot, norm, turned
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Pieces
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
@@ -154,7 +154,7 @@ def rolling_of(contact: PairContact, pieces: Pieces, k: int, relative: Array) ->
     ball, body = (contact.solid_a, contact.a) if first else (contact.solid_b, contact.b)
     centre = pieces.p[..., body, :] + turned(pieces.R[..., body, :, :], ball.centre)
     sign = 1.0 if first else -1.0
-    return np.asarray(np.cross(normal, slide_of(contact, pieces, centre)) * (sign / ball.radius))
+    return np.asarray(cross(normal, slide_of(contact, pieces, centre)) * (sign / ball.radius))
 
 
 def _turning(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from proofroll.truth.check.laws.impacts import held
+from proofroll.truth.check.laws.integrals import cross
 from proofroll.truth.check.laws.record import Array, BodyPoses, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
@@ -40,7 +41,7 @@ def _changes(scene: LawScene, one: BodyPoses) -> Array:
             reactions[-1][number] = *force, *moment
             effect = np.zeros((len(scene.mass), 6))
             for body, sign in ((connection.b, 1.0), (connection.a, -1.0)):
-                effect[body] += sign * np.array([*force, *(np.cross(place - centres[body], force) + moment)])
+                effect[body] += sign * np.array([*force, *(cross(place - centres[body], force) + moment)])
             columns.append(effect[:-1].ravel())
     if not columns:
         return np.zeros((len(scene.connections), 6))

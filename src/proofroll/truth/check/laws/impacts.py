@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.check.laws.contacts import gap_of, slide_of
-from proofroll.truth.check.laws.integrals import norm, turned
+from proofroll.truth.check.laws.integrals import cross, norm, turned
 from proofroll.truth.check.laws.joints import coordinate_of
 from proofroll.truth.check.laws.record import Array, BodyPoses, Passage, Pieces
 from proofroll.truth.check.laws.residuals import LawResiduals
@@ -112,7 +112,7 @@ def _column(
     centres, momenta = scene.centres(pieces_before)[0][0, 0], np.zeros((len(scene.mass), 6))
     for body, sign in zip(ends, (1.0, -1.0), strict=True):
         momenta[body, :3] += sign * force
-        momenta[body, 3:] += sign * (np.cross(place - centres[body], force) + moment)
+        momenta[body, 3:] += sign * (cross(place - centres[body], force) + moment)
     return momenta[:-1].ravel()
 
 
@@ -124,7 +124,7 @@ def held(scene: LawScene, pieces: BodyPoses, connection: JointFrames) -> list[tu
         apart = (placed.origin_b - placed.origin_a)[0, 0]
         return [(apart / np.linalg.norm(apart), none)]
     forces = [(A[:, k], none) for k in HELD_PLACES.get(connection.kind, (0, 1, 2))]
-    return forces + [(none, np.cross(A[:, i], B[:, k])) for i, k in HELD_TURNS.get(connection.kind, ())]
+    return forces + [(none, cross(A[:, i], B[:, k])) for i, k in HELD_TURNS.get(connection.kind, ())]
 
 
 def _coordinate(scene: LawScene, passage: Passage, number: int) -> Coordinate:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
-from proofroll.truth.check.laws.integrals import dot, norm
+from proofroll.truth.check.laws.integrals import cross, dot, norm
 from proofroll.truth.check.laws.joint_forces import forces_along
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import Array, BodyPoses, Pieces, PublishedValues
@@ -117,7 +117,7 @@ def closure(
         residuals.note("joint rate", name, dot(placed.slide, A[..., k]), sizes.velocity, time)
     for i, k in HELD_TURNS.get(connection.kind, ()):
         residuals.note("joint place", name, dot(A[..., i], B[..., k]), 1.0, time)
-        residuals.note("joint rate", name, dot(np.cross(B[..., k], A[..., i]), placed.spin), sizes.spin, time)
+        residuals.note("joint rate", name, dot(cross(B[..., k], A[..., i]), placed.spin), sizes.spin, time)
 
 
 def loop_forces(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.truth.check.laws.integrals import dot, norm, of_angles, turned, turned_back
+from proofroll.truth.check.laws.integrals import cross, dot, norm, of_angles, turned, turned_back
 from proofroll.truth.check.laws.record import Array, BodyPoses
 from proofroll.truth.check.laws.residuals import ROUND
 from proofroll.truth.check.laws.scene import LawScene, velocity_at
@@ -51,7 +51,7 @@ class BodyLoads:
             return
         arm = place - self._centres[..., body, :]
         self.force[..., body, :] += force
-        self.moment[..., body, :] += np.cross(arm, force) + moment
+        self.moment[..., body, :] += cross(arm, force) + moment
         self.force_size[..., body] += norm(force)
         reach = norm(arm) + _ARM * self._scene.length
         self.moment_size[..., body] += norm(force) * reach + norm(np.broadcast_to(moment, force.shape))
@@ -170,5 +170,5 @@ def _bent(R: Array, stiffness: Array) -> Any:
     series = 1 / 12 + angle**2 / 720 + angle**4 / 30240
     factor = np.where(angle > _SMALL, 1 / large**2 - 1 / (2 * large * np.tan(large / 2)), series)
     moment = stiffness * theta
-    across = np.cross(theta, moment)
-    return moment + 0.5 * across + factor[..., None] * np.cross(theta, across)
+    across = cross(theta, moment)
+    return moment + 0.5 * across + factor[..., None] * cross(theta, across)

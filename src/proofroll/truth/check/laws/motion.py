@@ -6,7 +6,7 @@ import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.contacts import contact_laws
-from proofroll.truth.check.laws.integrals import integral, norm, since_start, tail, turned
+from proofroll.truth.check.laws.integrals import cross, integral, norm, since_start, tail, turned
 from proofroll.truth.check.laws.joints import joint_laws
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import Array, BodyPoses, Pieces
@@ -25,7 +25,7 @@ def kinematics(scene: LawScene, pieces: BodyPoses, residuals: LawResiduals) -> N
         far = scene.length + np.abs(p).max((1, 2))[:, None]
         unresolved = norm(tail(v, pace))
         residuals.note("place", body.name, norm(since_start(p) - integral(v, pace)), far, time, tail=unresolved)
-        rate = np.cross(w[..., None, :], R.swapaxes(-1, -2)).swapaxes(-1, -2)  # [w] R by columns
+        rate = cross(w[..., None, :], R.swapaxes(-1, -2)).swapaxes(-1, -2)  # [w] R by columns
         apart, unresolved = since_start(R) - integral(rate, pace), tail(rate, pace).max((-1, -2))
         residuals.note("turn", body.name, np.abs(apart).max((-1, -2)), 1.0, time, tail=unresolved)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.truth.check.laws.contacts import contact_laws
-from proofroll.truth.check.laws.integrals import COUNT, dot, norm, turned
+from proofroll.truth.check.laws.integrals import COUNT, cross, dot, norm, turned
 from proofroll.truth.check.laws.joints import FreeDirection, joint_laws, loop_forces
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, PublishedValues
@@ -122,7 +122,7 @@ class _Unknown:
                     if body < self._bodies:
                         arm = place - self._centres[..., body, :]
                         column[..., body, :3] += 0.0 if turns else sign * unit
-                        column[..., body, 3:] += sign * (unit if turns else np.cross(arm, unit))
+                        column[..., body, 3:] += sign * (unit if turns else cross(arm, unit))
                 self._columns.append(column)
 
     def explained(self, left: Array, sizes: Array) -> tuple[Array, Array]:

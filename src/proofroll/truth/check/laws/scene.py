@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.check.laws.integrals import dot, frame_of, of_angles, turned
+from proofroll.truth.check.laws.integrals import cross, dot, frame_of, of_angles, turned
 from proofroll.truth.check.laws.record import Array, BodyPoses
 from proofroll.truth.check.laws.signals import value_of
 from proofroll.truth.check.laws.surfaces import PairContact, contacts_of
@@ -168,12 +168,12 @@ class LawScene:
     def centres(self, pieces: BodyPoses) -> tuple[Array, Array]:
         """Centres of mass [m] and their velocities [m/s]."""
         arm = turned(pieces.R, self.com)
-        return pieces.p + arm, pieces.v + np.cross(pieces.w, arm)
+        return pieces.p + arm, pieces.v + cross(pieces.w, arm)
 
 
 def velocity_at(pieces: BodyPoses, body: int, place: Array) -> Array:
     """Velocity of a body at places [m/s]."""
-    return np.asarray(pieces.v[..., body, :] + np.cross(pieces.w[..., body, :], place - pieces.p[..., body, :]))
+    return np.asarray(pieces.v[..., body, :] + cross(pieces.w[..., body, :], place - pieces.p[..., body, :]))
 
 
 def motion_of(signal: Any, time: Array) -> Array:

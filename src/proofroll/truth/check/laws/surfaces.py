@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from proofroll.truth.check.laws.integrals import dot, norm, of_angles, turned, turned_back
+from proofroll.truth.check.laws.integrals import cross, dot, norm, of_angles, turned, turned_back
 from proofroll.truth.check.laws.record import Array
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ def _apart(a: SurfaceShape, b: SurfaceShape, A: Pose, B: Pose) -> Array:
     U, W = A[1] @ a.frame, B[1] @ b.frame
     apart = A[0] + turned(A[1], a.centre) - B[0] - turned(B[1], b.centre)
     faces = np.concatenate([U.swapaxes(-1, -2), W.swapaxes(-1, -2)], -2)
-    edges = np.cross(U.swapaxes(-1, -2)[..., :, None, :], W.swapaxes(-1, -2)[..., None, :, :])
+    edges = cross(U.swapaxes(-1, -2)[..., :, None, :], W.swapaxes(-1, -2)[..., None, :, :])
     edges = edges.reshape(*U.shape[:-2], 9, 3)
     size = norm(edges)[..., None]
     directions = np.concatenate([faces, np.where(size > _PARALLEL, edges / np.maximum(size, _PARALLEL), 0.0)], -2)

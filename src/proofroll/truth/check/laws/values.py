@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from proofroll.truth.check.laws.contacts import gap_of, slide_of
-from proofroll.truth.check.laws.integrals import dot, norm, of_angles, of_quaternion, turned
+from proofroll.truth.check.laws.integrals import cross, dot, norm, of_angles, of_quaternion, turned
 from proofroll.truth.check.laws.joints import coordinate_of
 from proofroll.truth.check.laws.loads import bushing_load, rotation_vector, spring_ends, spring_pull
 from proofroll.truth.check.laws.record import Array, BodyPoses, PublishedValues
@@ -175,7 +175,7 @@ def _names(scene: LawScene, published: PublishedValues, residuals: LawResiduals)
             number, centres = scene.index[body.name], scene.centres(pieces)[0][:, 0]
             signs = np.array([(contact.a == number) - (contact.b == number) for contact in scene.contacts], float)
             arms = pieces.place[:, 0] - centres[:, number, None]
-            total = np.einsum("k,tki->ti", signs, np.cross(arms, forces))
+            total = np.einsum("k,tki->ti", signs, cross(arms, forces))
             both, least = (_vector(published, f"net_torque.{body.name}"), total), norm(arms).max() * np.abs(forces)
             _same(f"net_torque.{body.name}", both, published, residuals, float(np.nanmax(least, initial=0.0)))
     for name, first, second in pairs:
