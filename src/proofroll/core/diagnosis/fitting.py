@@ -112,6 +112,7 @@ class Residuals(Generic[M]):
         exact: True if the engine's own accelerations leave nothing but round-off to its model. They show that numbers
             read back are not those by which it moves; a run with the errors of its steps does not.
         scheme: residual that a scheme of first order leaves by itself at the engine's step, as ``left``.
+        leaves: residual that rounding and the step may leave of a right model, as ``left``.
     """
 
     left: Callable[[M | None], FloatArray]
@@ -125,6 +126,7 @@ class Residuals(Generic[M]):
     contradicted: Callable[[M], bool] = lambda _: False
     exact: bool = False
     scheme: FloatArray | float = 0.0
+    leaves: FloatArray | float = np.inf
 
     @cached_property
     def _changes(self) -> FloatArray:
@@ -174,7 +176,8 @@ class Residuals(Generic[M]):
         """
         remainder = self.largest(model)
         closes = remainder <= self.closes * self.before
-        if closes and (model is None or self.contradicted(model)):
+        part_left = closes and bool(np.any(np.abs(self.left(model)) > self.leaves))
+        if closes and (model is None or part_left or self.contradicted(model)):
             remainder = np.inf
         explains = self.explained(model) if number and closes else None
         proof = self.quantity, self.unit, self.before, remainder, remedy, number, self.covers, self.closes

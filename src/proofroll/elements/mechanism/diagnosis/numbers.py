@@ -210,14 +210,16 @@ def _about_origin(
 def damped_motion(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: velocities or spins of bodies, or both, decay at one rate, as engines for games have it.
 
-    Only free bodies tell it from damping in joints.
+    Only free bodies, or all momenta of several, tell it from damping in joints.
     """
     mechanism, period = evidence.element.mechanism, evidence.element.natural_time
     remedy = "find the engine's own damping, drag or sleeping, and switch it off"
     free = any(joint.kind == JointKind.FREE for joint in mechanism.joints)
-    for residuals in residuals_of(evidence) if free else ():
+    kinds = [("velocities", (1.0, 0.0)), ("spins", (0.0, 1.0))] if free else []
+    kinds += [("velocities and spins", (1.0, 1.0))] if free or len(mechanism.bodies) > 1 else []
+    for residuals in residuals_of(evidence) if kinds else ():
         plain = residuals.left(Change(mechanism))
-        for what, which in (("velocities", (1.0, 0.0)), ("spins", (0.0, 1.0)), ("velocities and spins", (1.0, 1.0))):
+        for what, which in kinds:
             slope = residuals.left(Change(mechanism, decay=which)) - plain
             square = float(slope @ slope)
             rate = -float(slope @ plain) / square if square else 0.0
@@ -225,6 +227,51 @@ def damped_motion(evidence: Evidence) -> Iterator[Cause]:
                 says = f"{what} of all bodies are damped at a rate of {rate:.4g} per second"
                 model = Change(mechanism, decay=(rate * which[0], rate * which[1]))
                 yield residuals.cause("damped motion", says, model, remedy, 1, rate * period)
+
+
+@hypothesis(
+    "several numbers", "the equations are linear in all of them: one fit balances them at every state of the run"
+)
+def of_several(evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: two or more terms of all bodies or joints have factors, or their momenta decay; solved together."""
+    mechanism = evidence.element.mechanism
+    gravity = np.array(mechanism.gravity)
+    terms: dict[str, Callable[[float], dict[str, Any]]] = {
+        "gravity": lambda x: {"gravity": (1 + x) * gravity},
+        "the gyroscopic moments w x I w": lambda x: {"gyroscopic": 1 + x},
+        "the damping of the joints": lambda x: {"damping": 1 + x},
+        "the stiffness of the joints": lambda x: {"stiffness": 1 + x},
+        "velocities and spins": lambda x: {"decay": (x, x)},
+    }
+    for residuals in residuals_of(evidence):
+        plain = residuals.left(Change(mechanism))
+        columns = {name: residuals.left(Change(mechanism, **term(1.0))) - plain for name, term in terms.items()}
+        names = [name for name, column in columns.items() if np.any(column)]
+        least = np.broadcast_to(np.minimum(residuals.leaves, residuals.closes * residuals.before), plain.shape)
+        values: FloatArray = np.zeros(0)
+        while len(names) > 1:
+            slopes = np.stack([columns[name] for name in names], axis=-1)
+            values = -np.linalg.lstsq(slopes, plain, rcond=None)[0]
+            shares = np.max(np.abs(slopes * values) / least[:, None], axis=0)  # below 1: within its error
+            if np.min(shares) > 1:
+                break
+            names.pop(int(np.argmin(shares)))
+        found = dict(zip(names, values.tolist(), strict=False))
+        rate = found.pop("velocities and spins", 0.0)
+        if (
+            len(names) < 2
+            or rate < 0
+            or not all(possible(1 + value, name == "gravity") for name, value in found.items())
+        ):
+            continue
+        says = [f"{name} {factor_text(1 + value)}" for name, value in found.items()]
+        says += [f"velocities and spins of all bodies damped at a rate of {rate:.4g} per second"] if rate else []
+        model = Change(
+            mechanism,
+            **{key: item for name, x in zip(names, values, strict=True) for key, item in terms[name](x).items()},
+        )
+        words, remedy = f"the engine moves it with {' and '.join(says)}", "find these terms in the engine, each alone"
+        yield residuals.cause("several numbers", words, model, remedy, len(names))
 
 
 @hypothesis(
