@@ -5,7 +5,9 @@ from proofroll_mjx.engine import Mjx
 
 from proofroll.conformance import checks
 
-KNOWN: dict[str, str] = {}
+KNOWN = {
+    "order_is_as_declared[f64-matched]": "connects lack the acceleration by velocities, whose error falls faster than the step",
+}
 
 
 @pytest.mark.nightly
