@@ -34,6 +34,7 @@ from proofroll.cli.replay import replay
 from proofroll.cli.report import report
 from proofroll.cli.run import run
 from proofroll.cli.stability import stability
+from proofroll.cli.watch import watch
 from proofroll.core.entry_points import broken, leave_out, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, choices
 from proofroll.report.terminal.printable import spelled_out
@@ -47,7 +48,7 @@ app = typer.Typer(
 )
 _ALIKE = 0.7  # least likeness, of 1, of an option that a wrong one may mean
 _STUDIES = (compare, report, recommend, ladder, stability, fuzz, diff)
-for _command in (scenes, run, judge, replay, export, findings, cite, *_STUDIES):
+for _command in (scenes, run, judge, replay, watch, export, findings, cite, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")
 app.add_typer(engines, name="engines")

@@ -8,7 +8,7 @@ from typer.core import TyperGroup
 
 # Title -> commands in their order. Commands of other packages that are not named here come last.
 GROUPS = {
-    "Ask": ("scenes", "run", "replay", "compare", "recommend", "report", "diff"),
+    "Ask": ("scenes", "run", "replay", "watch", "compare", "recommend", "report", "diff"),
     "Bring": ("new", "check", "judge", "export"),
     "Study": ("stability", "ladder", "fuzz", "balance", "paper"),
     "Maintain": ("engines", "findings", "cite"),

@@ -50,6 +50,7 @@ def compare(
     settings: options.Set = None,
     _root: options.Root = None,
     control: options.Control = None,
+    ground: options.Ground = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,
@@ -90,6 +91,7 @@ def compare(
     from proofroll.running.idle_workers import Workers
     from proofroll.studies.comparison.by_name import comparison_named
 
+    settings = options.with_ground(settings, control, ground)
     comparison, workers = options.controlled(comparison, control), Workers()
     assigned, bounds = options.assignments(settings), tolerance or []
     if like is not None or (engine and bounds):

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -117,6 +117,14 @@ Control = Annotated[
     Path | None,
     typer.Option("--control", help="TOML file of the controller of a robot file: gains, targets or policy, start."),
 ]
+Ground = Annotated[
+    Literal["file", "plane", "none"] | None,
+    typer.Option(
+        "--ground",
+        help="With --control: the robot stands on the floor of its file, on a plane z = 0, or is in the air; "
+        "by default as the controller's [ground] says.",
+    ),
+]
 Set = Annotated[
     list[str] | None, typer.Option("--set", help="parameter=value, in SI units or as '30 deg', '2 mm'; repeat.")
 ]
@@ -152,6 +160,15 @@ def controlled(scene: str, control: Path | None) -> str:
     from proofroll.files.scene_sources import with_control
 
     return with_control(scene, control)
+
+
+def with_ground(settings: list[str] | None, control: Path | None, ground: str | None) -> list[str] | None:
+    """Assignments of ``--set`` with that of ``--ground``. Raises InputError without a controller."""
+    if ground is None:
+        return settings
+    if control is None:
+        raise InputError("--ground", ground, "a robot stands under a controller; give that with --control, too")
+    return [*(settings or ()), f"ground={('none', 'file', 'plane').index(ground)}"]
 
 
 def doubt_numbers(scene: str, settings: list[str] | None) -> None:

@@ -32,6 +32,7 @@ def recommend(
     settings: options.Set = None,
     _root: options.Root = None,
     control: options.Control = None,
+    ground: options.Ground = None,
     engine: Annotated[
         list[str] | None,
         typer.Option(
@@ -67,6 +68,7 @@ def recommend(
 
     if plot is not None:
         _require_drawable(plot, scenes)
+    settings = options.with_ground(settings, control, ground)
     scenes = [options.controlled(scene, control) for scene in scenes]
     questions = [question_named(scene, options.assignments(settings), until) for scene in scenes]
     questions = [item.sampled_for(_given_step(engine or [])) for item in questions]
@@ -146,9 +148,9 @@ def _answer(
                 f"searching {', '.join(names)} in {place}: at most {WHOLE.engine:g} s of processor time each"
             )
 
-    def tell(item: EngineAnswer) -> None:
+    def tell(item: EngineAnswer, until: float) -> None:
         if not quiet:
-            options.complain(sentence(item, question.until))
+            options.complain(sentence(item, until))
 
     with options.progress_bar(f"{question.scene}: the truth") as advance:
         (made,) = answer(question, [asked], engines, runner, begin, tell, lambda engine: advance(f"runs of {engine}"))

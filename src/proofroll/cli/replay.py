@@ -1,4 +1,4 @@
-"""Command ``replay``: a run in motion."""
+"""Command ``replay``: runs in motion, and the list of those that are kept."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,12 @@ from proofroll.core.errors import InputError
 
 
 def replay(
-    trajectory: Annotated[Path, typer.Argument(help="A file of proofroll run --out, or one of a report.")],
+    runs: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Files of proofroll run --out or of a report, or names of run --keep; without one, a list."
+        ),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Page to write; RUN-replay.html by default.")] = None,
     scene: Annotated[
         str | None,
@@ -22,14 +27,20 @@ def replay(
     control: options.Control = None,
     _root: options.Root = None,
 ) -> None:
-    """Show a stored run in motion beside the truth, as a page.
+    """Show stored runs in motion beside the truth, as a page; without a name, list the runs that are kept.
 
-    Below are its curves, as with `proofroll run --plot`.
+    Several runs of one scene are shown together, at the instants that all have. Below are the curves of the first, as
+    with `proofroll run --plot`.
     """
+    from proofroll.files.kept_runs import kept_lines, run_file
     from proofroll.report.run.plot import read_run
     from proofroll.report.run.replay import replay_page
     from proofroll.running.store import write_text
 
+    if not runs:
+        sys.stdout.write("\n".join([*kept_lines(), ""]))
+        return
+    trajectory, *others = (run_file(name) for name in runs)
     target = trajectory.parent / f"{trajectory.stem}-replay.html" if out is None else out
     if target.suffix.lower() != ".html":
         raise InputError("--out", target, "a replay is a page: end the name of the file in .html")
@@ -38,8 +49,8 @@ def replay(
     scene = scene if scene is None else options.controlled(scene, control)
     options.require_writable(target)
     options.require_pages()
-    run = read_run(trajectory)
+    run, *beside = (read_run(path) for path in (trajectory, *others))
     with options.spinner("the truth"):
-        text = replay_page(trajectory, run, scene)
+        text = replay_page(trajectory, run, scene, beside)
     write_text(target, text)
     sys.stdout.write(f"The replay is in {target}.\n")

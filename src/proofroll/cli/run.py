@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -30,6 +31,7 @@ def run(
     settings: options.Set = None,
     _root: options.Root = None,
     control: options.Control = None,
+    ground: options.Ground = None,
     until: options.Until = None,
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default 0.01, or near it in whole steps.")
@@ -37,6 +39,9 @@ def run(
     out: Annotated[
         Path | None,
         typer.Option(help="Write the trajectory to this file, by its ending: nc (netCDF), csv, or npz (numpy)."),
+    ] = None,
+    keep: Annotated[
+        str | None, typer.Option(help="Keep the run by this name: proofroll replay lists and shows what is kept.")
     ] = None,
     events: Annotated[
         Path | None,
@@ -66,7 +71,11 @@ def run(
     from proofroll.running.engine_questions import prepare
     from proofroll.running.idle_workers import Workers
 
-    question, scene = scene, options.controlled(scene, control)
+    settings, question, scene = (
+        options.with_ground(settings, control, ground),
+        scene,
+        options.controlled(scene, control),
+    )
     if matrices:
         _show_matrices(scene, engine, options.assignments(settings), as_json)
         return
@@ -94,7 +103,8 @@ def run(
 
     if until is not None:
         time_grid(until, EVERY if every is None else every)
-    _require_files(out, events, plot)
+    trajectories = _trajectories(out, keep)
+    _require_files(events, plot)
     with options.spinner(f"{scene} in {engine}"):
         preparing.join()
         case = single_case(
@@ -114,7 +124,7 @@ def run(
         content = run_content(case, result, target)
         if result.trajectory is not None:
             path_of_scene = {"scene_path": resolved(scene)} if scene not in scene_names() else {}
-            content = _written(content, target, path_of_scene, out=out, events=events, plot=plot)
+            content = _written(content, target, path_of_scene, trajectories, events=events, plot=plot)
     done = content.status == "done"
     if not done:
         options.complain(f"{content.engine} {content.status}: {content.message}{_shorter_step(scene, engine, case)}")
@@ -165,17 +175,30 @@ def _show_matrices(scene: str, engine: str, settings: dict[str, str], as_json: b
         raise typer.Exit(options.ENGINE)
 
 
-def _require_files(out: Path | None, events: Path | None, plot: Path | None) -> None:
+def _trajectories(out: Path | None, keep: str | None) -> list[Path]:
+    """Files for the trajectory of a run. Raises InputError unless all can be written."""
+    from proofroll.core.errors import InputError
+    from proofroll.files.kept_runs import kept_path
+    from proofroll.files.trajectory_file import CSV, NETCDF, STORED
+
+    named = {"--keep": None if keep is None else kept_path(keep), "--out": out}
+    files = {option: path for option, path in named.items() if path is not None}
+    for option, path in files.items():
+        options.require_writable(path, option)
+        if path.suffix not in (NETCDF, CSV, STORED):  # a scene.toml would be written over
+            raise InputError(option, path, f"end the name of the file in {NETCDF}, {CSV} or {STORED}")
+    return list(files.values())
+
+
+def _require_files(events: Path | None, plot: Path | None) -> None:
     """Raises InputError unless the files that a run is to write can be written and have an ending of their formats."""
     from proofroll.core.errors import InputError
-    from proofroll.files.trajectory_file import CSV, NETCDF, STORED
+    from proofroll.files.trajectory_file import CSV
     from proofroll.report.run.plot import require_ending
 
-    for option, file in (("--out", out), ("--events", events), ("--plot", plot)):
+    for option, file in (("--events", events), ("--plot", plot)):
         if file is not None:
             options.require_writable(file, option)
-    if out is not None and out.suffix not in (NETCDF, CSV, STORED):  # a scene.toml would be written over
-        raise InputError("--out", out, f"end the name of the file in {NETCDF}, {CSV} or {STORED}")
     if events is not None and events.suffix != CSV:
         raise InputError("--events", events, f"end the name of the file in {CSV}")
     if plot is not None:
@@ -187,8 +210,8 @@ def _written(
     content: RunContent,
     stored: Path,
     attributes: dict[str, str],
+    files: Sequence[Path],
     *,
-    out: Path | None,
     events: Path | None,
     plot: Path | None,
 ) -> RunContent:
@@ -198,15 +221,15 @@ def _written(
     from proofroll.report.run.plot import draw_run
     from proofroll.report.run.run import event_csv
 
-    if (plot or out) is not None:
+    if plot is not None or files:
         import_xarray()
     if plot is not None:
         with options.spinner("the plot, beside the truth"):
             draw_run(read(stored).assign_attrs(attributes), plot)
         content = replace(content, plot=str(plot))
-    if out is not None:
-        write(read(stored).assign_attrs(attributes), out)
-        content = replace(content, trajectory=str(out))
+    for file in files:
+        write(read(stored).assign_attrs(attributes), file)
+        content = replace(content, trajectory=str(file))
     if events is not None:
         with replacing(events) as temporary:
             temporary.write_text(event_csv(content))

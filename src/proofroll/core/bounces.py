@@ -10,13 +10,15 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable
-from proofroll.core.events import IMPACTS, Event, events_of
+from proofroll.core.events import IMPACTS, JUMPS, Event, EventKind, events_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 # Samples between two impacts, or an impact and the end, of a motion that can be sampled at any time.
 _BETWEEN = 3
+# Parts of the time from an impact until its rebounds are over: one lies in the first of these.
+_GRADED: FloatArray = 0.5 ** np.arange(3.0, 15.0)
 # Distance of samples from the time of an event, relative to it: its round-off.
 _BESIDE = 8 * float(np.finfo(float).eps)
 # Most impacts whose energies and heights are found: a motion that comes to rest has hundreds, each lower.
@@ -132,10 +134,14 @@ def exact_bounces(
     if not hits.size:
         return []
     beside = [hits * (1 - _BESIDE), hits * (1 + _BESIDE)]
-    stops = np.append(hits, end)
+    stops = np.unique([*(event.time for event in events if event.kind in JUMPS and event.time <= end), end])
+    # of rebounds that are summed the last is followed, and rests in a part of the time until all are over
+    settled = np.array([event.time for event in events if event.kind == EventKind.SETTLE and event.time <= end])
+    struck = stops[np.searchsorted(stops, settled) - 1]
+    rebounds = (struck[:, None] + (settled - struck)[:, None] * _GRADED).ravel()
     parts = np.arange(1, _BETWEEN + 1) / (_BETWEEN + 1)
     inside = (stops[:-1, None] + np.diff(stops)[:, None] * parts).ravel()
-    times = np.unique(np.concatenate([*beside, inside, [end]]))
+    times = np.unique(np.concatenate([*beside, inside, rebounds, [end]]))
     times = times[(times >= 0) & (times <= end)]
     course = sampled(times)
     for _ in range(_IMPROVED):

@@ -28,6 +28,9 @@ _SHARED = frozenset({"time", "xyz", "wxyz", "between"})
 BETWEEN = "between"
 # Attributes of a truth that ends early: from when on it is not known [s], and why, as a clause.
 ENDS, ENDED = "ends", "ended"
+# Attribute of a reference by steps: the engine and formulation of its steps, as a setting; it is no truth.
+BY_STEPS = "by_steps"
+HORIZON = "horizon_words"  # attribute of a reference by steps: how far it tells the motion, a clause
 LAWS = "laws"  # attribute of a truth: outcome of its law check, a clause
 # Attribute: widest bracket [s] of the events at the end that are left out of a comparison.
 LEFT_OUT = "widest_bracket_left_out"

@@ -9,7 +9,9 @@ from proofroll.core.errors import Diverged
 
 _EVERY = 1.0  # s of processor time between two messages
 AT = "truth at "  # beginning of a line that a worker prints about it
-_ROUTES = {"first": 0.5, "second": 1.0}  # route -> part of the limit that is used when it ends
+# Route -> part of the limit that is used when it ends; of a smooth motion the second is followed twice, and sampled.
+_ROUTES = {"first": 0.5, "second": 1.0}
+_SMOOTH = 0.55
 
 
 class OutOfTime(Diverged):
@@ -29,7 +31,7 @@ class Pace:
         self.text, self.over, self.until = "", False, 0.0
         self._tell: Callable[[str], object] = str
         self._limit, self._began = math.inf, 0.0
-        self._route, self._begun, self._end, self._told = "", 0.0, math.inf, 0.0
+        self._route, self._begun, self._end, self._told, self._part = "", 0.0, math.inf, 0.0, 1.0
 
     @contextmanager
     def limited(self, seconds: float, tell: Callable[[str], object] = str) -> Iterator[None]:
@@ -48,9 +50,13 @@ class Pace:
             self.leave()
             self._tell("")  # what was told before is over
 
-    def follow(self, route: str, end: float) -> None:
-        """Begins the ``first`` or ``second`` route to an end in its own unit of time."""
+    def follow(self, route: str, end: float, *, smooth: bool = False) -> None:
+        """Begins the ``first`` or ``second`` route to an end in its own unit of time.
+
+        ``smooth``: nothing switches, so that what follows the routes takes as long as they do.
+        """
         self._route, self._begun, self._end = route, time.process_time(), end
+        self._part = _ROUTES[route] * (_SMOOTH if smooth else 1.0)
 
     def leave(self) -> None:
         """Ends a route: what follows has no limit."""
@@ -65,7 +71,7 @@ class Pace:
         if not self._route:
             return
         now, part = time.process_time(), t / self._end
-        if now - self._began > _ROUTES[self._route] * self._limit:
+        if now - self._began > self._part * self._limit:
             self.over = True
             raise OutOfTime(f"its limit of {self._limit:g} s of processor time was reached", t)
         if part > 0 and now - self._told > _EVERY:

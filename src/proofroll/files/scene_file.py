@@ -121,7 +121,8 @@ def _read(name: str, asked: Mapping[str, object]) -> tuple[SceneFile, dict[str, 
     values = values_of(file.parameters, asked)
     tables = dict(source.tables(path, values))
     omitted = tuple(tables.pop("omitted", ()))
-    return dataclasses.replace(file, gravity=tables.pop("gravity"), tables=tables), values, path, omitted
+    title = "; ".join([file.title, *filter(None, [tables.pop("about", "")])])
+    return dataclasses.replace(file, title=title, gravity=tables.pop("gravity"), tables=tables), values, path, omitted
 
 
 def scene_text(name: str, asked: Mapping[str, object]) -> str:

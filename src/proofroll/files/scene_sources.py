@@ -55,7 +55,8 @@ class SceneSource(Protocol):
     def tables(path: Path, values: Mapping[str, float]) -> Mapping[str, Any]:
         """Tables as in a ``scene.toml``, gravity among them, with numbers instead of parameters.
 
-        A list ``omitted`` may name what the file describes and the scene leaves out, with the option that brings it in.
+        A list ``omitted`` may name what the file describes and the scene leaves out, with the option that brings it in;
+        a text ``about`` is added to the title.
 
         Args:
             path: of the file.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+import operator
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -277,8 +278,14 @@ class Robot:
         return dataclasses.replace(self, **changes)
 
     def with_bodies(self, bodies: Iterable[RobotBody]) -> Robot:
-        """The robot with some bodies replaced by others of the same name."""
-        return self.change(bodies={**self.bodies, **{body.name: body for body in bodies}})
+        """The robot with some bodies replaced by others of the same name; itself without any."""
+        replaced = {body.name: body for body in bodies}
+        return self.change(bodies={**self.bodies, **replaced}) if replaced else self
+
+    def with_each_joint(self, changed: Callable[[RobotJoint], RobotJoint]) -> Robot:
+        """The robot with each joint as a function gives it; itself where that changes none."""
+        joints = tuple(map(changed, self.joints))
+        return self if all(map(operator.is_, joints, self.joints)) else self.change(joints=joints)
 
     def with_joints(self, **values: float) -> Robot:
         """The robot with attributes of all joints replaced."""

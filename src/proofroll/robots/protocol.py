@@ -199,3 +199,18 @@ def _stack(rates: Mapping[str, Array], joints: tuple[str, ...], dofs: tuple[int,
     parts = [np.zeros((count, 0))]
     parts += [zero if rate is None or rate.shape[1] != zero.shape[1] else rate for rate, zero in pairs]
     return np.concatenate(parts, axis=1)
+
+
+OVERLAPPING_DROP = 0.01  # m: height over the floor of a robot that its file lets overlap the floor
+
+
+def lift(lowest: float, drop: float | None) -> float:
+    """Way by which a robot is moved up [m].
+
+    Args:
+        lowest: height of its lowest shape over the floor [m].
+        drop: the height that is asked for [m]; None: as it is, or 1 cm where it overlaps the floor.
+    """
+    if drop is not None:
+        return drop - lowest
+    return OVERLAPPING_DROP - lowest if lowest < 0 else 0.0

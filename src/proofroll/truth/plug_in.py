@@ -15,6 +15,7 @@ from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
 from proofroll.core.events import with_events
 from proofroll.core.observable import Role
+from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.named_forces import FIELDS, named_forces
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.local_frame import local_bars
@@ -54,7 +55,10 @@ class MechanismTruth:
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
-        """See :func:`proofroll.truth.truth_of_mechanism.truth_of`; of motions that are not unique, laws alone."""
+        """See :func:`proofroll.truth.truth_of_mechanism.truth_of`; of motions that are not unique, laws alone.
+
+        With contacts under held targets it is a reference by steps.
+        """
         # imports of a third of a second, which what has another truth does not need
         from proofroll.truth.check.answer import held_answer
         from proofroll.truth.early_end import cut_motion
@@ -62,6 +66,10 @@ class MechanismTruth:
         from proofroll.truth.truth_of_mechanism import truth_of
 
         assert isinstance(element, MechanismElement)  # by ``covers``
+        if element.mechanism.contacts and has_held(element.mechanism):
+            from proofroll.truth.by_steps import reference_by_steps
+
+            return reference_by_steps(element, times)
         try:
             motion = truth_of(element.mechanism, times)
         except NotUnique as error:

@@ -67,8 +67,6 @@ def switched_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         Diverged: a route stopped.
     """
     refuse_uncovered(mechanism)
-    if mechanism.contacts and has_held(mechanism):
-        raise Refused("no route of the truth follows contacts under held targets yet; it follows them in the air")
     stands = standing_ends(mechanism)
     if stands is not None:
         with suppress(RollingLanding):

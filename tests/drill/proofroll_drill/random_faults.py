@@ -22,7 +22,9 @@ import proofroll.truth.plug_in
 import proofroll.truth.truth_of_mechanism  # noqa: F401 -- imported once, before processes are made
 from proofroll.core.errors import ProofrollError
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.scene_file import load_scene
+from proofroll_drill.own_reader import misread
 
 # Scene and its last time [s]: together they have contacts, joints, drives, springs, loops, stops and closed forms.
 SCENES: Mapping[str, float] = {
@@ -151,16 +153,24 @@ def _honest(scene: str) -> Mapping[str, Any]:
 def _run(scene: str) -> tuple[str, Any]:
     """Values and bars of a truth, or why there is none."""
     try:
-        found = truth(load_scene(scene), np.linspace(0.0, SCENES[scene], COUNT))
+        read = load_scene(scene)
+        for element in read.elements:
+            assert isinstance(element, MechanismElement)
+            if wrong := misread(scene, element.mechanism)[0]:
+                return "refused", f"the file says otherwise: {', '.join(wrong)}"
+        found = truth(read, np.linspace(0.0, SCENES[scene], COUNT))
     except Exception as error:
         told = "" if isinstance(error, ProofrollError) else f"{type(error).__name__}: "
         return "refused", told + str(error)
     for key in ("ended", "ill_posed"):
         if found.attrs.get(key):
             return "refused", str(found.attrs[key])
-    return "values", {
-        str(name): (np.array(item.values), _bar(str(name), item, found)) for name, item in found.variables.items()
-    }
+    return "values", values_and_bars(found)
+
+
+def values_and_bars(found: Any) -> dict[str, Any]:
+    """Values and bar of each variable of a truth."""
+    return {str(name): (np.array(item.values), _bar(str(name), item, found)) for name, item in found.variables.items()}
 
 
 def _bar(name: str, item: Any, found: Any) -> float:

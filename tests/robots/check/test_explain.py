@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from robot_templates import inertial, urdf
 
@@ -106,3 +107,17 @@ def test_a_shape_without_size_gives_no_cause(shape: str, tmp_path: Path) -> None
     truth = RobotTruth.of(robot, random_states(robot, 2, 1))
     causes, left = Search(file, reading_of(_lighter(robot), truth), "planted", TOLERANCES).causes(truth)
     assert (causes, left) == ((), "mass")
+
+
+@pytest.mark.parametrize("engine", ["pinocchio", "planted"])
+def test_a_possible_inertia_that_is_incomplete_is_called_incomplete(engine: str, tmp_path: Path) -> None:
+    """An inertia without its zeros, which an engine reads as none, is named so; it is not called impossible."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf(tip=inertial().replace('ixz="0.002" iyz="-0.001"', ""), tool=inertial()))
+    file = open_robot(path)
+    robot = read_urdf(file)
+    truth = RobotTruth.of(robot, random_states(robot, 2, 1))
+    assert not robot.bodies["tip"].impossible
+    held = robot.with_bodies([dataclasses.replace(robot.bodies["tip"], inertia=np.zeros((3, 3)))])
+    causes, left = Search(file, reading_of(held, truth), engine, TOLERANCES).causes(truth)
+    assert ([cause.id for cause in causes], left) == (["incomplete_inertia_zeroed"], None)

@@ -21,6 +21,7 @@ MASSLESS = inertial(mass="0")
 ROD = inertial(ixx="0", iyy="0.01", izz="0.01", ixy="0").replace("0.002", "0").replace("-0.001", "0")
 EMPTY = inertial(mass="0", ixx="0", iyy="0", izz="0", ixy="0").replace("0.002", "0").replace("-0.001", "0")
 POINT = inertial(ixx="0", iyy="0", izz="0", ixy="0").replace("0.002", "0").replace("-0.001", "0")
+LACKING = inertial().replace('ixz="0.002" iyz="-0.001"', "")
 PLANTED = {
     "without inertial": (urdf(), "warning", "links", "1 without <inertial>: tool"),
     "shape without inertial": (urdf(tool=BOX), "warning", "link tool", "1000 kg/m³"),
@@ -28,6 +29,7 @@ PLANTED = {
     "not positive": (urdf(tip=NOT_POSITIVE), "error", "link tip", "not positive definite"),
     "triangle": (urdf(tip=FLAT), "error", "link tip", "breaks the triangle inequality (0.9 > 0.00699"),
     "flat to nothing": (urdf(tip=ROD), "warning", "link tip", "a principal moment of zero"),
+    "inertia of four numbers": (urdf(tip=LACKING), "warning", "link tip", "its <inertia> lacks ixz, iyz, here 0"),
     "inertia without mass": (urdf(tip=MASSLESS), "error", "link tip", "it has inertia but no mass"),
     "nothing to move": (urdf(tip=EMPTY), "error", "joint j3", "it moves no mass"),
     "spherical": (urdf(kinds=("spherical", "fixed", "fixed")), "warning", "joint j1", "no spherical joints"),

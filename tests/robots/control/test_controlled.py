@@ -134,8 +134,7 @@ def test_servos_of_an_mjcf_follow_the_controller(written: Any) -> None:
 @pytest.mark.parametrize(
     ("control", "says"),
     [
-        (CONTROL + "[ground]\nfriction = 0.8\n", "walk.toml: ground = {'feet': 'spheres', 'friction': 0.8}: a robot"),
-        (CONTROL + "[ground]\nfriction = 0.8\n", "comes next"),
+        (CONTROL + "[ground]\nfeet = {foot = 0.1}\n", "walk.toml: ground.feet = 'foot': the robot has no such link"),
         (CONTROL.replace("j1 = 0.3", "j9 = 0.3"), "walk.toml: pose = 'j9': the robot has no such joint"),
         (POLICY, "walk.toml: policy.call = 'policy_beside:make': it needs instants"),
         ("rate = 50" + POLICY, "walk.toml: policy.call = 'policy_beside:make': it has nothing to drive"),
@@ -143,7 +142,7 @@ def test_servos_of_an_mjcf_follow_the_controller(written: Any) -> None:
     ],
 )  # fmt: skip
 def test_a_controller_that_does_not_fit_is_one_line(written: Any, control: str, says: str) -> None:
-    """What a controller cannot have is one line with its file; the ground comes next."""
+    """What a controller cannot have is one line with its file."""
     with pytest.raises(InputError) as caught:
         _mechanism(written(control))
     assert says in str(caught.value)

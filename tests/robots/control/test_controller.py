@@ -96,7 +96,7 @@ def test_targets_are_formulas_numbers_or_tables(tmp_path: Path) -> None:
         (("[policy]", "[targets]\nL_HIP = 1\n[policy]"), "targets = 'L_HIP': a policy sets all targets"),
         (("0.32, 1, 0, 0, 0", "0.32, 1, 1, 0, 0"), "a quaternion of length 1, scalar first"),
         (("base_velocity = [0, 0, 0, ", "base_velocity = ["), "start.base_velocity = (0.1, 0.0, 0.0): give six"),
-        (("{FOOT = 0.016}", '"cubes"'), """ground.feet = 'cubes': give "spheres","""),
+        (("{FOOT = 0.016}", '"cubes"'), """ground.feet = 'cubes': give "file","""),
         (("friction = 0.8", "friction = -1"), "ground.friction = -1.0: must be at least 0"),
         ((', "R_KNEE"]', "]"), "order = ['L_HIP', 'R_HIP', 'L_KNEE']: it lacks R_KNEE"),
         ((', "R_KNEE"]', ', "L_HIP"]'), "order = ['L_HIP']: a joint is in the order twice"),

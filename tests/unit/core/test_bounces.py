@@ -80,6 +80,18 @@ def test_the_truth_of_a_ball_tells_its_bounces() -> None:
     _within_bars(found, [0.64, 0.4096], [lost, 0.64 * lost])
 
 
+@pytest.mark.drill
+def test_the_last_rebound_before_a_rest_has_its_height() -> None:
+    """Each height is e² of the one before, up to the last impact, whose next rebounds are summed."""
+    bounces = bounces_of(truth(load_scene("bouncing_ball"), np.linspace(0.0, 4.1, 3)))
+    assert bounces is not None
+    heights = np.array([item.height for item in bounces])
+    assert len(heights) > 50
+    bar = bounces[0].height_bar
+    assert bar is not None
+    assert np.abs(heights - 0.64 ** np.arange(1, len(heights) + 1)).max() < bar < 1e-13
+
+
 def _box() -> Scene:
     """A box of 2 kg whose bottom is 0.5 m above a floor."""
     free = Joint("free", "free", "world", "box", q0=(0, 0, 0.55, 1, 0, 0, 0))

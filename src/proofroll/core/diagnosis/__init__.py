@@ -127,6 +127,32 @@ class Cause:
         return f"{self.says} ({self.quantity} off by {difference}{unit}, by {remainder}{unit} with that)"
 
 
+@dataclass(frozen=True)
+class Difference:
+    """A difference between engine and scene, which causes may close; attributes as those of :class:`Cause`."""
+
+    quantity: str
+    unit: str
+    before: float
+    covers: tuple[str, ...] = ()
+    closes: float = CLOSES
+
+    def cause(
+        self,
+        name: str,
+        says: str,
+        after: float,
+        remedy: str,
+        fitted: int = 0,
+        *,
+        explains: int | None = None,
+        change: float = np.inf,
+    ) -> Cause:
+        """Cause with this id that leaves ``after`` of the difference."""
+        proof = self.quantity, self.unit, self.before, after, remedy, fitted, self.covers, self.closes
+        return Cause(name, says, *proof, explains=explains, change=change)
+
+
 EvidenceT = TypeVar("EvidenceT", default=Evidence)
 ResultT = TypeVar("ResultT", default=Cause)
 

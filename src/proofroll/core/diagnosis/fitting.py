@@ -1,5 +1,7 @@
 """Fits wrong models of an element to its certificate or its run."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, wraps
@@ -8,7 +10,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
+from proofroll.core.diagnosis import Cause, Evidence
 
 M = TypeVar("M")
 FactT = TypeVar("FactT")
@@ -163,25 +165,94 @@ class Residuals(Generic[M]):
         """Value of the free parameter for which the residual is smallest, in a family of models."""
         return least_squares_parameter(lambda x: self.left(model(x)), start, 1.0)
 
-    def cause(self, name: str, says: str, model: M | None, remedy: str, number: int, change: float = np.inf) -> Cause:
-        """Cause: the engine moves by this model.
+    def cause(self, row: CauseRow[M]) -> Cause:
+        """Cause: the engine behaves as a row says."""
+        remainder = self.largest(row.model)
+        closes = remainder <= self.closes * self.before
+        rest = closes and bool(np.any(np.abs(self.left(row.model)) > self.leaves))
+        if closes and (row.model is None or rest or self.contradicted(row.model)):
+            remainder = np.inf
+        explains = self.explained(row.model) if row.fitted and closes else None
+        proof = self.quantity, self.unit, self.before, remainder, row.remedy, row.fitted, self.covers, self.closes
+        return Cause(row.id, row.says, *proof, explains=explains, change=row.change)
+
+    def scaled(
+        self,
+        name: str,
+        says: str,
+        model: Callable[[float], M],
+        remedy: str,
+        quantity: str = "",
+        *,
+        signed: bool = True,
+        linear: bool = True,
+    ) -> Iterator[CauseRow[M]]:
+        """Row of a number with the factor that closes the residual best, one of a known mistake if that closes it.
+
+        With a single equation any factor would fit, so that only those of known mistakes are tried.
 
         Args:
-            name: id of the hypothesis.
-            says: behaviour of the engine, as a clause.
-            model: the model; None: it is impossible.
+            name: id of the row.
+            says: behaviour, which the words of the factor follow.
+            model: model for a factor.
             remedy: advice to an author.
-            number: count of fitted parameters in it.
-            change: their change, see :class:`.Cause`.
+            quantity: see :class:`CauseRow`.
+            signed: True if a known mistake may give the number the wrong sign.
+            linear: True if the residual is linear in the factor.
         """
-        remainder = self.largest(model)
-        closes = remainder <= self.closes * self.before
-        part_left = closes and bool(np.any(np.abs(self.left(model)) > self.leaves))
-        if closes and (model is None or part_left or self.contradicted(model)):
-            remainder = np.inf
-        explains = self.explained(model) if number and closes else None
-        proof = self.quantity, self.unit, self.before, remainder, remedy, number, self.covers, self.closes
-        return Cause(name, says, *proof, explains=explains, change=change)
+        plain_left = self.left(model(1.0))
+        slope = self.left(model(2.0)) - plain_left if linear else plain_left
+
+        def largest(factor: float) -> float:
+            left = plain_left + (factor - 1.0) * slope
+            return float(np.max(np.abs(left), initial=0.0)) if linear else self.largest(model(factor))
+
+        factor = min(FACTORS, key=largest)
+        fitted = not self.single_equation and largest(factor) > self.closes * self.before
+        if fitted and linear:
+            square = float(slope @ slope)
+            factor = 1.0 - float(slope @ plain_left) / square if square else 1.0
+        elif fitted:
+            factor = self.fit(model, 1.0)
+        if possible(factor, signed):
+            yield CauseRow(
+                id=name,
+                says=f"{says} {factor_text(factor)}",
+                model=model(factor),
+                remedy=remedy,
+                quantity=quantity,
+                fitted=int(fitted),
+                change=change_by(factor),
+            )
+
+    def numbers_of(self, model: Callable[[FloatArray], M], count: int, cutoff: float | None = None) -> FloatArray:
+        """Numbers, in which the residual is linear, that leave least; ``cutoff``: of singular values, relative."""
+        residual = self.left(model(np.zeros(count)))
+        slopes = np.stack([self.left(model(row)) - residual for row in np.eye(count)], axis=-1)
+        return np.asarray(-np.linalg.lstsq(slopes, residual, rcond=cutoff)[0])
+
+
+@dataclass(frozen=True)
+class CauseRow(Generic[M]):
+    """A behaviour that an engine may have, as a change of the model.
+
+    Attributes:
+        id: of the cause.
+        says: the behaviour, as a clause.
+        model: the changed model; None: it is impossible.
+        remedy: advice to an author.
+        quantity: of the certificate that the change contradicts; empty: none.
+        fitted: count of fitted numbers in the model.
+        change: their change, see :class:`.Cause`.
+    """
+
+    id: str
+    says: str
+    model: M | None
+    remedy: str
+    quantity: str = ""
+    fitted: int = 0
+    change: float = np.inf
 
 
 def in_doubt(evidence: Evidence, residuals: Residuals[Any], quantity: str, fitted: int = 0) -> bool:
@@ -203,44 +274,3 @@ def cached_on_evidence(residuals: Callable[[Evidence], Iterator[FactT]]) -> Call
         return evidence.found[residuals]
 
     return remembered
-
-
-def any_gravity(
-    residuals: Callable[[Evidence], Sequence[Residuals[Any]]],
-    gravity_of: Callable[[Any], FloatArray],
-    falling: Callable[[Any, FloatArray], Any],
-) -> Hypothesis:
-    """Hypothesis: gravity has another direction or magnitude.
-
-    Args:
-        residuals: residuals of an evidence.
-        gravity_of: gravity of an element in the scene [m/s²].
-        falling: model of an element with another vector of gravity.
-    """
-    remedy = "look at the axes of gravity"
-
-    @hypothesis("direction of gravity", "the equations are linear in gravity: one vector closes them at every state")
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        element = evidence.element
-        g = gravity_of(element)
-        for source in residuals(evidence):
-            axes = [axis for axis in (*np.eye(3), *-np.eye(3)) if np.any(np.cross(axis, g))]
-            for along in axes if in_doubt(evidence, source, "gravity") else ():
-                gravity = float(np.linalg.norm(g)) * along
-                says = f"the engine's gravity is ({_shown(gravity)}) m/s^2, along another axis"
-                yield source.cause("direction of gravity", says, falling(element, gravity), remedy, 0)
-            if not in_doubt(evidence, source, "gravity", 3):
-                continue
-            residual = source.left(falling(element, g))
-            slopes = [source.left(falling(element, g + axis)) - residual for axis in np.eye(3)]
-            gravity = g - np.linalg.lstsq(np.stack(slopes, axis=-1), residual, rcond=None)[0]
-            gravity = np.where(np.abs(gravity) < 1e-6 * max(float(np.max(np.abs(gravity))), 1e-300), 0.0, gravity)
-            off, size = (float(np.linalg.norm(x)) for x in (gravity - g, g))
-            says, model = f"the engine's gravity is ({_shown(gravity)}) m/s^2", falling(element, gravity)
-            yield source.cause("direction of gravity", says, model, remedy, 3, off / size if size else np.inf)
-
-    return test
-
-
-def _shown(gravity: FloatArray) -> str:
-    return ", ".join(f"{x:.4g}" for x in gravity + 0.0)  # not -0

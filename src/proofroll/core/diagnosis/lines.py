@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.certificate import Line, distinct_texts, worst_numbers
-from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
+from proofroll.core.diagnosis import Cause, Difference, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import factor_text
 
 # Most numbers of a line that are shown in a cause; of more only the one that differs most.
@@ -53,19 +53,13 @@ def built_otherwise(
         remedy = (
             "give the engine the scene's number, once, in its unit and about the point and axes that the engine takes"
         )
-        name = f"at time 0 {worst['quantity']}, relative"
-        yield Cause(
-            id="built",
-            says=says,
-            quantity=name,
-            unit="1",
-            before=worst["difference"],
-            after=0.0,
-            remedy=remedy,
-            covers=covers,
-        )
+        yield _relative(worst["quantity"], worst["difference"], covers).cause("built", says, 0.0, remedy)
 
     return test
+
+
+def _relative(quantity: str, before: float, covers: tuple[str, ...] = ()) -> Difference:
+    return Difference(f"at time 0 {quantity}, relative", "1", before, covers)
 
 
 def _otherwise(line: Mapping[str, Any]) -> str:
@@ -92,12 +86,4 @@ def single_precision(lines: Sequence[Mapping[str, Any]]) -> Iterator[Cause]:
         difference = max(line["difference"] for line in exact)
         name, says = str(exact[0]["quantity"]), "the engine holds single-precision numbers (float32)"
         remedy = 'compute in double precision, or say precision = "single" in the settings'
-        yield Cause(
-            id="float32",
-            says=says,
-            quantity=f"at time 0 {name}, relative",
-            unit="1",
-            before=difference,
-            after=0.0,
-            remedy=remedy,
-        )
+        yield _relative(name, difference).cause("float32", says, 0.0, remedy)

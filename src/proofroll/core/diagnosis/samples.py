@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, in_single_precision, known_difference
 from proofroll.core.certificate import ROUNDED
-from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, above_round_off, hypothesis
+from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, Hypothesis, above_round_off, hypothesis
 from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, delay_text, in_steps, mistaken_rate
 from proofroll.core.diagnosis.fitting import change_by
 from proofroll.core.diagnosis.lines import differing, single_precision
@@ -56,15 +56,8 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
     if all(in_single_precision(reported) for reported in required):
         true, says = truth[REQUIRED[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
         difference = known_difference(required[0], true) if required[0].shape == true.shape else np.inf
-        yield Cause(
-            id="float32",
-            says=says,
-            quantity=REQUIRED[0],
-            unit="m",
-            before=difference,
-            after=0.0,
-            remedy="compute and report in double precision",
-        )
+        remedy = "compute and report in double precision"
+        yield Difference(REQUIRED[0], "m", difference).cause("float32", says, 0.0, remedy)
 
 
 def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[str, ...]) -> Hypothesis:
@@ -89,32 +82,19 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
             return
         time, weights = pair[1]["time"].to_numpy(), _alike(reported, true)
         reported, true = reported * weights, true * weights
-        causes = []
         if (moved := best_delay(time, reported, true)) is not None:
-            delay, *sizes = moved
+            delay, difference, remainder = moved
             says = f"every sample is {delay_text(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
-            causes.append(("late", says, remedy, sizes, 1, in_steps(delay, evidence.step)))
+            state_off = Difference("state", "m", difference, covers, closes=_CLOCK)
+            yield state_off.cause("late", says, remainder, remedy, 1, change=in_steps(delay, evidence.step))
         if (paced := best_clock_factor(time, reported, true)) is not None:
-            rate, *sizes = paced
+            rate, difference, remainder = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
             remedy = "the step that the engine takes is not the one that is counted"
-            mistaken = mistaken_rate(rate)
-            causes.append(("clock", says, remedy, sizes, int(not mistaken), np.inf if mistaken else change_by(rate)))
-        for name, says, remedy, (difference, remainder), fitted, change in causes:
-            yield Cause(
-                id=name,
-                says=says,
-                quantity="state",
-                unit="m",
-                before=difference,
-                after=remainder,
-                remedy=remedy,
-                fitted=fitted,
-                covers=covers,
-                closes=_CLOCK,
-                change=change,
-            )
+            fitted, change = (0, np.inf) if mistaken_rate(rate) else (1, change_by(rate))
+            state_off = Difference("state", "m", difference, covers, closes=_CLOCK)
+            yield state_off.cause("clock", says, remainder, remedy, fitted, change=change)
 
     return test
 
@@ -231,9 +211,7 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
             ),
         ):
             remedy = "give a unit quaternion of the body, scalar first"
-            yield Cause(
-                id="quaternion", says=says, quantity="q_WB", unit="1", before=difference, after=remainder, remedy=remedy
-            )
+            yield Difference("q_WB", "1", difference).cause("quaternion", says, remainder, remedy)
 
     return test
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, known_difference
-from proofroll.core.diagnosis import CLOSES, Cause, above_round_off
+from proofroll.core.diagnosis import CLOSES, Cause, Difference, above_round_off
 from proofroll.core.diagnosis.clocks import best_delay, delay_text, in_steps
 from proofroll.core.diagnosis.fitting import change_by, factor_text, known_factor
 
@@ -114,17 +114,8 @@ class ReportedVector:
         difference, remainder = known_difference(reported, true), known_difference(reported, explained)
         if difference < self.before / 2:
             remainder = np.inf  # most of the difference is in what is left aside
-        proof = self.name, self.unit, difference, remainder
-        return Cause(
-            f"{kind}.{self.name}",
-            says,
-            *proof,
-            remedy=remedy,
-            fitted=number,
-            closes=closes,
-            explains=explains,
-            change=change,
-        )
+        off = Difference(self.name, self.unit, difference, closes=closes)
+        return off.cause(f"{kind}.{self.name}", says, remainder, remedy, number, explains=explains, change=change)
 
     def causes(self, step: float | None) -> Iterator[Cause]:
         """All causes of this module, the simple ones first; none if nothing differs.
@@ -219,17 +210,8 @@ class ReportedVector:
         says = f"{self.name} is {delay_text(delay, step)}"
         remedy = f"sample {self.name} at the time that was asked for"
         change = 0.0 if half_step else in_steps(delay, step)
-        yield Cause(
-            id=f"late.{self.name}",
-            says=says,
-            quantity=self.name,
-            unit=self.unit,
-            before=difference,
-            after=remainder,
-            remedy=remedy,
-            fitted=1,
-            change=change,
-        )
+        off_by_time = Difference(self.name, self.unit, difference)
+        yield off_by_time.cause(f"late.{self.name}", says, remainder, remedy, 1, change=change)
 
 
 def components_along(frame: FloatArray, vectors: FloatArray) -> FloatArray:

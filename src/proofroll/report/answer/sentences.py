@@ -198,7 +198,8 @@ def scope_sentence(made: SceneAnswer | StepAnswer) -> str:
     """Sentence on what was judged, over which time, and that attitudes were not."""
     names = ", ".join(quantity_words(bound.quantity) for bound in made.bounds)
     unjudged = f" Not judged: {' and '.join(made.unjudged)}." if made.unjudged else ""
-    return f"Judged: {names}, every {made.every:g} s over {made.until:g} s.{unjudged}"
+    beyond = f" No longer: {made.beyond}." if made.beyond else ""
+    return f"Judged: {names}, every {made.every:g} s over {made.until:g} s.{beyond}{unjudged}"
 
 
 def answer_lines(made: SceneAnswer) -> Iterator[str]:

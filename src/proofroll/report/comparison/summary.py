@@ -1,11 +1,15 @@
 """Records of a comparison (:mod:`proofroll.report.comparison.records`), made from its outcome."""
 
 import dataclasses
+import math
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from proofroll.core.comparison import Comparison
+from proofroll.core.comparison import Comparison, Tolerance
+from proofroll.core.dataset import HORIZON
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
 from proofroll.core.element_abilities import step_bound
+from proofroll.core.number_format import number
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import SEVERITY, Judgement, Verdict
@@ -28,6 +32,7 @@ from proofroll.running.case import EngineFacts, Status, hosts
 from proofroll.running.environments import shown_name
 from proofroll.studies.comparison.outcome import Outcome, Run
 from proofroll.studies.comparison.planning import at_point, point_name
+from proofroll.studies.judging.reference import Reference
 
 
 def reported(outcome: Outcome) -> tuple[list[ReportedRow], list[ReportedRun]]:
@@ -91,22 +96,48 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
 def _unjudged(scene: Scene, comparison: Comparison) -> list[str]:
     """Reactions of a scene, with ``*`` for the parts of its mechanism, that no tolerance of a comparison judges."""
     bounds = {name for band in comparison.bands.values() for name in band.bounds}
-    names = [
-        f"{name.partition('.')[0]}.*" if "." in name else name
+    return _shortened(
+        name
         for name, item in scene.observables.items()
         if item.role is Role.REACTION and item.unit != "1" and name not in bounds and not item.absent
-    ]
-    return list(dict.fromkeys(names))
+    )
+
+
+def _shortened(names: Iterable[str]) -> list[str]:
+    """Names of observables, with ``*`` for the parts of a mechanism."""
+    return list(dict.fromkeys(f"{name.partition('.')[0]}.*" if "." in name else name for name in names))
 
 
 def _truth_ends(outcome: Outcome) -> list[str]:
-    """Sentences about truths that end early, one for each point of the parameters with such a truth."""
+    """Sentences about references by steps, and about truths that end early, one for each point with such a truth."""
     truths = {name: point.reference for name, point in outcome.points.items() if point.reference is not None}
-    return [
+    bounds = {name: bound for band in outcome.comparison.bands.values() for name, bound in band.bounds.items()}
+    by_steps = {_by_steps_words(reference, bounds): None for reference in truths.values() if reference.by_steps}
+    ends = [
         f"Not judged behind the end of the truth{at_point(outcome.points[name].case.parameters)}: {reference.ended}."
         for name, reference in truths.items()
         if reference.ended
     ]
+    return [*by_steps, *ends]
+
+
+def _by_steps_words(reference: Reference, bounds: Mapping[str, Tolerance]) -> str:
+    """Sentence on a reference by steps: what it is, its error bar, and what it does not tell to these tolerances."""
+    name = next((name for name in bounds if reference.tells(name, math.inf)), "")
+    known = f"; {name} known to {_with_unit(reference, name)}" if name else ""
+    untold = [
+        key for key, bound in bounds.items() if not reference.tells(key, bound.absolute(reference.sizes.get(key, 1.0)))
+    ]
+    leaves = f" Not told by it to the tolerance: {', '.join(_shortened(untold))}." if untold else ""
+    horizon = str(reference.dataset.attrs.get(HORIZON, ""))
+    horizon = f" Horizon: {horizon}." if horizon else ""
+    return f"Judged by a {reference.dataset.attrs['route']}, which is no truth{known}.{horizon}{leaves}"
+
+
+def _with_unit(reference: Reference, name: str) -> str:
+    """Error bar of an observable with its unit."""
+    bar = reference.true(name, reference.curves[name]).error_bar
+    return f"{number(bar, 2)} {reference.scene.observables[name].unit}"
 
 
 def _quiet(outcome: Outcome) -> list[str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +18,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.report.kinds import kind_of, report_kinds
-from proofroll.report.labels import settings_text
+from proofroll.report.labels import engine_words, settings_text, step
 from proofroll.report.replay.library import three
 from proofroll.report.replay.records import Ghost, Replay, ReplayCase, Replayed, ReplayKind
 from proofroll.report.replay.replay import case_content, distance
@@ -45,10 +47,19 @@ def run_page(path: Path, run: xr.Dataset) -> str:
         )
 
 
-def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) -> str:
-    """HTML page that replays a run: the truth of its scene, solid, and the run, translucent; without a truth alone.
+def replay_page(
+    path: Path,
+    run: xr.Dataset,
+    scene_of_run: str | None = None,
+    beside: Sequence[xr.Dataset] = (),
+    true: xr.Dataset | None = None,
+    untold: str = "",
+    script: str = "",
+    version: str = "",
+) -> str:
+    """HTML page that replays runs: the truth of their scene, solid, and the runs, translucent; without a truth alone.
 
-    Below are the four curves that are furthest off, with the truth's; without a truth all curves of the run.
+    Below are the four curves of the first run that are furthest off, with the truth's; without a truth all of them.
 
     In a scene of several elements, each is a case of its own, for no force couples them. Behind the end of a truth
     that ends early neither it nor the run is drawn; the caption says when and why it ends.
@@ -57,9 +68,15 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
         path: of the file, for messages.
         run: the run to show.
         scene_of_run: name or path of its scene; None: as the file says.
+        beside: further runs of the same scene with the same parameters, shown at the instants that all have.
+        true: truth at the instants of the longest run; None: it is computed.
+        untold: clause on why no truth is shown; empty: it is shown where there is one.
+        script: name of a script beside the page that sets the version of the page written last; empty: there is none.
+        version: of this page, which loads itself again as soon as the script's is another.
 
     Raises:
-        InputError: the file names no scene, the scene has changed since, or nothing draws such scenes.
+        InputError: the file names no scene, the scene has changed since, nothing draws such scenes, or the runs are of
+            several scenes or share no two instants.
         ProofrollError: the scene has no truth.
     """
     from proofroll.report.page.html import templates
@@ -71,39 +88,63 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     drawers = [_drawer(path, scene, element, alone, run) for element, alone in parts]
     usual = load_scene(name).parameters
     label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
-    true = truth(scene, run["time"].to_numpy())
-    run = until_end(scene, true, {0: run})[0]
+    run, *beside = _at_common_instants(path, [run, *beside])
+    longest = max([run, *beside], key=lambda rival: rival.sizes["time"])
+    if untold:
+        true = longest
+    elif true is None:
+        true = truth(scene, longest["time"].to_numpy())
+    run, *beside = until_end(scene, true, dict(enumerate([run, *beside]))).values()
     cases: list[ReplayCase] = []
     packed: list[str] = []
     captions: list[str] = []
     group = scene.title if len(parts) == 1 or not label else f"{scene.title}, {label}"
     for (element, alone), drawer in zip(parts, drawers, strict=True):
-        true_part, run_part = (part(scene, element, whole) for whole in (true, run))
+        true_part, run_part, *others = (part(scene, element, whole) for whole in (true, run, *beside))
         shown = element.name if len(parts) > 1 else label or scene.title
-        has_truth = bool(np.isfinite(true_part["p_WB"]).all())  # else laws alone judge a run
-        if has_truth:
-            replayed = Replayed(
-                scene=alone, true=true_part, file="", ghosts=_ghosts(run_part, true_part), group=group, label=shown
-            )
-        else:
-            replayed = Replayed(
-                scene=alone, true=run_part, file="", ghosts=[], group=group, label=shown, solid=str(run.attrs["engine"])
-            )
+        has_truth = not untold and bool(np.isfinite(true_part["p_WB"]).all())  # else laws alone judge a run
+        solid, ghosts = (true_part, [run_part, *others]) if has_truth else (run_part, others)
+        replayed = Replayed(
+            scene=alone, true=solid, file="", ghosts=_ghosts(ghosts, solid), group=group, label=shown,
+            solid="truth" if has_truth else str(run.attrs["engine"]),
+        )  # fmt: skip
         case, numbers = case_content(replayed, drawer)
         cases.append(case)
         packed.append(numbers)
-        captions.append(_caption(run, has_truth))
+        captions.append(_caption([run, *beside], has_truth, untold or "no truth tells the whole motion"))
     if has_truth and (end := ended_early(true)) is not None:
         captions.append(f"What lies behind {end[0]:.6g} s is not drawn, for the truth ends there: {end[1]}.")
     return rendered(
         templates(),
         "run_replay.html",
         title=scene.title,
-        curves=curves_beside_truth(scene, run, true) or curves_alone(run),
+        curves=(has_truth and curves_beside_truth(scene, run, true)) or curves_alone(run),
         replay=Replay(three(), 0, cases, packed),
         caption=" ".join(dict.fromkeys(captions)),
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
+        of_curves=str(run.attrs["engine"]) if beside else "",
+        script=script,
+        version=version,
     )
+
+
+def _at_common_instants(path: Path, runs: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Runs at the instants that all of them have, but for those that some end too early for.
+
+    Raises:
+        InputError: runs of several scenes, or without two common instants.
+    """
+    if len({str(run.attrs.get("scene_digest")) for run in runs}) > 1:
+        raise InputError("run", path, "the runs are of several scenes or parameters; show each alone")
+    # instants of one grid differ by the round-off of k · every alone
+    keys = [np.round(run["time"].to_numpy(), 12) for run in runs]
+    longest = max(keys, key=len)
+    if all(np.array_equal(key, longest[: len(key)]) for key in keys):
+        return list(runs)
+    common = reduce(np.intersect1d, keys)
+    if len(common) < 2:
+        raise InputError("run", path, "the runs share no two instants; make them with one --every")
+    return [run.isel(time=np.flatnonzero(np.isin(key, common))) for run, key in zip(runs, keys, strict=True)]
 
 
 def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Dataset) -> ReplayKind:
@@ -121,14 +162,20 @@ def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Da
     return kind.replay()
 
 
-def _caption(run: xr.Dataset, has_truth: bool) -> str:
-    engine = str(run.attrs["engine"])
-    if engine == "truth":
+def _caption(runs: Sequence[xr.Dataset], has_truth: bool, why: str) -> str:
+    names = [
+        f"{run.attrs['engine']} ({settings_text(json.loads(run.attrs['settings']))})"
+        for run in runs
+        if run.attrs["engine"] != "truth"
+    ]
+    if not names:
         return "The truth."
-    with_settings = f"{engine} ({settings_text(json.loads(run.attrs['settings']))})"
     if not has_truth:
-        return f"{with_settings} alone: no truth tells the whole motion."
-    return f"The truth, solid, and {with_settings}, translucent; where it agrees it is hidden in the truth."
+        first, *others = names
+        beside = f", solid, and {', '.join(others)}, translucent" if others else " alone"
+        return f"{first}{beside}: {why}."
+    agreeing = "where it agrees it is hidden" if len(names) == 1 else "where they agree they are hidden"
+    return f"The truth, solid, and {', '.join(names)}, translucent; {agreeing} in the truth."
 
 
 def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
@@ -152,24 +199,27 @@ def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
     return scene.fully_asked
 
 
-def _ghosts(run: xr.Dataset, true: xr.Dataset) -> list[Ghost]:
-    """The run as the only ghost; none if it is the truth itself."""
-    engine = str(run.attrs["engine"])
-    if engine == "truth":
-        return []
+def _name(run: xr.Dataset) -> str:
+    """Engine, formulation, preset and step of a run for a reader."""
     settings = json.loads(run.attrs["settings"])
-    message = "" if run.attrs["status"] == "done" else str(run.attrs["message"])
-    away = distance(run["p_WB"].to_numpy(), true["p_WB"].to_numpy())
+    named = engine_words(str(run.attrs["engine"]), str(settings.get("formulation") or ""))
+    return ", ".join(filter(None, (named, settings.get("preset"), step("dt", settings.get("dt")))))
+
+
+def _ghosts(runs: Sequence[xr.Dataset], true: xr.Dataset) -> list[Ghost]:
+    """Each run as a ghost, but the truth itself."""
     return [
         Ghost(
-            key="",
-            engine=engine,
-            settings=settings,
-            name=engine,
-            colour=0,
-            distance=away,
+            key=str(number),
+            engine=str(run.attrs["engine"]),
+            settings=json.loads(run.attrs["settings"]),
+            name=_name(run) if len(runs) > 1 else str(run.attrs["engine"]),
+            colour=number,
+            distance=distance(run["p_WB"].to_numpy(), true["p_WB"].to_numpy()),
             motion=run,
             file="",
-            message=message,
+            message="" if run.attrs["status"] == "done" else str(run.attrs["message"]),
         )
+        for number, run in enumerate(runs)
+        if run.attrs["engine"] != "truth"
     ]

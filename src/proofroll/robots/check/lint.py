@@ -11,6 +11,7 @@ from proofroll.elements.mechanism.reading.plausibility import LARGE, doubtful_bo
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots.files.mjcf.defaults import with_classes
 from proofroll.robots.files.robot_file import LintRemark, RobotFile, floats, numbers
+from proofroll.robots.hypotheses.inertias import incomplete_inertias
 from proofroll.robots.model import Robot, RobotBody
 
 # Level, where and what of a :class:`LintRemark`.
@@ -93,6 +94,9 @@ def _urdf(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
         yield "warning", "links", f"{len(carrying)} without <inertial>: {names}; engines invent different masses"
     for name in (name for name in bare if robot.sources[name]["shapes"]):
         yield "warning", f"link {name}", "a collision shape without <inertial>: MuJoCo weighs it at 1000 kg/m³"
+    for name, missing in incomplete_inertias(file.root).items():
+        words = f"its <inertia> lacks {', '.join(missing)}, here 0; MuJoCo refuses that, Pinocchio 4.1.0 takes all as 0"
+        yield "warning", f"link {name}", words
     for name, source in robot.sources.items():
         if source["inertial"] and np.any(source["frame"] != np.eye(3)):
             off = source["written"] - np.diag(np.diag(source["written"]))

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.number_format import error as short
 from proofroll.core.number_format import with_bar
 from proofroll.robots.control.air_rows import (
     FEWEST_ROWS,
@@ -187,5 +186,4 @@ def _numbers(rows: AirRows, law: ControlLaw) -> Iterator[LayerCause]:
 
 
 def _cause(name: str, sentence: str, value: float | None, rows: AirRows, distance: float) -> LayerCause:
-    proof = f"forces off by {short(rows.off / rows.size)} of their size, by {short(distance / rows.size, 1)} with that"
-    return LayerCause(name, f"{sentence} ({proof})", value, distance / rows.size)
+    return LayerCause(name, f"{sentence} ({rows.proof(distance)})", value, distance / rows.size)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.integrators import classical_step
+from proofroll.core.number_format import error
 from proofroll.elements.mechanism.scene.rotations import skew
 from proofroll.robots.control.bookkeeping.air import AirLink, AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
@@ -101,6 +102,10 @@ class AirRows:
     late: Array
     size: float
     slow: NDArray[np.bool_]
+
+    def proof(self, after: float, closing: str = "with that") -> str:
+        """Clause on the forces that are off, and those that a cause leaves; ``after``: their root mean square."""
+        return f"forces off by {error(self.off / self.size)} of their size, by {error(after / self.size, 1)} {closing}"
 
     def without(self, left_out: NDArray[np.bool_]) -> AirRows:
         """The same at fewer rows."""

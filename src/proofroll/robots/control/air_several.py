@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from proofroll.core.diagnosis.fitting import least_squares_parameters
-from proofroll.core.number_format import error as short
 from proofroll.core.number_format import with_bar
 from proofroll.robots.control.air_rows import BY_JOINT, NUMBERS, ROUND_OFF, SAFETY, AirRows, rms
 from proofroll.robots.control.record import FITTED, LayerCause
@@ -85,9 +84,7 @@ class _Screen:
     """Remainders of groups of columns, from products of all columns: quick, and exact to half the digits."""
 
     def __init__(self, groups: Sequence[_Group], left: Array) -> None:
-        columns = np.concatenate([group.columns for group in groups], axis=1)
-        sizes = np.linalg.norm(columns, axis=0)
-        scaled = columns / np.where(sizes > 0, sizes, 1.0)
+        scaled, _ = _scaled(np.concatenate([group.columns for group in groups], axis=1))
         self._products, self._along, self._left = scaled.T @ scaled, scaled.T @ left, left
         ends = np.cumsum([0, *(group.columns.shape[1] for group in groups)])
         self._places = [np.arange(begin, end) for begin, end in itertools.pairwise(ends.tolist())]
@@ -100,18 +97,24 @@ class _Screen:
         return float(np.sqrt(max(square, 0.0) / len(self._left)))
 
 
+def _scaled(columns: Array) -> tuple[Array, Array]:
+    """Columns of size 1, and their sizes, infinite for columns of zeros."""
+    sizes = np.linalg.norm(columns, axis=0)
+    sizes = np.where(sizes > 0, sizes, np.inf)
+    return columns / sizes, sizes
+
+
 def _solved(columns: Array, left: Array) -> tuple[Array, Array]:
     """Numbers of least squares, and what they leave."""
-    sizes = np.linalg.norm(columns, axis=0)
-    scaled = columns / np.where(sizes > 0, sizes, 1.0)
+    scaled, sizes = _scaled(columns)
     values = np.linalg.lstsq(scaled, left, rcond=ROUND_OFF)[0]
-    return values / np.where(sizes > 0, sizes, np.inf), left - scaled @ values
+    return values / sizes, left - scaled @ values
 
 
 def _errors(rows: AirRows, columns: Array) -> Array:
     """Error of each number by the rounding of the record."""
-    sizes = np.where(np.any(columns, axis=0), np.linalg.norm(columns, axis=0), np.inf)
-    inverse = np.linalg.pinv(columns / sizes, rcond=ROUND_OFF)
+    scaled, sizes = _scaled(columns)
+    inverse = np.linalg.pinv(scaled, rcond=ROUND_OFF)
     return np.asarray(SAFETY * rows.rounding * np.linalg.norm(inverse, axis=1) / sizes)
 
 
@@ -120,7 +123,7 @@ def _told(
 ) -> Iterator[LayerCause]:
     """A cause for each kind of number beyond its error."""
     bars, remainder = _errors(rows, columns) + ROUND_OFF, rms(rows.left - columns @ values)
-    proof = f"forces off by {short(rows.off / rows.size)} of their size, by {short(remainder / rows.size, 1)} with all"
+    proof = rows.proof(remainder, "with all")
     begin = 0
     for group in groups:
         place = slice(begin, begin + len(group.where))
@@ -150,8 +153,7 @@ def _carried(rows: AirRows) -> list[LayerCause]:
         if distance <= SAFETY * rows.rounding and numbers[0] > 0:
             place = ", ".join(f"{x:.3g}" for x in (numbers[1:] / numbers[0]).round(4))
             words = f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"
-            off, rest = short(rows.off / rows.size), short(distance / rows.size, 1)
-            sentence = f"{words} (forces off by {off} of their size, by {rest} with that)"
+            sentence = f"{words} ({rows.proof(distance)})"
             causes.append((distance, LayerCause(FITTED, sentence, float(numbers[0]), distance / rows.size)))
     return [cause for _, cause in sorted(causes, key=lambda item: item[0])[:1]]
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,7 +121,7 @@ def reading_in_degrees(record: ControlRecord) -> StateReading | None:
         return None
     words = "q.JOINT and v.JOINT are in degrees: name them q.JOINT[deg] and v.JOINT[deg/s]"
     off = (1 - _DEGREE) * places[column]
-    changed = _after(_scaled("q.", _DEGREE), _scaled("v.", _DEGREE))(record)
+    changed = _after(partial(_scaled, "q.", _DEGREE), partial(_scaled, "v.", _DEGREE))(record)
     return _silent(changed, "degrees", words, off, column)
 
 
@@ -140,7 +142,7 @@ def readings_of_early_rates(record: ControlRecord) -> Iterator[StateReading]:
         told = ", ".join(_NAMES.get(kind[:-1], kind[:-1]) for kind in kinds)
         words = f"{told}: one row early, as velocities after a step beside places before it"
         size = max(max(rates[kind].values()) for kind in kinds)
-        yield _silent(_moved(kinds, -1)(record), "early", words, size, kinds[0][:-1])
+        yield _silent(_moved(kinds, -1, record), "early", words, size, kinds[0][:-1])
 
 
 def untold_lags(record: ControlRecord) -> Iterator[str]:
@@ -159,7 +161,7 @@ def readings_of_late_efforts(readings: Sequence[StateReading]) -> Iterator[State
         if not efforts:
             continue
         words = "the columns effort.JOINT are one row late: each row has those of the step before it"
-        column, sooner = max(efforts, key=efforts.__getitem__), _moved("effort.", 1)
+        column, sooner = max(efforts, key=efforts.__getitem__), partial(_moved, "effort.", 1)
         late = _silent(sooner(reading.record), "late_effort", words, efforts[column], column)
         if reading.layer is not None and late.layer is not None:
             late = late._replace(layer=replace(reading.layer, causes=(*reading.layer.causes, *late.layer.causes)))
@@ -216,7 +218,7 @@ def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
         return reading
     lag, rounding = compared.lag_fit(), compared.rounding / np.sqrt(3)
     rows = 1 if lag.intervals > 0 else -1
-    record = _moved(f"{name}.", rows)(reading.record)
+    record = _moved(f"{name}.", rows, reading.record)
     right = measured(record) if len(record.time) > _FEWEST else None
     if right is None:
         return reading
@@ -326,11 +328,13 @@ def _of_spin(record: ControlRecord) -> _Contradiction | None:
 
 
 def _of_joint_columns() -> Iterator[ColumnMistake]:
-    yield ColumnMistake("swapped", "the columns q.JOINT and v.JOINT are each the other", _exchanged("q.", "v."))
-    yield ColumnMistake("degrees", "q.JOINT is in degrees: name it q.JOINT[deg]", _scaled("q.", _DEGREE))
-    yield ColumnMistake("degrees", "v.JOINT is in degrees per second: name it v.JOINT[deg/s]", _scaled("v.", _DEGREE))
-    yield ColumnMistake("sign", "v.JOINT has the other sign", _scaled("v.", -1.0))
-    yield ColumnMistake("sign", "q.JOINT has the other sign", _scaled("q.", -1.0))
+    swapped = "the columns q.JOINT and v.JOINT are each the other"
+    yield ColumnMistake("swapped", swapped, partial(_exchanged, "q.", "v."))
+    yield ColumnMistake("degrees", "q.JOINT is in degrees: name it q.JOINT[deg]", partial(_scaled, "q.", _DEGREE))
+    rates = "v.JOINT is in degrees per second: name it v.JOINT[deg/s]"
+    yield ColumnMistake("degrees", rates, partial(_scaled, "v.", _DEGREE))
+    yield ColumnMistake("sign", "v.JOINT has the other sign", partial(_scaled, "v.", -1.0))
+    yield ColumnMistake("sign", "q.JOINT has the other sign", partial(_scaled, "q.", -1.0))
     yield ColumnMistake("milliseconds", "the times are in milliseconds: name them time[ms]", _in_seconds)
 
 
@@ -338,22 +342,23 @@ def _of_spins() -> Iterator[ColumnMistake]:
     last = "q_WB is x, y, z, w under the names of w, x, y, z"
     inverse = "q_WB is of the inverse rotation, of the world in the base"
     both = f"{last}, and of the inverse rotation, of the world in the base"
-    yield ColumnMistake("base_axes", "w_WB is along the axes of the base: name it w_WB_B", _along_base("w_WB"))
-    yield ColumnMistake("sign", "w_WB has the other sign", _scaled("w_WB.", -1.0))
-    yield ColumnMistake("quaternion", last, _requaternioned(_SCALAR_LAST))
-    yield ColumnMistake("quaternion", inverse, _requaternioned(_INVERSE))
-    yield ColumnMistake("quaternion", both, _requaternioned({**_SCALAR_LAST, **_INVERSE}))
+    yield ColumnMistake("base_axes", "w_WB is along the axes of the base: name it w_WB_B", partial(_along_base, "w_WB"))
+    yield ColumnMistake("sign", "w_WB has the other sign", partial(_scaled, "w_WB.", -1.0))
+    yield ColumnMistake("quaternion", last, partial(_requaternioned, _SCALAR_LAST))
+    yield ColumnMistake("quaternion", inverse, partial(_requaternioned, _INVERSE))
+    yield ColumnMistake("quaternion", both, partial(_requaternioned, {**_SCALAR_LAST, **_INVERSE}))
     for words, change in ((last, _SCALAR_LAST), (inverse, _INVERSE)):
         sentence = f"{words}, and w_WB is along the axes of the base"
-        yield ColumnMistake("quaternion", sentence, _after(_requaternioned(change), _along_base("w_WB")))
+        changed = _after(partial(_requaternioned, change), partial(_along_base, "w_WB"))
+        yield ColumnMistake("quaternion", sentence, changed)
 
 
 def _of_velocities(law: ControlLaw) -> Iterator[ColumnMistake]:
-    yield ColumnMistake("base_axes", "v_WB is along the axes of the base: name it v_WB_B", _along_base("v_WB"))
+    yield ColumnMistake("base_axes", "v_WB is along the axes of the base: name it v_WB_B", partial(_along_base, "v_WB"))
     if law.centre.any():
         at_centre = "v_WB is the velocity of the base's centre of mass, not of its origin"
-        yield ColumnMistake("point", at_centre, _to_origin(law.centre))
-        change = _after(_along_base("v_WB"), _to_origin(law.centre))
+        yield ColumnMistake("point", at_centre, partial(_to_origin, law.centre))
+        change = _after(partial(_along_base, "v_WB"), partial(_to_origin, law.centre))
         yield ColumnMistake("point", f"{at_centre}, along the axes of the base", change)
 
 
@@ -365,7 +370,7 @@ def action_mistakes(law: ControlLaw, instants: Array) -> Iterator[ColumnMistake]
         columns = {name: item - pose.get(name, 0.0) for name, item in record.columns.items()}
         return ControlRecord(record.path, columns, record.rounding, record.time)
 
-    scaled = _scaled("action.", 1 / law.scale)
+    scaled = partial(_scaled, "action.", 1 / law.scale)
     if law.scale != 1:
         yield ColumnMistake("scaled_action", "the columns of actions have the scale of the controller already", scaled)
     words = "the columns of actions are targets, the default pose and the scale included"
@@ -390,19 +395,15 @@ _SCALAR_LAST: Mapping[str, str] = {"w": "z", "x": "w", "y": "x", "z": "y"}  # co
 _INVERSE: Mapping[str, str] = {"inverse": ""}
 
 
-def _requaternioned(change: Mapping[str, str]) -> Changed:
-    """Change of the columns of quaternions, and of what was turned by them."""
-
-    def changed(record: ControlRecord) -> ControlRecord:
-        columns, rounding = dict(record.columns), dict(record.rounding)
-        for axis in BASE["q_WB"]:
-            source = f"q_WB.{change.get(axis, axis)}"
-            sign = -1.0 if "inverse" in change and axis != "w" else 1.0
-            columns[f"q_WB.{axis}"] = sign * record.columns[source]
-            rounding[f"q_WB.{axis}"] = record.rounding[source]
-        return _turned_again(ControlRecord(record.path, columns, rounding, record.time))
-
-    return changed
+def _requaternioned(change: Mapping[str, str], record: ControlRecord) -> ControlRecord:
+    """The record with other columns of quaternions, and of what was turned by them."""
+    columns, rounding = dict(record.columns), dict(record.rounding)
+    for axis in BASE["q_WB"]:
+        source = f"q_WB.{change.get(axis, axis)}"
+        sign = -1.0 if "inverse" in change and axis != "w" else 1.0
+        columns[f"q_WB.{axis}"] = sign * record.columns[source]
+        rounding[f"q_WB.{axis}"] = record.rounding[source]
+    return _turned_again(ControlRecord(record.path, columns, rounding, record.time))
 
 
 def _turned_again(record: ControlRecord) -> ControlRecord:
@@ -415,63 +416,48 @@ def _turned_again(record: ControlRecord) -> ControlRecord:
     return in_world(ControlRecord(record.path, columns, rounding, record.time))
 
 
-def _along_base(kind: str) -> Changed:
-    """Change of velocities that are along the axes of the base."""
-
-    def changed(record: ControlRecord) -> ControlRecord:
-        columns, rounding = (
-            {name.replace(f"{kind}.", f"{kind}_B."): item for name, item in part.items()}
-            for part in (record.columns, record.rounding)
-        )
-        return in_world(ControlRecord(record.path, columns, rounding, record.time))
-
-    return changed
+def _along_base(kind: str, record: ControlRecord) -> ControlRecord:
+    """The record with velocities that are along the axes of the base."""
+    columns, rounding = (
+        {name.replace(f"{kind}.", f"{kind}_B."): item for name, item in part.items()}
+        for part in (record.columns, record.rounding)
+    )
+    return in_world(ControlRecord(record.path, columns, rounding, record.time))
 
 
-def _to_origin(centre: Array) -> Changed:
-    """Change of velocities of a point [m, in the base's axes] to those of the origin."""
-
-    def changed(record: ControlRecord) -> ControlRecord:
-        attitude, velocity, spin = (record.stacked(name, tuple(BASE[name])) for name in ("q_WB", "v_WB", "w_WB"))
-        if attitude is None or velocity is None or spin is None:
-            return record
-        moved = velocity - np.cross(spin, Rotation.from_quat(attitude, scalar_first=True).apply(centre))
-        columns = dict(record.columns) | {f"v_WB.{axis}": moved[:, k] for k, axis in enumerate("xyz")}
-        return ControlRecord(record.path, columns, record.rounding, record.time)
-
-    return changed
+def _to_origin(centre: Array, record: ControlRecord) -> ControlRecord:
+    """The record with velocities of the origin in place of those of a point [m, in the base's axes]."""
+    attitude, velocity, spin = (record.stacked(name, tuple(BASE[name])) for name in ("q_WB", "v_WB", "w_WB"))
+    if attitude is None or velocity is None or spin is None:
+        return record
+    moved = velocity - np.cross(spin, Rotation.from_quat(attitude, scalar_first=True).apply(centre))
+    columns = dict(record.columns) | {f"v_WB.{axis}": moved[:, k] for k, axis in enumerate("xyz")}
+    return ControlRecord(record.path, columns, record.rounding, record.time)
 
 
-def _exchanged(first: str, second: str) -> Changed:
+def _exchanged(first: str, second: str, record: ControlRecord) -> ControlRecord:
     names = {first: second, second: first}
-
-    def renamed(part: Mapping[str, Array]) -> dict[str, Array]:
-        return {names.get(name[:2], name[:2]) + name[2:]: item for name, item in part.items()}
-
-    return lambda record: ControlRecord(record.path, renamed(record.columns), renamed(record.rounding), record.time)
-
-
-def _scaled(start: str, factor: float) -> Changed:
-    def scaled(part: Mapping[str, Array]) -> dict[str, Array]:
-        return {name: factor * item if name.startswith(start) else item for name, item in part.items()}
-
-    def changed(record: ControlRecord) -> ControlRecord:
-        rounding = {name: np.abs(item) for name, item in scaled(record.rounding).items()}
-        return ControlRecord(record.path, scaled(record.columns), rounding, record.time)
-
-    return changed
+    columns, rounding = (
+        {names.get(name[:2], name[:2]) + name[2:]: item for name, item in part.items()}
+        for part in (record.columns, record.rounding)
+    )
+    return ControlRecord(record.path, columns, rounding, record.time)
 
 
-def _moved(start: str | tuple[str, ...], rows: int) -> Changed:
-    """Change of columns that are a row late, 1, or early, -1; the row for which there is none goes."""
+def _scaled(start: str, factor: float, record: ControlRecord) -> ControlRecord:
+    columns, rounding = (
+        {name: size * item if name.startswith(start) else item for name, item in part.items()}
+        for part, size in ((record.columns, factor), (record.rounding, abs(factor)))
+    )
+    return ControlRecord(record.path, columns, rounding, record.time)
 
-    def changed(record: ControlRecord) -> ControlRecord:
-        kept: Any = np.arange(max(0, -rows), len(record.time) - max(0, rows))
-        part = record.part(kept)
-        moved = {name: item[kept + rows] for name, item in record.columns.items() if name.startswith(start)}
-        return ControlRecord(record.path, {**part.columns, **moved}, part.rounding, part.time)
 
-    return changed
+def _moved(start: str | tuple[str, ...], rows: int, record: ControlRecord) -> ControlRecord:
+    """The record with columns that are a row late, 1, or early, -1, in time; the row for which there is none goes."""
+    kept: Any = np.arange(max(0, -rows), len(record.time) - max(0, rows))
+    part = record.part(kept)
+    moved = {name: item[kept + rows] for name, item in record.columns.items() if name.startswith(start)}
+    return ControlRecord(record.path, {**part.columns, **moved}, part.rounding, part.time)
 
 
 def _in_seconds(record: ControlRecord) -> ControlRecord:
@@ -480,10 +466,4 @@ def _in_seconds(record: ControlRecord) -> ControlRecord:
 
 def _after(*changes: Changed) -> Changed:
     """Change by several ones, one after another."""
-
-    def changed(record: ControlRecord) -> ControlRecord:
-        for change in changes:
-            record = change(record)
-        return record
-
-    return changed
+    return lambda record: functools.reduce(lambda changed, change: change(changed), changes, record)

@@ -14,36 +14,43 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, error_location
 from proofroll.core.parameters import Parameters
-from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism import WORLD, Mechanism, Tree
+from proofroll.elements.mechanism.contact.start import touches
 from proofroll.elements.mechanism.reading.reader import made_mechanism
+from proofroll.elements.mechanism.scene.checks import Z
 from proofroll.elements.mechanism.scene.control import TARGET, Control
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.model import TOGETHER
 from proofroll.elements.mechanism.scene.policy import PolicySource
 from proofroll.robots.control.base_frames import BaseFrame, base_frames
 from proofroll.robots.control.bookkeeping.air import HeldRobot, links_of
-from proofroll.robots.control.controller import Controller, Gains, read_controller
+from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
 from proofroll.robots.control.imported import imported_robots
 from proofroll.robots.files.actuators import scene_actuators
+from proofroll.robots.files.feet import GROUNDS, NO_GROUND, OF_FILE, StandingRobot, ground_tables
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.scene_tables import (
+    CONTACTS,
     ENDINGS,
     ParameterRow,
     described,
     keyframe_states,
     laws,
+    names_of_bodies,
     read_robot,
     tables_of,
 )
-from proofroll.robots.model import Robot
+from proofroll.robots.model import Array, Robot
+from proofroll.robots.protocol import lift
 from proofroll.robots.states import RobotStates
 
 _DURATION = 0.1  # s: what is wrong with the bookkeeping of a controller shows in the air within it
 _GRID, _STEP = 4e-3, 5e-4  # s: sampling of a first look, and its longest step
 _LADDER, _FINER = 4, 2  # a ladder's coarsest step has so many of the finest; steps are at most so many times finer
-_NEXT = (
-    "a robot on its feet comes next; leave [ground] out: in the air the truth is exact, and gains, orders, frames and "
-    "limits show there"
-)
+_STANDING = 0.3  # s: duration of a robot on a ground, which lands and stands by then
+_SEEN = 1e-6  # m: way of a robot at its start that is told
+_GROUND_WORDS = "what the robot stands on: nothing (0), the floor of its file (1), or a plane z = 0 (2)"
+_ABOVE = 10.0  # m: by which a robot is lifted while the heights of its shapes are measured
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,14 +92,16 @@ class ControlledScenes:
 
     def content(self, path: Path) -> dict[str, Any]:
         """Title, source and parameters of the scene."""
-        controller = self._controller()
-        file, robot = self._robot(path, controller, "fixed" if controller.start.base is None else "free")
+        controller = read_controller(self._path)
+        ground = GROUNDS.index(NO_GROUND if controller.ground is None else OF_FILE)
+        file, robot = self._robot(path, controller, _base(controller, ground))
         gravity = float(np.linalg.norm(robot.gravity))
         parameters: dict[str, ParameterRow] = {
             "gravity": (gravity, "m/s^2", "acceleration of gravity", {"at_least": 0}),
+            "ground": (ground, "1", _GROUND_WORDS, {"at_least": 0, "at_most": len(GROUNDS) - 1, "integer": True}),
         }
-        reason = f"How engines move this robot in the air under {self._path.name}"
-        times = _times(controller)
+        reason = f"How engines move this robot {'on its ground' if ground else 'in the air'} under {self._path.name}"
+        times = _times(controller, _STANDING if ground else _DURATION)
         return {"title": f"{robot.name} under {self._path.stem}", "reason": reason, **times} | described(
             file, parameters | laws(robot)
         )
@@ -103,9 +112,10 @@ class ControlledScenes:
         Raises:
             InputError: the controller does not fit the robot, or the robot cannot be moved.
         """
-        controller = self._controller()
-        base = "fixed" if controller.start.base is None else "free"
-        return self._tables(*self._robot(path, controller, base), controller, values)
+        controller = read_controller(self._path)
+        file, robot = self._robot(path, controller, _base(controller, int(values["ground"])))
+        tables = self._tables(file, robot, controller, values, always=bool(values["ground"]))
+        return self._grounded(file, robot, controller, tables, GROUNDS[int(values["ground"])])
 
     def of_record(self, path: Path, *, free: bool) -> RecordedRobot:
         """Robot that a record is of, wherever it stands.
@@ -177,14 +187,41 @@ class ControlledScenes:
                 advice = "it has nothing to drive: no joint has gains; give [[gains]] with kp and kd"
                 raise InputError("policy.call", controller.policy.call, advice)
             control = self._control(controller, names, actuators, always)
-        tables = tables_of(file, robot, start_of(file, robot, controller), values)
+        start = start_of(file, robot, controller, placed=bool(values.get("ground")))
+        tables = tables_of(file, robot, start, values)
         return tables | {"actuators": actuators, **({} if control is None else {"control": control})}
 
-    def _controller(self) -> Controller:
-        controller = read_controller(self._path)
-        if controller.ground is not None:
-            raise InputError(f"{self._path}: ground", dataclasses.asdict(controller.ground), _NEXT)
-        return controller
+    def _grounded(
+        self, file: RobotFile, robot: Robot, controller: Controller, tables: dict[str, Any], ground: str
+    ) -> dict[str, Any]:
+        """Tables with those of a ground, above which the robot starts."""
+        if ground == NO_GROUND:
+            return tables
+        asked = controller.ground or GroundContact()
+        start = start_of(file, robot, controller, placed=True)
+        servos = {
+            row["joint"]: (row["kp"], row["kd"], _first_target(row["target"], float(start.angle[row["joint"]][0])))
+            for row in tables["actuators"]
+        }
+        standing = StandingRobot(
+            file=file,
+            robot=robot,
+            bodies=names_of_bodies(robot),
+            start=start,
+            servos=servos,
+            drop=controller.start.drop,
+        )
+        with error_location(str(self._path)):
+            touching = ground_tables(standing, ground, asked.feet, asked.friction)
+        tables = tables | {"geometries": touching.geometries, "pairs": touching.pairs, "impacts": TOGETHER}
+        way = _way_up(tables, robot, controller.start.drop)
+        up = -robot.gravity / np.linalg.norm(robot.gravity)
+        tables["joints"] = _lifted(tables["joints"], way * up)
+        about = touching.about
+        if abs(way) > _SEEN and controller.start.drop is None:
+            about += f"; moved up by {1e3 * way:.3g} mm, as its start overlaps the floor"
+        others = [clause for clause in tables["omitted"] if clause != CONTACTS]
+        return tables | {"about": about, "omitted": [*touching.left_out, *others]}
 
     def _robot(self, path: Path, controller: Controller, base: str) -> tuple[RobotFile, Robot]:
         """Robot whose joints have the controller's armatures; ``base``: ``fixed`` or ``free``, of a URDF's root."""
@@ -220,8 +257,53 @@ class ControlledScenes:
         )
 
 
-def start_of(file: RobotFile, robot: Robot, controller: Controller) -> RobotStates:
-    """State of a robot at time 0: the controller's start, else a keyframe's, else its pose, else 0."""
+def _base(controller: Controller, ground: int) -> str:
+    """Support of the root of a URDF: nothing where the controller puts it somewhere, or it stands on a ground."""
+    return "free" if controller.start.base is not None or ground else "fixed"
+
+
+def _first_target(target: Any, angle: float) -> float:
+    """Target of a servo at the start: a number, or the joint's own coordinate where it moves."""
+    return target if isinstance(target, float) else angle
+
+
+def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> float:
+    """Way against gravity to the start of the first body that floats [m], for the height of its lowest shape."""
+    floors = {row["name"]: row for row in tables["geometries"] if row["kind"] == "plane" and row["body"] == WORLD}
+    free = next((joint for joint in robot.moving if joint.kind == JointKind.FREE), None)
+    size = float(np.linalg.norm(robot.gravity))
+    if not floors or free is None or not size:
+        return 0.0
+    up = -robot.gravity / size
+    raised = {key: value for key, value in tables.items() if key not in {"gravity", "omitted", "control"}}
+    raised["joints"] = _lifted(tables["joints"], _ABOVE * up)
+    x, y, z = robot.gravity.tolist()
+    mechanism = made_mechanism(raised, (x, y, z), Parameters({}, {}))
+    touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))
+    ends = {pair.name: pair.geometries[1] for pair in mechanism.pairs}
+    heights = []
+    for contact, touch in zip(mechanism.contacts, touching, strict=True):
+        floor = floors.get(ends[contact.pair])
+        if floor is not None:
+            heights.append(touch.gap / float(np.array(floor.get("normal", Z)) @ up) - _ABOVE)
+    return lift(min(heights), drop) if heights else 0.0
+
+
+def _lifted(joints: list[dict[str, Any]], way: Array) -> list[dict[str, Any]]:
+    """Tables of joints, the first one that floats moved along a way [m]."""
+    number = next((number for number, joint in enumerate(joints) if joint["kind"] == JointKind.FREE), None)
+    if number is None:
+        return joints
+    q = joints[number]["q0"]
+    moved = joints[number] | {"q0": [*(np.array(q[:3]) + way).tolist(), *q[3:]]}
+    return [*joints[:number], moved, *joints[number + 1 :]]
+
+
+def start_of(file: RobotFile, robot: Robot, controller: Controller, *, placed: bool = False) -> RobotStates:
+    """State of a robot at time 0: the controller's start, else a keyframe's, else its pose, else 0.
+
+    ``placed``: what floats is where an MJCF puts it, unless start or keyframe say; else at its origin.
+    """
     start = controller.start
     home = keyframe_states(robot, file.keyframe(start.keyframe)) if start.keyframe else None
     single = [joint for joint in robot.moving if joint.dofs == 1]
@@ -241,6 +323,9 @@ def start_of(file: RobotFile, robot: Robot, controller: Controller) -> RobotStat
             continue
         R, p = (joint.rotation if joint.kind == JointKind.FREE else np.eye(3)), joint.position
         rates = np.zeros(joint.dofs)
+        if placed and joint.kind == JointKind.FREE and file.kind == "mjcf":
+            pose = robot.sources[joint.child]
+            R, p = np.array(pose["rotation"]), np.array(pose["position"])
         if home is not None:
             R, p = home.rotation[joint.name][0], home.position.get(joint.name, p[None])[0]
             rates = home.velocity[joint.name][0]
@@ -304,15 +389,15 @@ def _servo(controller: Controller, of_file: Mapping[str, Mapping[str, Any]], joi
     return Gains((joint,), kp=square * row["kp"], kd=square * row.get("kd", 0.0))
 
 
-def _times(controller: Controller) -> dict[str, float]:
+def _times(controller: Controller, duration: float) -> dict[str, float]:
     """Duration, step and, where the usual ones do not fit the instants, sampling interval [s]."""
     if controller.period is None:
-        return {"duration": _DURATION}
+        return {"duration": duration}
     least = _LADDER * math.ceil(controller.period / _STEP / _LADDER - 1e-9)
     for count in range(least, _FINER * least, _LADDER):
         coarsest = _LADDER * controller.period / count
         if abs(_GRID / coarsest - round(_GRID / coarsest)) < 1e-9:
-            return {"duration": _DURATION, "dt": coarsest / _LADDER}
+            return {"duration": duration, "dt": coarsest / _LADDER}
     coarsest = _LADDER * controller.period / least
     every = coarsest * max(1, round(_GRID / coarsest))
-    return {"duration": every * math.ceil(_DURATION / every - 1e-9), "dt": coarsest / _LADDER, "every": every}
+    return {"duration": every * math.ceil(duration / every - 1e-9), "dt": coarsest / _LADDER, "every": every}

@@ -19,7 +19,7 @@ from proofroll.files.toml import read_toml
 from proofroll.robots.model import Array
 
 HELD = ("target", "effort")
-FEET = "spheres"  # feet that the robot's own file describes
+FEET = "file"  # the shapes of the robot file
 _NO_NUMBERS = Parameters({}, {})
 _PLACE, _RATE = "rad or m", "rad/s or m/s"
 # Numbers of a base in a start: place and quaternion; velocity and angular velocity.
@@ -90,12 +90,12 @@ class GroundContact:
     """Plane under a robot.
 
     Attributes:
-        feet: ``spheres`` of the robot file, or frame -> radius [m].
-        friction: coefficient of the pair of a foot and the ground.
+        feet: ``file`` (shapes of the robot file), or link -> radius of a ball at its origin [m].
+        friction: coefficient of the pair of a foot and the ground; None: that of the file, or 1 where it has none.
     """
 
     feet: str | dict[str, float] = FEET
-    friction: float = field(default=1.0, metadata={"unit": "1"})
+    friction: float | None = field(default=None, metadata={"unit": "1"})
 
 
 @dataclass(frozen=True)
@@ -189,9 +189,10 @@ class Controller:
                 "ground.feet",
                 feet,
                 isinstance(feet, str) and feet != FEET,
-                (f'give "{FEET}", or a table of frames and radii in m'),
+                (f'give "{FEET}", or a table of links and radii in m'),
             )
-            yield "ground.friction", ground.friction, ground.friction < 0, "must be at least 0"
+            friction = ground.friction
+            yield "ground.friction", friction, friction is not None and friction < 0, "must be at least 0"
 
     @property
     def period(self) -> float | None:

@@ -127,15 +127,10 @@ def states(record: ControlRecord, law: ControlLaw) -> list[RobotState] | str:
     q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
     if q is None or v is None:
         return f"the record has no columns {'q' if q is None else 'v'}.JOINT"
-    base_at_rest = {"p_WB": np.zeros(3), "q_WB": np.array([1.0, 0, 0, 0]), "v_WB": np.zeros(3), "w_WB": np.zeros(3)}
-    base = {name: record.stacked(name, tuple(axes)) for name, axes in BASE.items()}
+    parts = ((name, record.stacked(name, tuple(axes))) for name, axes in BASE.items())
+    base = {name: item for name, item in parts if item is not None}
     return [
-        RobotState(
-            time=float(time),
-            q=q[row],
-            v=v[row],
-            **{name: base_at_rest[name] if item is None else item[row] for name, item in base.items()},
-        )
+        RobotState(time=float(time), q=q[row], v=v[row], **{name: item[row] for name, item in base.items()})
         for row, time in enumerate(record.time)
     ]
 

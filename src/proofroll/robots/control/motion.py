@@ -48,15 +48,7 @@ def _begun(record: ControlRecord, law: ControlLaw) -> tuple[int, ControlLaw] | s
 def _looks_back(law: ControlLaw) -> bool:
     """True if the policy of a law answers differently where its last action was another."""
     count = len(law.joints)
-    rest = RobotState(
-        time=0.0,
-        q=law.pose,
-        v=np.zeros(count),
-        p_WB=np.zeros(3),
-        q_WB=np.array([1.0, 0, 0, 0]),
-        v_WB=np.zeros(3),
-        w_WB=np.zeros(3),
-    )
+    rest = RobotState(time=0.0, q=law.pose, v=np.zeros(count))
     answers = []
     for last in (np.zeros(count), np.full(count, 0.1)):
         if (answer := law.answer()) is None:

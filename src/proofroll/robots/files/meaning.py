@@ -86,27 +86,33 @@ def meaning(
     """
     if file.kind == "urdf":
         return read_urdf(file), None
-    robot, by = _by_definer(
+    robot, by = by_definer(
         file.kind, file.path, workers, lambda worker: compiled_robot(worker, file, written, time_limit)
     )
     return robot.change(name=file.root.get("model", "robot")), by
 
 
 def opened(
-    path: Path, base: str, root: Path | None = None, time_limit: float = TIME_LIMIT, workers: Workers | None = None
+    path: Path,
+    base: str,
+    root: Path | None = None,
+    time_limit: float = TIME_LIMIT,
+    workers: Workers | None = None,
+    *,
+    contacts: bool = False,
 ) -> RobotFile:
     """A file as :func:`proofroll.robots.files.opening.open_robot` reads it, with macros written out.
 
-    The engine that defines the format writes them out within ``time_limit`` [s].
+    The engine that defines the format writes them out within ``time_limit`` [s]. ``contacts``: see there.
     """
 
     def expanded(parts: Mapping[str, Element]) -> Element:
-        return _by_definer("mjcf", path, workers, lambda w: expand(w, path, parts, time_limit))[0]
+        return by_definer("mjcf", path, workers, lambda w: expand(w, path, parts, time_limit))[0]
 
-    return open_robot(path, base, root, expanded)
+    return open_robot(path, base, root, expanded, contacts=contacts)
 
 
-def _by_definer(
+def by_definer(
     kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, Compiler]]
 ) -> tuple[_Answer, Compiler]:
     """Answer of the engine that defines a format, and its name. Raises InputError if its process dies."""

@@ -16,7 +16,9 @@ BASES = ("fixed", "free")
 _XACRO = "xacro"
 
 
-def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand: Expand | None = None) -> RobotFile:
+def open_robot(
+    path: Path, base: str = "fixed", root: Path | None = None, expand: Expand | None = None, *, contacts: bool = False
+) -> RobotFile:
     """Reads a file, without parts that engines must not or need not load.
 
     Args:
@@ -24,6 +26,7 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
         base: support of the root of a URDF, ``fixed`` or ``free``.
         root: folder that holds the file and all files named in it; by default :data:`ROOT`, or the file's own.
         expand: writes out macros of an MJCF (repetition, attached models); None: a file with macros is refused.
+        contacts: True to keep the pairs of shapes that an MJCF names.
 
     Raises:
         InputError: the file is broken, of another kind, too large, or asks for files outside the folder.
@@ -36,10 +39,10 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
         if not file.is_relative_to(inside):
             advice = f"{path.name} is in {file.parent}, not in this folder; name one that holds it with --root"
             raise InputError("--root", inside, advice)
-        return _opened(path, base, inside, expand)
+        return _opened(path, base, inside, expand, contacts=contacts)
 
 
-def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> RobotFile:
+def _opened(path: Path, base: str, inside: Path, expand: Expand | None, *, contacts: bool) -> RobotFile:
     root, driven, rotors = read_xml(path), dict[str, float](), dict[str, float]()
     keyframes: tuple[Keyframe, ...] = ()
     if root.tag == "robot":
@@ -50,7 +53,8 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
         driven, rotors = urdf.transmissions(root)
         kind, (root, remarks), body = "urdf", urdf.neutral_urdf(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
-        kind, (root, remarks, contained, keyframes), body = "mjcf", neutral_mjcf(root, path, inside, expand), "body"
+        root, remarks, contained, keyframes = neutral_mjcf(root, path, inside, expand, contacts=contacts)
+        kind, body = "mjcf", "body"
     elif root.tag == "sdf":
         raise InputError("file", path, "it is an SDF, which is not read; give the robot as a URDF or an MJCF")
     else:

@@ -31,6 +31,7 @@ _NEAR = 0.2  # part of a random coordinate that a guess of a closed pose is away
 # Parameters: default, unit, meaning, bounds.
 ParameterRow = tuple[float, str, str, dict[str, Any]]
 SWITCH: dict[str, Any] = {"at_least": 0, "at_most": 1, "integer": True}
+CONTACTS = "contacts"  # clause on what a scene without a ground leaves out
 _FACTORS = {
     "damping": "damping of the joints in parts of the file's",
     "friction": "dry friction of the joints in parts of the file's",
@@ -80,7 +81,7 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
         if body.impossible:
             advice = f"it {body.impossible}; correct it, or take the bodies of each joint as one by possible=0"
             raise InputError(f"{path}: <link {link}> inertia", body.moments.tolist(), advice)
-    names, near = _names(robot), 1.0 if values.get("keyframe") else _NEAR
+    names, near = names_of_bodies(robot), 1.0 if values.get("keyframe") else _NEAR
     with_couplings = bool(values["couplings"])
     following = _following(robot) if with_couplings else frozenset()
     gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])
@@ -142,7 +143,7 @@ def _omitted(file: RobotFile, robot: Robot, values: Mapping[str, float]) -> Iter
         yield f"gravity compensation of {counted(compensated, 'bodies')}"
     extra = Counter(key for joint in file.root.iter("joint") for key in extra_dynamics(joint))
     yield from (f"{key} of {counted(number, 'joints')}" for key, number in extra.items())
-    yield "contacts"
+    yield CONTACTS
 
 
 def read_robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
@@ -154,7 +155,7 @@ def read_robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
     return file, robot.change(joints=tuple(joints)) if rotors else robot
 
 
-def _names(robot: Robot) -> dict[str, str]:
+def names_of_bodies(robot: Robot) -> dict[str, str]:
     """Link -> name of its body in the scene; a link called ``world`` is renamed, as a scene has its own ``world``."""
     names = {joint.child: joint.child for joint in robot.moving}
     if "world" in names:

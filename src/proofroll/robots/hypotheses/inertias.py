@@ -10,10 +10,34 @@ import numpy as np
 from proofroll.robots.hypotheses import LEAST, WRITE_INERTIALS, RobotEvidence, hypothesis, with_weightless
 from proofroll.robots.model import Array, Robot, RobotBody
 
+# Attributes of the <inertia> of a URDF; its specification requires all.
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def incomplete_inertias(root: Element) -> dict[str, list[str]]:
+    """Links of a URDF whose <inertia> lacks attributes, each with those that it lacks."""
+    lacking = {
+        str(link.get("name")): [name for name in _MOMENTS if moments.get(name) is None]
+        for link in root.findall("link")
+        for moments in link.findall("inertial/inertia")
+    }
+    return {name: missing for name, missing in lacking.items() if missing}
+
+
+@hypothesis({"pinocchio": "4.1.0"}, "write all of ixx, ixy, ixz, iyy, iyz, izz, also those that are zero")
+def incomplete_inertia_zeroed(evidence: RobotEvidence) -> Robot:
+    """An <inertia> that lacks one of its six attributes is read as zero."""
+    bodies = evidence.robot.bodies
+    names = (name for name in incomplete_inertias(evidence.root) if name in bodies and np.any(bodies[name].inertia))
+    return evidence.robot.with_bodies(dataclasses.replace(bodies[name], inertia=np.zeros((3, 3))) for name in names)
+
 
 def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
-    """Bodies whose inertia differs in the engine and may count as impossible there, by whatever rule."""
-    robot, reading = evidence.robot, evidence.reading
+    """Bodies whose inertia differs in the engine and may count as impossible there, by whatever rule.
+
+    One that is written incompletely is possible as far as it is known.
+    """
+    robot, reading, incomplete = evidence.robot, evidence.reading, incomplete_inertias(evidence.root)
     scale = max((float(np.abs(group.inertia).max()) for group in robot.groups.values()), default=1.0)
     unlike = {
         name
@@ -25,24 +49,24 @@ def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
         alone = sum(carrier == home for carrier, _, _ in robot.welded.values()) == 1
         if body is not None and home in unlike:
             impossible = body.breaks_triangle or body.moments[0] <= 0
-            if alone or (impossible and np.any(body.inertia)) or (not body.mass and np.any(body.inertia)):
+            suspect = alone or (impossible and np.any(body.inertia)) or (not body.mass and np.any(body.inertia))
+            if suspect and (impossible or name not in incomplete):
                 yield body
 
 
-def _replaced(evidence: RobotEvidence, instead: Callable[[RobotBody], RobotBody]) -> Robot | None:
-    """Robot with ``instead(body)`` for each suspect body (see :func:`_suspects`); None: there is none."""
-    bodies = [instead(body) for body in _suspects(evidence)]
-    return evidence.robot.with_bodies(bodies) if bodies else None
+def _replaced(evidence: RobotEvidence, instead: Callable[[RobotBody], RobotBody]) -> Robot:
+    """Robot with ``instead(body)`` for each suspect body (see :func:`_suspects`)."""
+    return evidence.robot.with_bodies(map(instead, _suspects(evidence)))
 
 
 @hypothesis({"pybullet": "3.2.7", "mujoco": "4.0.0 (of a link without mass)"}, "correct the inertia in the file")
-def impossible_inertia_zeroed(evidence: RobotEvidence) -> Robot | None:
+def impossible_inertia_zeroed(evidence: RobotEvidence) -> Robot:
     """An impossible inertia is replaced by zero."""
     return _replaced(evidence, lambda body: dataclasses.replace(body, inertia=np.zeros((3, 3))))
 
 
 @hypothesis({"mujoco": "with balanceinertia"}, "correct the inertia in the file, and leave balanceinertia out")
-def inertia_balanced(evidence: RobotEvidence) -> Robot | None:
+def inertia_balanced(evidence: RobotEvidence) -> Robot:
     """An impossible inertia is replaced by a sphere with the mean of its principal moments."""
     return _replaced(evidence, lambda body: dataclasses.replace(body, inertia=np.trace(body.inertia) / 3 * np.eye(3)))
 
@@ -58,7 +82,7 @@ def _sphere_of_water(body: RobotBody) -> RobotBody:
 
 
 @hypothesis({"drake": "1.51.1 (a line of its log says so)"}, "correct the inertia in the file")
-def water_sphere(evidence: RobotEvidence) -> Robot | None:
+def water_sphere(evidence: RobotEvidence) -> Robot:
     """An impossible inertia is replaced by that of a sphere of water (of 1 kg where the mass is 0)."""
     return _replaced(evidence, _sphere_of_water)
 
@@ -76,7 +100,7 @@ def _raised(body: RobotBody, com: Array) -> RobotBody:
 
 
 @hypothesis({"mujoco": "with boundmass, boundinertia"}, "leave the bounds out, or correct the masses in the file")
-def mass_bounded(evidence: RobotEvidence) -> Robot | None:
+def mass_bounded(evidence: RobotEvidence) -> Robot:
     """Small masses and inertias are raised to a bound (1e-6 kg, 1e-8 kg m²)."""
     robot = evidence.robot
     small = []
@@ -86,7 +110,7 @@ def mass_bounded(evidence: RobotEvidence) -> Robot | None:
             # MuJoCo 4.0.0 puts the centre of mass of a link without <inertial> where its frame is in the parent's
             has_inertial = robot.sources.get(body.name, {}).get("inertial", True)
             small.append(_raised(body, body.com if has_inertial else joint.position))
-    return robot.with_bodies(small) if small else None
+    return robot.with_bodies(small)
 
 
 def bounded_from_below(root: Element, *, replace: bool) -> None:
@@ -112,18 +136,17 @@ def bounds_ignored(evidence: RobotEvidence) -> Robot | None:
 
 
 @hypothesis({"mujoco": "3.1.3 to 3.13.0"}, "update the engine, or write the inertia in the axes of the link with rpy 0")
-def inertial_rotation_ignored(evidence: RobotEvidence) -> Robot | None:
+def inertial_rotation_ignored(evidence: RobotEvidence) -> Robot:
     """The rpy of <inertial> is ignored.
 
     The moments are taken in the axes of the link.
     """
     robot = evidence.robot
-    turned = [
+    return robot.with_bodies(
         dataclasses.replace(robot.bodies[name], inertia=np.array(source["written"]))
         for name, source in robot.sources.items()
         if name in robot.bodies and "written" in source and np.any(np.array(source["frame"]) != np.eye(3))
-    ]
-    return robot.with_bodies(turned) if turned else None
+    )
 
 
 @hypothesis(

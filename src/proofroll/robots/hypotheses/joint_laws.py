@@ -24,27 +24,25 @@ def armature_left_out(evidence: RobotEvidence) -> Robot | None:
 
 
 @hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, "write free joints without armature: nothing is geared there")
-def armature_of_free_joints_turns(evidence: RobotEvidence) -> Robot | None:
+def armature_of_free_joints_turns(evidence: RobotEvidence) -> Robot:
     """Armature of a free joint acts along axes that turn with the body.
 
     The engine multiplies it with the derivative of the velocity's components in body axes. The file means those in
     world axes; they differ by ω × v.
     """
-    robot = evidence.robot
-    if not any(joint.kind == JointKind.FREE and joint.armature for joint in robot.joints):
-        return None
-    joints = (dataclasses.replace(joint, turning=joint.kind == JointKind.FREE) for joint in robot.joints)
-    return robot.change(joints=tuple(joints))
+    return evidence.robot.with_each_joint(
+        lambda joint: (
+            dataclasses.replace(joint, turning=True) if joint.kind == JointKind.FREE and joint.armature else joint
+        )
+    )
 
 
 @hypothesis({"drake": "1.51.1"}, "give every joint with armature an actuator")
-def armature_of_actuated_joints_only(evidence: RobotEvidence) -> Robot | None:
+def armature_of_actuated_joints_only(evidence: RobotEvidence) -> Robot:
     """Armature is used only of joints that have an actuator."""
-    robot = evidence.robot
-    if all(joint.actuated or not joint.armature for joint in robot.moving):
-        return None
-    joints = (joint if joint.actuated else dataclasses.replace(joint, armature=0.0) for joint in robot.joints)
-    return robot.change(joints=tuple(joints))
+    return evidence.robot.with_each_joint(
+        lambda joint: joint if joint.actuated or not joint.armature else dataclasses.replace(joint, armature=0.0)
+    )
 
 
 @hypothesis(
@@ -77,10 +75,8 @@ def defaults_not_inherited(evidence: RobotEvidence) -> Robot | None:
         for joint in robot.joints
         if joint.name in of_engine
     }
-    if not any(changes.values()):
-        return None
-    return robot.change(
-        joints=tuple(dataclasses.replace(joint, **changes.get(joint.name, {})) for joint in robot.joints)
+    return robot.with_each_joint(
+        lambda joint: dataclasses.replace(joint, **changes[joint.name]) if changes.get(joint.name) else joint
     )
 
 

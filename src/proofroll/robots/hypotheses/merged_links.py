@@ -18,7 +18,7 @@ def _moments(inertia: Array) -> Array:
 
 
 @hypothesis({"pybullet": "3.2.7 with URDF_MERGE_FIXED_LINKS"}, "load without URDF_MERGE_FIXED_LINKS")
-def merged_at_link_origins(evidence: RobotEvidence) -> Robot | None:
+def merged_at_link_origins(evidence: RobotEvidence) -> Robot:
     """Links at fixed joints are merged by their origins: inertial origins and rotations are dropped.
 
     Their principal moments are taken about the axes of the whole.
@@ -34,7 +34,7 @@ def merged_at_link_origins(evidence: RobotEvidence) -> Robot | None:
             written = np.array(robot.sources.get(name, {}).get("written", body.inertia))
             inertia = R.T @ np.diag(_moments(written)) @ R  # in the link's frame: diagonal in the axes of the composite
             bodies.append(dataclasses.replace(body, com=np.zeros(3), inertia=inertia))
-    return robot.with_bodies(bodies) if bodies else None
+    return robot.with_bodies(bodies)
 
 
 # Off-diagonal element at which MuJoCo's Jacobi rotations end; moments that differ by less count as equal.
@@ -63,8 +63,8 @@ def _principal(inertia: Array) -> tuple[Array, Array]:
     return moments, axes
 
 
-def _misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot | None:
-    """Robot with misplaced inertials of merged links (None: it has none), see :func:`merged_inertial_misplaced`.
+def _misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot:
+    """Robot with misplaced inertials of merged links, see :func:`merged_inertial_misplaced`.
 
     Principal axes are Q R if ``turned``, else Q.
     """
@@ -79,13 +79,13 @@ def _misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot | None:
         # c + Q p and axes Q R are in the frame of the moving link; here they are transformed to the merged link's own
         axes, com = R.T @ (Q @ R if turned else Q), R.T @ (body.com + Q @ p - p)
         bodies.append(dataclasses.replace(body, com=com, inertia=axes @ np.diag(moments) @ axes.T))
-    return robot.with_bodies(bodies) if bodies else None
+    return robot.with_bodies(bodies)
 
 
 @hypothesis(
     {"mujoco": "3.8.1 to 3.10.0"}, 'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file'
 )
-def merged_inertial_misplaced(evidence: RobotEvidence) -> Robot | None:
+def merged_inertial_misplaced(evidence: RobotEvidence) -> Robot:
     """The inertial of a merged link is placed in the wrong order (default fusestatic for URDF).
 
     The pose (p, R) of the link in its parent and the pose (c, Q) of its principal frame in the link are multiplied as
@@ -97,6 +97,6 @@ def merged_inertial_misplaced(evidence: RobotEvidence) -> Robot | None:
 
 
 @hypothesis({"mujoco": "3.3.3"}, 'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file')
-def merged_inertial_misplaced_unturned(evidence: RobotEvidence) -> Robot | None:
+def merged_inertial_misplaced_unturned(evidence: RobotEvidence) -> Robot:
     """The inertial of a merged link is placed in the wrong order and not turned (default fusestatic for URDF)."""
     return _misplaced(evidence, turned=False)

@@ -115,15 +115,16 @@ def _one_of_several(joint: RobotJoint, robot: Robot) -> bool:
 
 
 @hypothesis({"pybullet": "3.2.7"}, "give the root link a mass")
-def free_base_is_fixed(evidence: RobotEvidence) -> Robot | None:
+def free_base_is_fixed(evidence: RobotEvidence) -> Robot:
     """A free base without mass is fixed to the world."""
-    robot = evidence.robot
     names = set(evidence.reading.joints)
-    lost = [joint for joint in robot.joints if joint.kind == JointKind.FREE and joint.name not in names]
-    if not lost:
-        return None
-    joints = (dataclasses.replace(joint, kind=JointKind.FIXED) if joint in lost else joint for joint in robot.joints)
-    return robot.change(joints=tuple(joints))
+    return evidence.robot.with_each_joint(
+        lambda joint: (
+            dataclasses.replace(joint, kind=JointKind.FIXED)
+            if joint.kind == JointKind.FREE and joint.name not in names
+            else joint
+        )
+    )
 
 
 def _offset(joint: RobotJoint, robot: Robot) -> RobotJoint:
@@ -138,15 +139,12 @@ def _offset(joint: RobotJoint, robot: Robot) -> RobotJoint:
 @hypothesis(
     {"pinocchio": "4.1.0"}, "write free bodies with pos 0 0 0 or without rotation, and set the start in the coordinates"
 )
-def free_body_offset(evidence: RobotEvidence) -> Robot | None:
+def free_body_offset(evidence: RobotEvidence) -> Robot:
     """A free body whose pose (p, R) in the file is turned is offset by p − R p.
 
     The pose is undone in the wrong order.
     """
-    robot = evidence.robot
-    joints = tuple(_offset(joint, robot) for joint in robot.joints)
-    changed = any(changed_joint is not unchanged for changed_joint, unchanged in zip(joints, robot.joints, strict=True))
-    return robot.change(joints=joints) if changed else None
+    return evidence.robot.with_each_joint(lambda joint: _offset(joint, evidence.robot))
 
 
 @hypothesis(

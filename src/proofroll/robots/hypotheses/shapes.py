@@ -1,6 +1,7 @@
 """Causes that change masses and inertias computed from shapes."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -59,7 +60,7 @@ def inertia_from_collision(evidence: RobotEvidence) -> Robot | None:
             return None
         frame = source["frame"]
         bodies.append(dataclasses.replace(body, inertia=frame @ np.diag(moments) @ frame.T))
-    return robot.with_bodies(bodies) if bodies else None
+    return robot.with_bodies(bodies)
 
 
 @hypothesis({"pinocchio": "4.1.0"}, WRITE_INERTIALS)
@@ -117,19 +118,16 @@ def _weighed(name: str, shapes: list[Any]) -> RobotBody | None:
 
 
 @hypothesis({"mujoco": "all versions so far"}, "give every link an <inertial>")
-def shapes_weighed(evidence: RobotEvidence) -> Robot | None:
+def shapes_weighed(evidence: RobotEvidence) -> Robot:
     """Collision shapes of links without <inertial> are weighed at 1000 kg/m³."""
     robot = evidence.robot
-    bare = {name: source for name, source in robot.sources.items() if not source.get("inertial", True)}
-    bodies = [body for name, source in bare.items() if (body := _weighed(name, source["shapes"])) is not None]
-    return robot.with_bodies(bodies) if bodies else None
+    bare = {name: source["shapes"] for name, source in robot.sources.items() if not source.get("inertial", True)}
+    return robot.with_bodies(filter(None, itertools.starmap(_weighed, bare.items())))
 
 
 @hypothesis({"pybullet": "3.2.7"}, "give every link an <inertial>; a massless one with mass 0 and inertia 0")
-def unit_mass_without_inertial(evidence: RobotEvidence) -> Robot | None:
+def unit_mass_without_inertial(evidence: RobotEvidence) -> Robot:
     """Links without <inertial> are given 1 kg and unit inertia."""
     robot = evidence.robot
-    bare = [name for name, source in robot.sources.items() if name in robot.bodies and not source.get("inertial", True)]
-    if not bare:
-        return None
+    bare = (name for name, source in robot.sources.items() if name in robot.bodies and not source.get("inertial", True))
     return robot.with_bodies(RobotBody(name, 1.0, np.zeros(3), np.eye(3)) for name in bare)

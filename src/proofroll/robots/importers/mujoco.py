@@ -13,6 +13,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.engines.mujoco.running import mass_matrix, written
 from proofroll.robots.importers.mujoco_actuators import actuators_of, is_off, reflected
+from proofroll.robots.importers.mujoco_shapes import near_shapes
 from proofroll.robots.model import (
     NO_BODY,
     Array,
@@ -68,6 +69,10 @@ class MujocoRobots:
         spec = mujoco.MjSpec.from_file(str(path))
         spec.compile()
         return written(spec)
+
+    def near_shapes(self, path: Path, **asked: Any) -> dict[str, Any]:
+        """See :func:`proofroll.robots.importers.mujoco_shapes.near_shapes`."""
+        return near_shapes(path, **asked)
 
     def as_written(self, request: Request) -> Whole:
         """Degrees of freedom and moving mass [kg] of the unchanged file, loaded from its path."""

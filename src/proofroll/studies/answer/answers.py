@@ -48,7 +48,7 @@ _NEAR = 3.0
 # Rounds and length of such a measurement [s]; a slower run is measured once.
 _ROUNDS, _SECONDS, _ONCE = 2, 0.05, 0.1
 
-Tell = Callable[[EngineAnswer], None]
+Tell = Callable[[EngineAnswer, float], None]
 _Answer = TypeVar("_Answer")
 
 
@@ -58,7 +58,7 @@ def answer(
     engines: Sequence[str],
     runner: Runner,
     begins: Callable[[Sequence[str]], None] = lambda _: None,
-    tell: Tell = lambda _: None,
+    tell: Tell = lambda _, __: None,
     ran: Callable[[str], None] = lambda _: None,
     caps: SearchCaps = WHOLE,
 ) -> list[SceneAnswer]:
@@ -70,7 +70,7 @@ def answer(
         engines: names or ``name[key=value,…]``; empty: all that are installed, without those that check the truth.
         runner: runs the cases.
         begins: called with the names of the engines before the first run.
-        tell: called with the answer of an engine as soon as its search has ended.
+        tell: called with the answer of an engine as soon as its search has ended, and with the length of its runs [s].
         ran: called with the name of an engine after each of its runs.
         caps: processor time of a run, and of the search of an engine [s].
 
@@ -82,7 +82,8 @@ def answer(
     curves, absent = curves_to_search(question, engines, runner.workers)
     begins(list(dict.fromkeys(curve.facts.name for curve in curves)))
     _, truth = resolve_with_truth([], runner.workers)
-    abreast = SearchesAbreast(question.references(truth, runner), runner, ran)
+    question, references = question.well_posed(truth, runner)
+    abreast = SearchesAbreast(references, runner, ran)
     answers = []
     for tolerance in asked:
         spent = processor_seconds() - begin
@@ -111,7 +112,7 @@ def _answered(
     searches = [] if unanswerable else settings_of(question, curves, allowed, sizes, caps)
     lacking = [EngineSearch(engine=name, settings=[], cannot=why) for name, why in absent.items()]
     generators = [searching(search, question) for search in searches]
-    abreast.run(generators, lambda number: tell(engine_answer(searches[number], bounds)))
+    abreast.run(generators, lambda number: tell(engine_answer(searches[number], bounds), question.until))
     speeds = _speeds(searches, question, runner)
     return SceneAnswer(
         scene=question.scene,
@@ -121,6 +122,7 @@ def _answered(
         tolerance=tolerance.text,
         bounds=bounds,
         unjudged=orientations_of(question.loaded, allowed),
+        beyond=question.beyond,
         open=unanswerable,
         engines=ranked([engine_answer(search, bounds, speeds) for search in [*searches, *lacking]]),
         spent=processor_seconds() - begin,

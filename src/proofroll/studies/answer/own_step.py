@@ -59,7 +59,8 @@ def step_answer(
     begin = processor_seconds()
     own, truth = facts
     resolution = own.resolution or ""
-    abreast = SearchesAbreast(question.references(truth, runner), runner)
+    question, references = question.well_posed(truth, runner)
+    abreast = SearchesAbreast(references, runner)
     reference = abreast.references[question.every]
     bounds = bounds_of(asked, reference)
     spec = parse_engine(engine)
@@ -96,6 +97,7 @@ def step_answer(
         tolerance=asked.text,
         bounds=bounds,
         unjudged=orientations_of(question.loaded, item.allowed),
+        beyond=question.beyond,
         open=unanswerable,
         spec=engine,
         resolution=resolution,

@@ -30,6 +30,8 @@ _FEWEST, _MOST = 80, 400
 _SPARSE = 2
 # Limit of the truth's wall time [s].
 _TRUTH_LIMIT = 600.0
+# Times that a question is made shorter until it is well-posed.
+_SHORTER = 3
 # Halvings of the sampling interval at whose off-grid times the truth has samples, too.
 _HALVINGS = 12
 
@@ -64,12 +66,16 @@ class AnswerQuestion:
         parameters: its parameters that differ from the defaults.
         until: length of every run [s].
         every: sampling interval [s].
+        whole: step whose multiples the samples are [s]; None: any steps are run.
+        beyond: clause on why no longer run can be judged; empty: as long was asked for.
     """
 
     scene: str
     parameters: dict[str, float]
     until: float
     every: float
+    whole: float | None = None
+    beyond: str = ""
 
     @classmethod
     def of(cls, scene: str, parameters: dict[str, float], until: float | None = None) -> AnswerQuestion:
@@ -107,7 +113,7 @@ class AnswerQuestion:
             raise InputError("dt", step, f"give a positive step of at most a quarter of the {self.until:g} s")
         count = math.floor(self.until / longest * (1 + 1e-12) + 1e-9)
         every = float(f"{longest * max(1, round(self.until / 100 / longest)):.12g}")
-        return replace(self, until=float(f"{longest * count:.12g}"), every=every)
+        return replace(self, until=float(f"{longest * count:.12g}"), every=every, whole=step)
 
     @cached_property
     def loaded(self) -> Scene:
@@ -131,6 +137,29 @@ class AnswerQuestion:
         return case_of(
             self.scene, scene, self.parameters, facts, self.until, self.every, time_limit=_TRUTH_LIMIT, between=between
         )
+
+    def well_posed(self, facts: EngineFacts, runner: Runner) -> tuple[AnswerQuestion, dict[float, Reference]]:
+        """The question over the time in which it is well-posed, and its truths by sampling interval [s].
+
+        Args:
+            facts: of the truth.
+            runner: runs it.
+
+        Raises:
+            ProofrollError: there is no truth.
+        """
+        question, references = self, self.references(facts, runner)
+        for _ in range(_SHORTER):
+            reference = references[question.every]
+            horizon = float(reference.dataset.attrs.get("horizon", math.inf))
+            if not 0 < horizon <= question.until:
+                break
+            # a horizon may be found at a sample only, one interval late
+            sure = max(horizon - question.every, horizon / 2)
+            shorter = AnswerQuestion.of(self.scene, self.parameters, _rounded_down(sure)).sampled_for(self.whole)
+            question = replace(shorter, beyond=question.beyond or reference.ill_posed)
+            references = question.references(facts, runner)
+        return question, references
 
     def references(self, facts: EngineFacts, runner: Runner) -> dict[float, Reference]:
         """Sampling interval [s] -> truth.
@@ -169,6 +198,12 @@ def question_named(name: str, parameters: Mapping[str, object], until: float | N
         until = until or read_scene_file(scene).duration or comparison.until
     loaded = load_scene(scene, **point)  # type: ignore[arg-type]  # text is checked and converted there
     return AnswerQuestion.of(scene, {key: loaded.parameters[key] for key in point}, until)
+
+
+def _rounded_down(seconds: float) -> float:
+    """A time with two digits, not above the given one [s]."""
+    unit = 10.0 ** (math.floor(math.log10(seconds)) - 1)
+    return float(f"{math.floor(seconds / unit) * unit:.12g}")
 
 
 def _steps(every: float) -> Iterator[float | None]:

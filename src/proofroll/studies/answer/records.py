@@ -140,6 +140,7 @@ class AnsweredScene:
         tolerance: as it was given.
         bounds: of the judged quantities.
         unjudged: observables of orientation that the tolerance does not bound.
+        beyond: clause on why no longer run can be judged; empty: as long was asked for.
         open: why no engine can be judged here; empty: all are.
     """
 
@@ -150,6 +151,7 @@ class AnsweredScene:
     tolerance: str
     bounds: list[AllowedError]
     unjudged: list[str]
+    beyond: str
     open: str
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _OF_TRUTHS = 0.8  # largest part of a budget that truths take, at first and again for a shorter time
 _PARTS = (1, 8, 64)  # parts of the time, the first of which is tried
+_OWN_STEPS = "the reference by steps is the ladder of this formulation, which is no judge of itself"
 _LEAST = 2  # samples of a truth with which a motion is judged: at the first one nothing has moved yet
 
 
@@ -59,6 +60,12 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
         if reference is None:
             judged.append(_without_truth(run, point, result))
             continue
+        if (
+            reference.by_steps
+            and reference.by_steps == f"{run.facts.name}[formulation={run.facts.settings.get('formulation')}]"
+        ):
+            judged.append(_run(run, replace(result, status=Status.NO_TRUTH, message=_OWN_STEPS)))
+            continue
         built_scene = reference.another_scene(result.certificate)
         if built_scene is not None:
             judged.append(_of_another_scene(run, result, built_scene))
@@ -68,7 +75,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
             for factor, case in run.ladder.items()
             if results[case.key].status == Status.DONE
         }
-        band = comparison.bands[run.row.tolerance]
+        band = _told(comparison.bands[run.row.tolerance], comparison, reference)
         if reference.ill_posed and not reference.curves.keys() & {*band.bounds, *run.row.bound}:
             reason = f"no motion is unique here, and no law has a tolerance: {reference.ill_posed}"
             judged.append(_run(run, replace(result, status=Status.NO_TRUTH, message=reason)))
@@ -104,6 +111,18 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
         points=points,
         beyond_budget=_beyond_budget(planned, results),
     )
+
+
+def _told(band: Band, comparison: Comparison, reference: Reference) -> Band:
+    """The band, for a comparison without a file without what a reference by steps does not tell to its tolerances."""
+    if comparison.budget is None or not reference.by_steps:
+        return band
+    told = {
+        name: bound
+        for name, bound in band.bounds.items()
+        if reference.tells(name, bound.absolute(reference.sizes.get(name, 1.0)))
+    }
+    return replace(band, bounds=told) if told else band
 
 
 def left_out(results: Mapping[str, Result]) -> set[str]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from proofroll.core.arrays import FloatArray, Vectors, magnitudes
 from proofroll.core.columns import SAMPLED_BAR
 from proofroll.core.dataset import (
+    BY_STEPS,
     CONTINUOUS,
     LEFT_OUT,
     Key,
@@ -127,6 +128,17 @@ class Reference:
         return str(self.dataset.attrs.get("ill_posed", ""))
 
     @property
+    def by_steps(self) -> str:
+        """Engine and formulation, as a setting, whose finer and finer steps lead to this; empty: it is a truth."""
+        return str(self.dataset.attrs.get(BY_STEPS, ""))
+
+    def tells(self, name: str, tolerance: float) -> bool:
+        """True if the error bar of an observable is within a tolerance, in its unit."""
+        if name not in self.curves:
+            return False
+        return self.true(name, self.curves[name]).error_bar <= tolerance
+
+    @property
     def ended(self) -> str:
         """Clause on the time and reason of an early end of the truth, behind which nothing is judged; or empty."""
         end = ended_early(self.dataset)
@@ -186,8 +198,10 @@ class Reference:
     def _known(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
         """True values of an observable and their error bar."""
         item = self.scene.observables[name]
-        if item.name == EVENT_ORDER:
+        if item.name == EVENT_ORDER and not self.by_steps:
             return np.zeros(1), 0.0
+        if item.role == Role.EVENT and self.by_steps:  # no two steps have the same touches and slips
+            return np.full_like(values, np.nan), np.inf
         if item.role == Role.EVENT:
             times = self.curves.get(name, np.zeros(0))  # of a scene without events there are none
             return times, max((event.time_high - event.time_low for event in self.events), default=0.0)

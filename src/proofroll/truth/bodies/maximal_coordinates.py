@@ -184,7 +184,7 @@ class NumericEquations:
 
     def poses_at(self, states: Array) -> tuple[Array, Array, Array, Array]:
         """Places, velocities, rotations and angular velocities at states, each (states, bodies, …), world axes."""
-        unit = np.array([self.normalised(state) for state in states]).T
+        unit = self.normalised(states).T
         views = self.equations.views(list(unit), SMOOTH)[:-1]
 
         def stacked(values: Sequence[Any]) -> Array:
@@ -196,11 +196,11 @@ class NumericEquations:
         return r - arm, v - np.cross(w, arm), R, w
 
     def normalised(self, state: Array) -> Array:
-        """State with quaternions of unit length."""
+        """State, or states, (…, n), with quaternions of unit length."""
         state = state.copy()
         for body, part in zip(self.equations.bodies, self.equations.x_slices, strict=True):
             if body.nx == 7:
-                state[part][3:] /= np.linalg.norm(state[part][3:])
+                state[..., part][..., 3:] /= np.linalg.norm(state[..., part][..., 3:], axis=-1, keepdims=True)
         return state
 
     def rate(self, time: float, state: Array) -> Array:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import Diverged, Missing
+from proofroll.core.pace import PACE
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.bodies.body_elimination import BodySystem
@@ -64,12 +65,14 @@ class MaximalTaylor:
 
         Raises:
             Diverged: the integration stops before the last time.
+            OutOfTime: the truth has taken the processor time that it may.
         """
         integrator = self._integrator
         self._begin(time, state)
         states: list[Array] = []
         while len(states) < len(times):
             begun, left = integrator.time, np.longdouble(times[-1]) - integrator.time
+            PACE.reached(float(begun))
             if visited is not None:
                 visited.append((self, begun, integrator.state.copy()))
             _, step = integrator.step(max_delta_t=left, write_tc=True)

@@ -103,6 +103,7 @@ def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[LawRecorde
     for walk in walks[1:] if working(mechanism) else ():
         walk.through(0.0)
     works, residuals, tiles = [walk.work for walk in walks], walks[0].residuals, _joined(parts, routes[0])
+    tiles = None if tiles is None else replace(tiles, impulses=tuple(walks[0].impulses))
     text = residuals.broken("the motion that was followed")
     if residuals.first is None:
         return HeldMotion(end=np.inf, text="", laws=residuals.held(), works=works, tiles=tiles)
@@ -138,12 +139,14 @@ class _Walk:
     Attributes:
         residuals: remainders of the laws of transitions.
         work: of drives.
+        impulses: time of each impact that driven joints take a part of [s], and the impulses along these.
     """
 
     def __init__(self, mechanism: Mechanism, units: Units, route: LawRecorder) -> None:
         self._route, scale = route, (units.length, 1 / units.time)
         self._scene, self.residuals = LawScene(mechanism, *scale), LawResiduals(rate=scale[1])
         self.work, self._working = WorkAlong(mechanism, *scale), bool(working(mechanism))
+        self.impulses = list[tuple[float, dict[int, float]]]()
 
     def through(self, end: float) -> list[Tiles | None]:
         """Tiles of all stretches; transitions are judged up to a time in natural units."""
@@ -155,7 +158,9 @@ class _Walk:
             if ending is not None:
                 residuals = self.residuals if stretch.start < end else unjudged
                 passage = route.passage(number, ending)
-                self.work.passes(passage, transition(self._scene, passage, residuals, fastest))
+                if pulses := transition(self._scene, passage, residuals, fastest):
+                    self.impulses.append((stretch.start * route.second, pulses))
+                self.work.passes(passage, pulses)
             parts.append(route.tiles(number, drives=self._working))
             if self._working and (part := parts[-1]) is not None:
                 self.work.take(part)

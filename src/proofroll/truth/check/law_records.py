@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -45,6 +45,33 @@ class _Piece(NamedTuple):
     coarse: bool = False
 
 
+class _Window(NamedTuple):
+    """A part of a step between values of its variable, with its states.
+
+    ``recorded``: record at states and rate of the time by that variable, which is the time where there is none.
+    """
+
+    start: float
+    end: float
+    inside: Callable[[Array], Any]
+    recorded: Callable[[Array], tuple[Array, Array]] | None = None
+    coarse: bool = False
+
+    def piece(self) -> _Piece:
+        """The window as a piece."""
+        places = (self.start + self.end) / 2 + (self.end - self.start) / 2 * POINTS
+        states, half = np.asarray(self.inside(places)), np.full(len(POINTS), (self.end - self.start) / 2)
+        if self.recorded is None:
+            return _Piece(places, half, states.T, coarse=self.coarse)
+        record, pace = self.recorded(states)
+        return _Piece(states[-1], half * pace, states.T, record.T if len(record) else None, self.coarse)
+
+    def halves(self) -> tuple[_Window, _Window]:
+        """Both of its halves."""
+        middle = (self.start + self.end) / 2
+        return self._replace(end=middle), self._replace(start=middle)
+
+
 class LawRecorder:
     """Takes the record of one route for the checks, in SI units.
 
@@ -78,7 +105,7 @@ class LawRecorder:
     def tiles(self, number: int, *, drives: bool = False) -> Tiles | None:
         """Poses and velocities in all pieces of a stretch, and forces of ``drives``; None: there are none."""
         stretch = self.path.stretches[number]
-        cut = list(self._cut(stretch))
+        cut = self._cut(stretch)
         if not cut:
             return None
         time, pace = (np.array([getattr(piece, name) for piece in cut]) for name in ("time", "pace"))
@@ -119,7 +146,7 @@ class LawRecorder:
             turned = of_quaternion(quaternions)
         return np.concatenate([p, turned.reshape(*p.shape[:2], 9), v, w], -1).reshape(len(states), -1)
 
-    def _moving(self, of_bodies: Array) -> dict[str, Array]:
+    def _moving(self, of_bodies: Array) -> dict[str, Any]:
         """Poses and velocities in SI units, the world last, from values (pieces, points, bodies, 18)."""
         length, shape = self._units.length, of_bodies.shape[:2]
         world = np.broadcast_to(np.concatenate([np.zeros(3), np.eye(3).ravel(), np.zeros(6)]), (*shape, 1, 18))
@@ -192,72 +219,64 @@ class LawRecorder:
             stops=tuple((low, high) for low, high in stops),
         )
 
-    def _cut(self, stretch: Stretch[ContactMode]) -> Iterator[_Piece]:
-        """Pieces of a stretch."""
+    def _windows(self, stretch: Stretch[ContactMode]) -> Iterator[_Window]:
+        """Parts of a stretch that are polynomials, as far as it tells."""
         if isinstance(stretch, BegunSlip):
-            edges = np.linspace(stretch.start, stretch.end, _PARTS + 1)
-            for start, end in pairwise(edges):
-                yield from self._parts(start, end, lambda times: stretch.at(times).T, None)
+            for start, end in pairwise(np.linspace(stretch.start, stretch.end, _PARTS + 1)):
+                yield _Window(start, end, lambda times: stretch.at(times).T)
         elif isinstance(stretch, StoppingSlip):
             for start, end in pairwise([stretch.start, *(step.time for step in stretch.steps), stretch.end]):
                 if end > start:
-                    yield from self._parts(start, end, lambda times: stretch.at(times).T, None)
+                    yield _Window(start, end, lambda times: stretch.at(times).T)
         elif isinstance(stretch, CompiledStretch) and stretch.by is not None:
             recorded = stretch.by.record_of(stretch.mode, stretch.start)
             for start, end, inside_step in stretch.by.steps_of(stretch):
-                yield from self._parts(start, end, inside_step, recorded, paced=True)
+                yield _Window(start, end, inside_step, recorded)
         elif stretch.dense:
             together = 1 if stretch.exact else _TOGETHER
             for begin in range(0, len(stretch.dense), together):
                 steps = stretch.dense[begin : begin + together]
                 start, last = steps[0][0], min(steps[-1][1], stretch.end)
                 inside = steps[0][2] if len(steps) == 1 else partial(states_inside, steps)
-                for piece in self._parts(start, last, inside, None) if last > start else ():
-                    yield piece._replace(coarse=not stretch.exact)
-        elif stretch.end > stretch.start:  # nothing moves
+                if last > start:
+                    yield _Window(start, last, inside, coarse=not stretch.exact)
+
+    def _cut(self, stretch: Stretch[ContactMode]) -> list[_Piece]:
+        """Pieces of a stretch: its windows, halved until points resolve states and turns, in order of time."""
+        windows, pieces = list(self._windows(stretch)), list[_Piece]()
+        if not windows and stretch.end > stretch.start:  # nothing moves
             half = (stretch.end - stretch.start) / 2
             states = np.repeat(stretch.first[None], len(POINTS), 0)
-            yield _Piece((stretch.start + stretch.end) / 2 + half * POINTS, np.full(len(POINTS), half), states)
+            return [_Piece((stretch.start + stretch.end) / 2 + half * POINTS, np.full(len(POINTS), half), states)]
+        for halvings in range(_HALVINGS + 1):
+            made = [window.piece() for window in windows]
+            rough = self._rough(made) if windows and halvings < _HALVINGS else [False] * len(made)
+            pieces += [piece for piece, again in zip(made, rough, strict=True) if not again]
+            halved = [window.halves() for window, again in zip(windows, rough, strict=True) if again]
+            windows = [half for halves in halved for half in halves]
+        return sorted(pieces, key=lambda piece: float(piece.time[0]))
 
-    def _rough(self, states: Array, span: float, record: Array | None = None) -> bool:
-        """True if points do not resolve the states, (state, points), and turns of a piece, which takes a ``span``."""
-        if _unresolved(states):
-            return True
+    def _rough(self, pieces: Sequence[_Piece]) -> list[bool]:
+        """True for each piece whose points do not resolve its states, or turns of its bodies."""
         # no state has a prescribed motion, which may turn bodies as no polynomial of the points does
         prescribed = bool(self._mechanism.prescribed)
-        if record is None or not len(record):
-            record = self._poses(states.T if prescribed else states.T[[0, -1]]).T
-        moving = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, record.shape[1])
+        points = slice(None) if prescribed else [0, -1]
+        bare = [piece.states[points] for piece in pieces if piece.record is None]
+        poses = iter(np.split(self._poses(np.concatenate(bare)), len(bare)) if bare else ())
+        return [self._is_rough(piece, next(poses) if piece.record is None else piece.record) for piece in pieces]
+
+    def _is_rough(self, piece: _Piece, record: Array) -> bool:
+        """True if points do not resolve the states, and turns by poses at all points or at both ends of a piece."""
+        if _unresolved(piece.states.T):
+            return True
+        moving = record[:, : 18 * len(self._mechanism.bodies)].T.reshape(-1, 18, len(record))
         turning, spins = moving[:, 3:12], moving[:, 15:]
         # an angle whose rate changes needs more points
         fastest = np.abs(spins).max(initial=0.0) + np.ptp(spins, axis=-1).max(initial=0.0)
-        return bool(fastest * span > _TURN) or (prescribed and _unresolved(turning.reshape(-1, len(POINTS))))
-
-    def _parts(
-        self,
-        start: float,
-        end: float,
-        inside: Callable[[Array], Any],
-        recorded: Callable[[Array], tuple[Array, Array]] | None,
-        *,
-        paced: bool = False,
-        depth: int = 0,
-    ) -> Iterator[_Piece]:
-        """Pieces of a step between values of its variable, halved until their points resolve states and turns.
-
-        ``recorded``: record at states and rate of the time by that variable, which counts if it is ``paced``.
-        """
-        places = (start + end) / 2 + (end - start) / 2 * POINTS
-        states = np.asarray(inside(places))
-        time = states[-1] if paced else places
-        record, pace = (np.zeros((0, 0)), np.ones(1)) if recorded is None else recorded(states)
-        if depth < _HALVINGS and self._rough(states, time[-1] - time[0], record):
-            middle = (start + end) / 2
-            yield from self._parts(start, middle, inside, recorded, paced=paced, depth=depth + 1)
-            yield from self._parts(middle, end, inside, recorded, paced=paced, depth=depth + 1)
-            return
-        rate = np.full(len(POINTS), (end - start) / 2) * (pace if paced else 1.0)
-        yield _Piece(time, rate, states.T, record.T if len(record) else None)
+        prescribed = bool(self._mechanism.prescribed)
+        return bool(fastest * (piece.time[-1] - piece.time[0]) > _TURN) or (
+            prescribed and _unresolved(turning.reshape(-1, len(POINTS)))
+        )
 
 
 def _unresolved(values: Array) -> bool:

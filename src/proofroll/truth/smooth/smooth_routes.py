@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from proofroll.core.errors import Diverged, Missing
+from proofroll.core.pace import OutOfTime
 from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
@@ -24,7 +25,7 @@ from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.bodies.maximal_taylor import MaximalTaylor, Visited, compiled_rates
 from proofroll.truth.followed_paths import TOLERANCES
 from proofroll.truth.numerics.collocation import Step, System, by_states, next_length, nodes, take
-from proofroll.truth.numerics.hybrid import DenseStep, Stretch, StretchLaw, Transition
+from proofroll.truth.numerics.hybrid import DenseStep, StoppedWithin, Stretch, StretchLaw, Transition
 from proofroll.truth.numerics.scalars import Scalar
 from proofroll.truth.tree.contact_tree import ContactTree
 
@@ -111,6 +112,19 @@ class SmoothBodies(ContactBodies):
             (last,) = self._second.taylor_states(np.array([until]), state[:-1], series)
         except Missing:
             return super()._walked(time, state, mode, until)
+        except OutOfTime as stopped:
+            if not series or stopped.time is None:
+                raise
+            taylor, start, y = series[-1]
+            (last,) = taylor.inside(start, y, stopped.time, np.array([stopped.time]))
+            known = self._of_series(series, time, state, mode, stopped.time, last)
+            raise StoppedWithin(str(stopped), stopped.time, known) from None
+        return self._of_series(series, time, state, mode, until, last)
+
+    def _of_series(
+        self, series: Visited, time: float, state: Array, mode: ContactMode, until: float, last: Array
+    ) -> Stretch[ContactMode]:
+        """Stretch from a time and state to ``until`` and the ``last`` state, by the series of its steps."""
         self._used.setdefault("Taylor series in long doubles")
         ends = [*(float(start) for _, start, _ in series[1:]), until]
         dense: list[DenseStep] = [

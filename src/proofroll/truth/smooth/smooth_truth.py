@@ -133,7 +133,7 @@ class _SmoothTruth:
             Diverged: none of the times is known.
         """
         units, early, form = self._units, EarlyEnd(), self._exact
-        paths = followed(self._tree, self._bodies, self._until, ())
+        paths = followed(self._tree, self._bodies, self._until, (), smooth=True)
         early.at(*self._end_of(paths))
         growth, nearby = early.run(partial(self._nearby, paths[1]), self._times)
         count = len(growth)

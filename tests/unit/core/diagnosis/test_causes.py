@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, diagnose
-from proofroll.core.diagnosis.fitting import Residuals, possible
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals, possible
 from proofroll.core.diagnosis.vectors import ReportedVector, product
 from proofroll.core.errors import NotUnique
 
@@ -99,4 +99,4 @@ def test_a_model_that_contradicts_a_right_report_proves_nothing() -> None:
             lambda size: np.array([1.0 - (size or 0.0)]), "motion", "m/s^2", 1.0, CLOSES, (), 0.0, list,
             lambda _, contradicts=contradicts: contradicts,
         )  # fmt: skip
-        assert residuals.cause("mass", "it moves so", 1.0, "look", 0).proven is not contradicts
+        assert residuals.cause(CauseRow("mass", "it moves so", 1.0, "look")).proven is not contradicts

@@ -21,7 +21,8 @@ from proofroll.studies.answer.setting_search import State
 
 METRES = AllowedError("positions", "m", 1e-3, 2.0, 1e-12, relative=False)
 OWN = StepAnswer(
-    scene="pendulum", parameters={}, until=5.0, every=0.02, tolerance="1 mm", bounds=[METRES], unjudged=[], open="",
+    scene="pendulum", parameters={}, until=5.0, every=0.02, tolerance="1 mm", bounds=[METRES], unjudged=[],
+    beyond="", open="",
     spec="alpha[dt=0.002]", resolution="dt", step=2e-3, holds=True, luck="", bound=METRES, error=1.2e-4, status="done",
     message="", reached=5.0, held_until=5.0, seconds_per_second=1 / 160, advised=replace(HELD, step=2e-3), spent=1.0,
 )  # fmt: skip

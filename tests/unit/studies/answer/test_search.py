@@ -11,6 +11,7 @@ import pytest
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.engine_questions import resolve_with_truth
 from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
@@ -131,3 +132,20 @@ def test_an_answer_is_true_of_the_engine_and_is_stored(tmp_path: Path) -> None:
     true = proofroll.simulate(proofroll.load_scene("double_pendulum"), "truth", until=until, every=every)
     (bound,) = [bound for bound in made.bounds if bound.quantity == "p_WB"]
     assert float(np.abs(run["p_WB"].values - true["p_WB"].values).max()) <= bound.allowed
+
+
+@pytest.mark.drill
+def test_a_chaotic_motion_is_judged_before_its_horizon(tmp_path: Path) -> None:
+    """Runs that are longer than a motion can be known are judged as far as it is, and the answer says how far."""
+    runner = Runner(Store(tmp_path / "cases"), jobs=1, workers=Workers())
+    question = AnswerQuestion.of("double_pendulum", {"angle": 2.8}, 12.0)
+    asked = AskedTolerance.of(["1e-2"], question.loaded)
+    (made,) = answer(question, [asked], ["mujoco[preset=tuned]"], runner)
+    assert made.taken is not None
+    assert 6.0 < made.until < 8.5
+    assert "chaotic" in made.beyond
+    assert not made.open
+    shorter, _ = AnswerQuestion.of("double_pendulum", {}, 1.0).well_posed(
+        resolve_with_truth([], runner.workers)[1], runner
+    )
+    assert not shorter.beyond

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.typing import NDArray
+from tests.unit.truth.test_work_of_drives import TIMES as LIFTED
+from tests.unit.truth.test_work_of_drives import plate_and_ball
 
 from proofroll.core.errors import Refused
 from proofroll.core.truth import truth
@@ -128,6 +130,13 @@ FAULTS: list[tuple[str, str, Change]] = [
     ("no first event", "stop", of_events(lambda events: events.isel(event=slice(1, None)))),
     ("an impact told as a stick", "stop", values(lambda item: np.full(item.shape, "stick"), "event_kind")),
     ("an event at a fifth of its time", "stop", times(0.2, *EVENTS)),
+    ("energy before an impact off by 1e-9", "bouncing_ball", times(1 + 1e-9, "event_energy_before")),
+    (
+        "energy after an impact that of before",
+        "bouncing_ball",
+        of_events(lambda events: events.assign(event_energy_after=events.event_energy_before)),
+    ),
+    ("height after an impact off by 1e-9", "spinning_bounce", times(1 + 1e-9, "event_height")),
 ]
 
 
@@ -172,6 +181,31 @@ def test_a_stop_is_held_whatever_kind_of_truth_was_chosen() -> None:
     limited = replace(element, mechanism=mechanism)
     check = held_answer(limited, dataset, motion.tiles, TIMES)
     assert check.residuals.largest["stop"][0] > 10
+
+
+@pytest.mark.parametrize(("scene", "part"), [("bouncing_ball", "pairs"), ("stop", "joints")])
+def test_an_impact_that_was_published_has_the_restitution_of_the_scene(scene: str, part: str) -> None:
+    """A rebound whose speed is off by a millionth is refused by poses and the scene's own field alone."""
+    element, motion, dataset = answer(scene)
+    items = getattr(element.mechanism, part)
+    changed = [replace(item, restitution=item.restitution + 1e-6) for item in items]
+    other = replace(element, mechanism=replace(element.mechanism, **{part: tuple(changed)}))
+    assert motion.tiles is not None
+    assert held_answer(other, dataset, motion.tiles, TIMES).residuals.largest["rebound"][0] > 10
+
+
+def test_works_are_held_across_an_impact() -> None:
+    """A motor's work behind a blow on what it moves is that of its force and of its impulse."""
+    (element,) = plate_and_ball().elements
+    assert isinstance(element, MechanismElement)
+    motion = truth_of(element.mechanism, LIFTED)
+    dataset = MechanismTruth._dataset(element, motion, "")
+    assert motion.tiles is not None
+    check = held_answer(element, dataset, motion.tiles, LIFTED)
+    assert check.residuals.largest["work"][0] < 0.1
+    struck = dataset.time.to_numpy() > float(dataset.event_time[0])
+    wrong = dataset.assign({"work.drive.shake": dataset["work.drive.shake"] * (1 + 1e-6 * struck)})
+    assert held_answer(element, wrong, motion.tiles, LIFTED).residuals.largest["work"][0] > 10
 
 
 def test_a_broken_law_ends_a_truth_and_keeps_what_lies_before(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,16 +2,12 @@
 
 from functools import cache
 
-import numpy as np
-
 from proofroll.core.diagnosis import Hypothesis
-from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.core.diagnosis.lines import built_otherwise
 from proofroll.core.entry_points import loaded
 from proofroll.elements.mechanism.diagnosis import contacts
 from proofroll.elements.mechanism.diagnosis.contact_forces import REPORTED_FORCES
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import at_start
-from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.impacts import impacts, laws_of_impacts
 from proofroll.elements.mechanism.diagnosis.joint_laws import (
     of_actuators,
@@ -27,8 +23,9 @@ from proofroll.elements.mechanism.diagnosis.laws_of_parts import (
     rolling_resistance,
 )
 from proofroll.elements.mechanism.diagnosis.numbers import (
-    FACTORS_OF_ALL,
+    any_gravity,
     damped_motion,
+    factors_of_all,
     friction_of_each_joint,
     of_each_body,
     of_each_joint,
@@ -36,7 +33,7 @@ from proofroll.elements.mechanism.diagnosis.numbers import (
 )
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
 from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, PLACED, STATE, residuals_of
+from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, PLACED, STATE
 from proofroll.elements.mechanism.diagnosis.starts import start_not_taken
 from proofroll.elements.mechanism.diagnosis.structure import (
     axis_of_first_steps,
@@ -45,11 +42,6 @@ from proofroll.elements.mechanism.diagnosis.structure import (
     other_axis,
 )
 
-GRAVITY = any_gravity(
-    residuals_of,
-    lambda element: np.array(element.mechanism.gravity),
-    lambda element, gravity: Change(element.mechanism, gravity=gravity),
-)
 BUILT = built_otherwise([name for name in GIVEN if name != "joint axes"], COVERED, PLACED, STATE)
 # Entry points of hypotheses about mechanisms that other packages test, each a :class:`Hypothesis`.
 GROUP = "proofroll.mechanism_hypotheses"
@@ -66,7 +58,7 @@ _OF_WHOLE_RUNS: tuple[Hypothesis, ...] = (
     laws_of_impacts,
     other_axis,
     axis_of_first_steps,
-    *FACTORS_OF_ALL,
+    factors_of_all,
     damped_motion,
     of_several,
     rolling_resistance,
@@ -85,7 +77,7 @@ _OF_PARTS: tuple[Hypothesis, ...] = (
     friction_of_each_joint,
     lost_coupling,
     loop_lacks_row,
-    GRAVITY,
+    any_gravity,
 )
 
 

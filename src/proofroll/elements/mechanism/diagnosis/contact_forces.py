@@ -1,12 +1,13 @@
 """Hypotheses of contact forces that are reported wrongly, along a run and at time 0."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray, cross, known_difference, longest
-from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
+from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import delay_text, in_steps
 from proofroll.core.diagnosis.fitting import factor_text, known_factor, least_squares_parameter
 from proofroll.core.diagnosis.vectors import ReportedVector
@@ -16,7 +17,6 @@ from proofroll.elements.mechanism.diagnosis.reporting_errors import SURFACE, sur
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.scene.model import Mechanism
 
-_WHAT = "the force of a contact on its first body"
 _OF_MASS = (0.5, 2.0, 1e-3, 1e3)  # factors of masses that are known mistakes
 _STEP = 1e-3  # delay that a fit tries where there is no step [s]
 _FEWEST = 4  # samples through which a curve of normals is laid
@@ -31,16 +31,8 @@ def contact_forces(evidence: Evidence) -> Iterator[Cause]:
         if not touch.moves_as_true or not finite.any() or "contact_forces" in evidence.settled:
             continue  # forces of another motion cannot be compared
         axes = surface_axes(evidence.element, placed_of(touch.mechanism, evidence.truth))
-        vector = ReportedVector(
-            name="contact_forces",
-            what=_WHAT,
-            unit="N",
-            reported=touch.force[1:, finite],
-            true=true_ones[:, finite],
-            time=touch.time[1:],
-            frames={} if axes is None else {SURFACE: axes[1:, None]},
-            least=evidence.element.force,
-        )
+        axes = None if axes is None else axes[1:]
+        vector = _vector(evidence.element, touch.force[1:, finite], true_ones[:, finite], touch.time[1:], axes)
         yield from _causes(vector, touch.true.normal[1:, finite], evidence, read_back=evidence.read_back("mass"))
         yield from _along_earlier_normals(vector, touch, finite)
 
@@ -54,17 +46,24 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
         return
     reported, true, finite = pair
     axes = surface_axes(element, element.start)
-    vector = ReportedVector(
+    vector = _vector(element, reported[None, finite], true[None, finite], np.zeros(1), axes)
+    yield from _causes(vector, follow_contacts(element.start).normal[:, finite], evidence, read_back=False)
+
+
+def _vector(
+    element: Any, reported: FloatArray, true: FloatArray, time: FloatArray, axes: FloatArray | None
+) -> ReportedVector:
+    """Contact forces at times; ``axes``: of the wall at these, (times, 3, 3), or None."""
+    return ReportedVector(
         name="contact_forces",
-        what=_WHAT,
+        what="the force of a contact on its first body",
         unit="N",
-        reported=reported[None, finite],
-        true=true[None, finite],
-        time=np.zeros(1),
+        reported=reported,
+        true=true,
+        time=time,
         frames={} if axes is None else {SURFACE: axes[:, None]},
         least=element.force,
     )
-    yield from _causes(vector, follow_contacts(element.start).normal[:, finite], evidence, read_back=False)
 
 
 def _causes(vector: ReportedVector, normals: FloatArray, evidence: Evidence, *, read_back: bool) -> Iterator[Cause]:
@@ -115,8 +114,8 @@ def _along_earlier_normals(vector: ReportedVector, touch: SeenContact, finite: N
     says = f"contact_forces are along the normal of {moment} {'before' if delay > 0 else 'later'}"
     remedy, change = "take the normal where the bodies are when the force is read", in_steps(delay, touch.evidence.step)
     remainder = known_difference(vector.reported, turned(delay))
-    proof = f"stale normal.{vector.name}", says, vector.name, vector.unit, vector.before, remainder, remedy
-    yield Cause(*proof, fitted=1, change=change)
+    off = Difference(vector.name, vector.unit, vector.before)
+    yield off.cause(f"stale normal.{vector.name}", says, remainder, remedy, 1, change=change)
 
 
 REPORTED_FORCES = (contact_forces, forces_at_start)

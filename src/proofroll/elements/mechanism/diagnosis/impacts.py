@@ -14,6 +14,7 @@ from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import delay_text
 from proofroll.core.diagnosis.fitting import (
     ABOVE,
+    CauseRow,
     Residuals,
     change_by,
     factor_text,
@@ -187,7 +188,9 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
         for law in ("friction", "restitution"):
             factor = residuals.fit(functools.partial(_scaled, mechanism, law), 1.0)
             model, says = _scaled(mechanism, law, factor), f"{law} of impacts is {factor_text(factor)}"
-            yield residuals.cause(f"{law} of impacts", says, model, _REMEDY, 1, change_by(factor))
+            yield residuals.cause(
+                CauseRow(f"{law} of impacts", says, model, _REMEDY, fitted=1, change=change_by(factor))
+            )
         for plane in (geometry for geometry in mechanism.geometries if geometry.kind == "plane"):
 
             def missed(by: FloatArray, plane: Geometry = plane, source: Residuals[Mechanism] = residuals) -> FloatArray:

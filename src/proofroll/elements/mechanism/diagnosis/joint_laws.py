@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import CLOSES_EXACTLY, Cause, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import change_by, factor_text, least_squares_parameter, possible
+from proofroll.core.diagnosis import CLOSES_EXACTLY, Cause, Difference, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals, change_by, least_squares_parameter
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import EventKind, events_of
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, is_one_motion, of_start, placed_of
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
+from proofroll.elements.mechanism.diagnosis.residuals import MOTION, by_rows
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
@@ -21,7 +21,8 @@ from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.signal import value_at
 
 Effort = Callable[[Actuator, float, float, float], float]
-_COVERS = ("motion", *COVERED, "effort")
+_COVERS = (*MOTION, "effort")
+_UNLIMITED = "has no limit on the efforts of actuators"
 _STILL = 1e-9
 _AT_STOP = 1e-3  # largest distance from a stop of rebounds found by parabolas, relative to the joint's range
 # Softness at which the fit of a soft coupling starts: that of a row of impedance 0.9.
@@ -57,58 +58,50 @@ def _swapped(a: Actuator, t: float, q: float, v: float) -> float:
     return _effort(kp=a.kd / a.kp, kd=a.kp / a.kd)(a, t, q, v)
 
 
-@hypothesis(
+@by_rows(
     "actuators", "the equations of motion balance at every state of the run with that law, and not with the scene's"
 )
-def of_actuators(evidence: Evidence) -> Iterator[Cause]:
-    """Hypotheses: gains, gears and limits of all actuators."""
+def of_actuators(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: gains, gears and limits of all actuators."""
     mechanism = evidence.element.mechanism
     actuators = mechanism.actuators
     limited = any(item.limit is not None for item in actuators)
-    rules: list[tuple[bool, str, str, Effort]] = [
-        (any(item.kp and item.kd for item in actuators), "gains", "has kp and kd swapped", _swapped),
-        (limited, "limit", "has no limit on the efforts of actuators", _effort(clamps="nothing")),
+    proportional, damped = (any(getattr(item, gain) for item in actuators) for gain in ("kp", "kd"))
+    both = any(item.kp and item.kd for item in actuators)
+    geared = any(item.gear != 1 for item in actuators)
+    torques = any(item.kind == "torque" for item in actuators)
+    remedy = "look at gains, gear and limit of the actuators: the limit clamps the whole effort, at the joint"
+    laws: list[tuple[bool, str, str, Effort]] = [
+        (both, "gains", "has kp and kd swapped", _swapped),
+        (limited, "limit", _UNLIMITED, _effort(clamps="nothing")),
         (limited, "limit", "clamps the part of kp alone, not the whole effort", _effort(clamps="part")),
-        (limited and _geared(actuators), "limit", "clamps efforts before the gear", _effort(clamps="motor")),
-        (
-            _geared(actuators),
-            "gear",
-            "leaves out the gears of actuators",
-            lambda a, *x: _effort(gear=1 / a.gear)(a, *x),
-        ),
-        (_geared(actuators), "gear", "has gears the other way round", lambda a, *x: _effort(gear=a.gear**-2)(a, *x)),
+        (limited and geared, "limit", "clamps efforts before the gear", _effort(clamps="motor")),
+        (geared, "gear", "leaves out the gears of actuators", lambda a, *x: _effort(gear=1 / a.gear)(a, *x)),
+        (geared, "gear", "has gears the other way round", lambda a, *x: _effort(gear=a.gear**-2)(a, *x)),
     ]
     numbers: list[tuple[bool, str, Callable[[float], Effort]]] = [
-        (any(item.kp for item in actuators), "kp", lambda x: _effort(kp=x)),
-        (any(item.kd for item in actuators), "kd", lambda x: _effort(kd=x)),
-        (any(item.kp and item.kd for item in actuators), "kp and kd", lambda x: _effort(kp=x, kd=x)),
-        (any(item.kind == "torque" for item in actuators), "the torques", lambda x: lambda a, *s: x * a.effort(*s)),
+        (proportional, "kp", lambda x: _effort(kp=x)),
+        (damped, "kd", lambda x: _effort(kd=x)),
+        (both, "kp and kd", lambda x: _effort(kp=x, kd=x)),
+        (torques, "the torques", lambda x: lambda a, *s: x * a.effort(*s)),
         (limited, "the limits", lambda x: _effort(limit=x)),
         (bool(actuators), "the gears", lambda x: _effort(gear=x)),
     ]
-    remedy = "look at gains, gear and limit of the actuators: the limit clamps the whole effort, at the joint"
-    for residuals in residuals_of(evidence) if actuators else ():
-        states = [
-            residuals.cause(f"actuators: {name}", f"the engine {says}", Change(mechanism, effort=effort), remedy, 0)
-            for asked, name, says, effort in rules
-            if asked
-        ]
-        yield from states
-        unlimited = any(cause.proven and "no limit" in cause.says for cause in states)
-        for asked, what, law in numbers:
-            if not asked or (unlimited and what == "the limits"):  # any limit that is large enough
-                continue
-            factor, count = best(residuals, lambda x, law=law: Change(mechanism, effort=law(x)))  # type: ignore[misc]  # bound now
-            if what in {"the limits", "the gears"} and count:  # the equations are not linear in these
-                factor = residuals.fit(lambda x, law=law: Change(mechanism, effort=law(x)), 1.0)  # type: ignore[misc]  # bound now
-            if possible(factor, signed=what != "the limits"):
-                says = f"the engine moves it with {what} of the actuators {factor_text(factor)}"
-                model = Change(mechanism, effort=law(factor))
-                yield residuals.cause(f"actuators: {what}", says, model, remedy, count, change_by(factor))
+    unlimited = False
+    for asked, name, says, effort in laws:
+        if asked:
+            row = CauseRow(f"actuators: {name}", f"the engine {says}", Change(mechanism, effort=effort), remedy)
+            unlimited |= says == _UNLIMITED and residuals.cause(row).proven
+            yield row
+    for asked, what, law in numbers:
+        if asked and not (unlimited and what == "the limits"):  # any limit that is large enough
+            says, of_limits = f"the engine moves it with {what} of the actuators", what == "the limits"
 
+            def model(x: float, law: Callable[[float], Effort] = law) -> Change:
+                return Change(mechanism, effort=law(x))
 
-def _geared(actuators: tuple[Actuator, ...]) -> bool:
-    return any(item.gear != 1 for item in actuators)
+            name, linear = f"actuators: {what}", what not in {"the limits", "the gears"}
+            yield from residuals.scaled(name, says, model, remedy, signed=not of_limits, linear=linear)
 
 
 @hypothesis(
@@ -146,19 +139,10 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
         says = f"the coupling {coupling.name} has the ratio {ratio:.6g}, not {ratio_true:.6g}"
         remedy = "the scene's ratio is that of joint_b's rate to joint_a's"
         name = "accelerations at time 0" if alone else f"rate of {coupling.joint_b} by its coupling"
-        what = name, "1/s^2" if alone else "1/s", difference, remainder
+        off = Difference(name, "1/s^2" if alone else "1/s", difference, _COVERS)
         change = np.inf if remainder <= CLOSES_EXACTLY * difference else change_by(ratio / ratio_true)
         count = len(moving[0]) if alone else None
-        yield Cause(
-            f"ratio of {coupling.name}",
-            says,
-            *what,
-            remedy=remedy,
-            fitted=1,
-            covers=_COVERS,
-            explains=count,
-            change=change,
-        )
+        yield off.cause(f"ratio of {coupling.name}", says, remainder, remedy, 1, explains=count, change=change)
 
 
 @hypothesis(
@@ -209,10 +193,8 @@ def soft_couplings(evidence: Evidence) -> Iterator[Cause]:
             f"make the couplings stiffer (their impedance is {1 / (1 + part):.4g}; 1 is rigid), give light joints an "
             "armature, or relate heavy joints by one coupling without the light ones"
         )
-        what = "accelerations at time 0", "1/s^2", difference, remainder
-        yield Cause(
-            "soft couplings", says, *what, remedy=remedy, fitted=1, covers=_COVERS, explains=len(rates), change=part
-        )
+        off = Difference("accelerations at time 0", "1/s^2", difference, _COVERS)
+        yield off.cause("soft couplings", says, remainder, remedy, 1, explains=len(rates), change=part)
         return
 
 
@@ -281,18 +263,9 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
                 count = 2  # place and rate
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
-            unit = joint.unit
-            what, change = (f"{joint.name} at its stop", unit, difference, remainder), abs(shift) / size
-            yield Cause(
-                f"stop of {joint.name}",
-                says,
-                *what,
-                remedy=remedy,
-                fitted=1,
-                covers=_COVERS,
-                explains=count,
-                change=change,
-            )
+            at_stop = Difference(f"{joint.name} at its stop", joint.unit, difference, _COVERS)
+            name, change = f"stop of {joint.name}", abs(shift) / size
+            yield at_stop.cause(name, says, remainder, remedy, 1, explains=count, change=change)
 
 
 @hypothesis(
@@ -339,21 +312,13 @@ def soft_stops(evidence: Evidence) -> Iterator[Cause]:
                 f"where its stops are {high - low:.2g} {joint.unit} apart, and throws it back at "
                 f"{abs(v[first, rated]):.2g} {joint.unit}/s"
             )
-            yield Cause(
-                id=f"soft stop of {joint.name}",
-                says=says,
-                quantity=f"{joint.name} between its stops",
-                unit=joint.unit,
-                before=float(off[flight].max()),
-                after=float(
-                    np.abs(q[flight, place] - expected).max() + off[times[: flight.stop] < hits[joint.name]].max()
-                ),
-                remedy="make the stop stiffer, or slow the joint down: a stop of no width is none for a soft one",
-                fitted=2,
-                covers=_COVERS,
-                explains=len(expected) - 1,
-                change=abs(v[first, rated]) / float(np.abs(v[:first, rated]).max()),
-            )
+            earlier = float(off[times[: flight.stop] < hits[joint.name]].max())
+            remainder = float(np.abs(q[flight, place] - expected).max()) + earlier
+            remedy = "make the stop stiffer, or slow the joint down: a stop of no width is none for a soft one"
+            change = abs(v[first, rated]) / float(np.abs(v[:first, rated]).max())
+            name, count = f"soft stop of {joint.name}", len(expected) - 1
+            between = Difference(f"{joint.name} between its stops", joint.unit, float(off[flight].max()), _COVERS)
+            yield between.cause(name, says, remainder, remedy, 2, explains=count, change=change)
             break
 
 

@@ -7,12 +7,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, change_by, factor_text, known_factor, possible
+from proofroll.core.diagnosis import Cause, Difference, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.pressing import Resisting
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
+from proofroll.elements.mechanism.diagnosis.residuals import MOTION, by_rows
 from proofroll.elements.mechanism.scene.bushing import Bushing, Six
 from proofroll.elements.mechanism.scene.checks import WORLD, ZERO
 from proofroll.elements.mechanism.scene.joint import Joint
@@ -23,8 +23,9 @@ from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.rotations import Array, to_rpy
 from proofroll.elements.mechanism.scene.signal import delayed, varies
 
-_COVERS = ("motion", *COVERED, "drive")
+_COVERS = (*MOTION, "drive")
 _DEGREE = np.pi / 180
+_DEPENDENT = 1e-6  # relative singular value of a direction along which a force may be moved without effect
 
 
 @hypothesis(
@@ -56,17 +57,8 @@ def of_motions(evidence: Evidence) -> Iterator[Cause]:
             continue
         for says, factor, delay, remedy in _mistakes(joint, evidence.step):
             remainder = float(np.max(np.abs(values - _values(joint, factor, delay, times)[part])))
-            yield Cause(
-                id=f"motion of {joint.name}",
-                says=f"the motion of {joint.name} {says}",
-                quantity=what,
-                unit=units,
-                before=difference,
-                after=remainder,
-                remedy=remedy,
-                fitted=0,
-                covers=_COVERS,
-            )
+            name = f"motion of {joint.name}"
+            yield Difference(what, units, difference, _COVERS).cause(name, f"the {name} {says}", remainder, remedy)
 
 
 def _values(joint: Joint, factor: float, delay: float, times: FloatArray) -> FloatArray:
@@ -116,25 +108,22 @@ def _with(mechanism: Mechanism, table: str, number: int, part: Force | Bushing) 
 
 
 def _exchanged(
-    residuals: Residuals[Change],
-    mechanism: Mechanism,
-    table: str,
-    mistakes: Callable[[PartT], Iterator[tuple[str, PartT, str]]],
-) -> Iterator[Cause]:
-    """Hypotheses: one of the parts of a table has one of its mistakes: words, other part, remedy."""
+    mechanism: Mechanism, table: str, mistakes: Callable[[PartT], Iterator[tuple[str, PartT, str]]]
+) -> Iterator[CauseRow[Change]]:
+    """Rows: one of the parts of a table has one of its mistakes: words, other part, remedy."""
     for number, part in enumerate(getattr(mechanism, table)):
         for says, other_part, remedy in mistakes(part):
             name = f"{table.removesuffix('s')} {part.name}"
             kind = getattr(part, "kind", "bushing")
-            model = Change(_with(mechanism, table, number, other_part))
-            yield residuals.cause(name, f"{kind} {part.name} {says}", model, remedy, 0)
+            yield CauseRow(
+                name, f"{kind} {part.name} {says}", Change(_with(mechanism, table, number, other_part)), remedy
+            )
 
 
-@hypothesis("bushing", _PROOF)
-def of_bushings(evidence: Evidence) -> Iterator[Cause]:
-    """Hypotheses: one bushing with its axes in another order, along those of a body, or without its dampers."""
-    for residuals in residuals_of(evidence):
-        yield from _exchanged(residuals, evidence.element.mechanism, "bushings", _of_bushing)
+@by_rows("bushing", _PROOF)
+def of_bushings(evidence: Evidence, _: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: one bushing with its axes in another order, along those of a body, or without its dampers."""
+    return _exchanged(evidence.element.mechanism, "bushings", _of_bushing)
 
 
 def _of_bushing(bushing: Bushing) -> Iterator[tuple[str, Bushing, str]]:
@@ -167,44 +156,38 @@ def _less(bushing: Bushing) -> tuple[float, float, float]:
     return to_rpy(bushing.frame_b @ bushing.frame_a.T)
 
 
-@hypothesis("applied force", _PROOF)
-def of_applied_forces(evidence: Evidence) -> Iterator[Cause]:
-    """Hypotheses: one applied force with a factor, in other axes, at another place, without reaction, or late."""
-    mechanism = evidence.element.mechanism
-    for residuals in residuals_of(evidence):
-        yield from _exchanged(residuals, mechanism, "forces", lambda force: _of_force(mechanism, force, evidence.step))
-        for number, force in enumerate(mechanism.forces):
+@by_rows("applied force", _PROOF)
+def of_applied_forces(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: one applied force with a factor, in other axes, at another place, without reaction, or late."""
+    mechanism: Mechanism = evidence.element.mechanism
+    yield from _exchanged(mechanism, "forces", lambda force: _of_force(mechanism, force, evidence.step))
+    for number, force in enumerate(mechanism.forces):
 
-            def scaled(x: float, number: int = number) -> Change:
-                return Change(mechanism, factors_of_forces=((number, x),))
+        def scaled(x: float, number: int = number) -> Change:
+            return Change(mechanism, factors_of_forces=((number, x),))
 
-            factor, fitted = best(residuals, scaled)
-            if possible(factor, signed=True):
-                says = f"the engine moves it with the {force.kind} {force.name} {factor_text(factor)}"
-                remedy = f"give {force.name} its value, on {force.body}"
-                yield residuals.cause(f"size of {force.name}", says, scaled(factor), remedy, fitted, change_by(factor))
-            if force.kind == "force":
-                yield _elsewhere(residuals, mechanism, number, evidence.element.length)
+        says = f"the engine moves it with the {force.kind} {force.name}"
+        remedy = f"give {force.name} its value, on {force.body}"
+        yield from residuals.scaled(f"size of {force.name}", says, scaled, remedy)
+        if force.kind == "force":
+            yield _elsewhere(residuals, mechanism, number, evidence.element.length)
 
 
-def _elsewhere(residuals: Residuals[Change], mechanism: Mechanism, number: int, length: float) -> Cause:
-    """Hypothesis: the force acts along another line, through its nearest place that balances the equations."""
+def _elsewhere(residuals: Residuals[Change], mechanism: Mechanism, number: int, length: float) -> CauseRow[Change]:
+    """Row: the force acts along another line, through its nearest place that balances the equations."""
     force = mechanism.forces[number]
 
-    def at(place: Array) -> Change:
-        x, y, z = map(float, place)
+    def moved(shift: Array) -> Change:
+        x, y, z = (force.position + shift).tolist()
         return Change(_with(mechanism, "forces", number, replace(force, position=(x, y, z))))
 
-    position = np.array(force.position)
-    left = residuals.left(at(position))
-    slopes = [residuals.left(at(position + axis)) - left for axis in np.eye(3)]
-    shift = -np.linalg.lstsq(np.stack(slopes, axis=-1), left, rcond=1e-6)[0]
-    place = np.where(np.abs(position + shift) < 1e-6 * length, 0.0, position + shift)
+    shift = residuals.numbers_of(moved, 3, _DEPENDENT)
+    place = np.where(np.abs(force.position + shift) < 1e-6 * length, 0.0, force.position + shift)
     words = ", ".join(f"{x:.3g}" for x in place)
     says = f"force {force.name} acts along a line through ({words}) m of {force.body}, not through its place"
     remedy = f"give its place in the axes of {force.body}, from the origin of its frame"
-    size = float(np.linalg.norm(shift)) / length
-    return residuals.cause(f"place of {force.name}", says, at(place), remedy, 3, size)
+    model, change = moved(place - force.position), float(np.linalg.norm(shift)) / length
+    return CauseRow(f"place of {force.name}", says, model, remedy, fitted=3, change=change)
 
 
 def _of_force(mechanism: Mechanism, force: Force, step: float | None) -> Iterator[tuple[str, Force, str]]:
@@ -229,24 +212,18 @@ def _of_force(mechanism: Mechanism, force: Force, step: float | None) -> Iterato
         yield "is a step late", late, "evaluate it at the time of each stage of the step"
 
 
-@hypothesis("rolling resistance", _PROOF)
-def rolling_resistance(evidence: Evidence) -> Iterator[Cause]:
-    """Hypotheses: rolling resistance has a factor, is against the whole spin, or is by the weight."""
-    mechanism = evidence.element.mechanism
+@by_rows("rolling resistance", _PROOF)
+def rolling_resistance(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: rolling resistance has a factor, is against the whole spin, or is by the weight."""
+    mechanism, name = evidence.element.mechanism, "rolling resistance"
     if not any(contact.rolling_resistance for contact in mechanism.contacts):
         return
     moves = any(contact.bend for contact in mechanism.contacts)
-    for residuals in residuals_of(evidence):
-        for law, says in _LAWS if moves else _LAWS[1:]:
-            yield residuals.cause("rolling resistance", says, Change(mechanism, resisting=law), _REMEDY, 0)
+    for law, says in _LAWS if moves else _LAWS[1:]:
+        yield CauseRow(name, says, Change(mechanism, resisting=law), _REMEDY)
+    says = "the engine moves it with rolling resistance"
 
-        def changed(factor: float) -> Change:
-            return Change(mechanism, resisting=Resisting(factor))
+    def changed(factor: float) -> Change:
+        return Change(mechanism, resisting=Resisting(factor))
 
-        factor = residuals.fit(changed, 1.0)
-        mistake = known_factor(factor)
-        factor = mistake[0] if mistake else factor
-        if np.isfinite(factor) and factor >= 0:
-            says = f"the engine moves it with rolling resistance {factor_text(factor)}"
-            number = 0 if mistake else 1
-            yield residuals.cause("rolling resistance", says, changed(factor), _REMEDY, number, change_by(factor))
+    yield from residuals.scaled(name, says, changed, _REMEDY, signed=False, linear=False)

@@ -1,350 +1,250 @@
-"""Hypotheses of wrong numbers: one factor on a number of all bodies, joints or springs, or of one of them."""
+"""Rows of wrong numbers: of all bodies, joints or springs, or of one of them."""
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, change_by, factor_text, in_doubt, possible
+from proofroll.core.diagnosis import Evidence
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals, factor_text, possible
 from proofroll.elements.mechanism.diagnosis.equations import Change
-from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
+from proofroll.elements.mechanism.diagnosis.residuals import by_rows
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
 
-
-def factor_of_all(
-    name: str,
-    what: str,
-    change: Callable[[Mechanism, float], Change],
-    has: Callable[[Mechanism], bool],
-    remedy: str,
-    signed: bool = True,
-    line: str = "",
-) -> Hypothesis:
-    """Hypothesis that the engine moves all bodies or joints with one factor on a number.
-
-    Args:
-        name: of the hypothesis.
-        what: the number, in the words of the cause.
-        change: of a mechanism, for a factor.
-        has: True if a mechanism has the number at all.
-        remedy: advice to the author.
-        signed: True if the engine may have the wrong sign of the number; masses are never negative.
-        line: quantity of the certificate that reads the number back; empty: none does.
-    """
-
-    @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        mechanism = evidence.element.mechanism
-        for residuals in residuals_of(evidence) if has(mechanism) else ():
-            factor, fitted = best(residuals, lambda x: change(mechanism, x))
-            other_model = change(mechanism, factor)
-            told = possible(factor, signed) and in_doubt(evidence, residuals, line, fitted)
-            if told and not _by_scheme(residuals, other_model):
-                says = f"the engine moves it with {what} {factor_text(factor)}"
-                yield residuals.cause(name, says, other_model, remedy, fitted, change_by(factor))
-
-    return test
-
-
-def _inertias(mechanism: Mechanism, x: float) -> Change:
-    return Change(mechanism, inertia=x * np.array([body.inertia for body in mechanism.bodies]))
-
-
-def _masses(mechanism: Mechanism, x: float) -> Change:
-    return Change(mechanism, mass=x * np.array([body.mass for body in mechanism.bodies]))
-
-
-def _of_joints(name: str, law: str, what: str, give: str) -> Hypothesis:
-    """Hypothesis of one factor on a law of all joints; an armature, being an inertia, cannot have the wrong sign."""
-    return factor_of_all(
-        name,
-        f"the {what} of the joints",
-        lambda m, x: Change(m, **{law: x}),  # type: ignore[arg-type]  # a factor by its name
-        lambda m: any(getattr(joint, law) for joint in m.joints),
-        f"give the joints {give}",
-        signed=law != "armature",
-    )
-
-
-FACTORS_OF_ALL: tuple[Any, ...] = (
-    factor_of_all(
-        "gravity",
-        "gravity",
-        lambda m, x: Change(m, gravity=x * np.array(m.gravity)),
-        lambda m: any(m.gravity),
-        "give the engine the scene's gravity: an acceleration in the world, its sign and its unit",
-        line="gravity",
-    ),
-    factor_of_all(
-        "mass", "all masses", _masses, lambda m: bool(m.bodies), "give each body its mass once", False, "mass"
-    ),
-    factor_of_all(
-        "inertia",
-        "all inertias",
-        _inertias,
-        lambda m: bool(m.bodies),
-        "give each body its inertia once",
-        signed=False,
-        line="inertia",
-    ),
-    _of_joints(
-        "joint damping",
-        "damping",
-        "damping",
-        "their damping, as a moment per rad/s or a force per m/s against the motion",
-    ),
-    _of_joints("joint friction", "friction", "dry friction", "their dry friction, against the motion"),
-    _of_joints("joint stiffness", "stiffness", "stiffness", "their stiffness, per rad or per m"),
-    _of_joints("joint torque", "torque", "drives", "their drive, on the child against the parent"),
-    _of_joints("armature", "armature", "armature", "their armature"),
-    factor_of_all(
-        "springs",
-        "the stiffness of the springs",
-        lambda m, x: Change(m, springs=x),
-        lambda m: bool(m.springs),
-        "give the springs their stiffness and free length",
-    ),
-    factor_of_all(
-        "damping of springs",
-        "the damping of the springs",
-        lambda m, x: Change(m, spring_damping=x),
-        lambda m: any(spring.damping for spring in m.springs),
-        "give the springs their damping, along the line between their ends",
-    ),
-    factor_of_all(
-        "springs with damping",
-        "the springs",
-        lambda m, x: Change(m, springs=x, spring_damping=x),
-        lambda m: any(spring.damping for spring in m.springs),
-        "give the springs their stiffness, damping and free length",
-    ),
-    factor_of_all(
-        "bushings",
-        "the bushings",
-        lambda m, x: Change(m, bushings=x),
-        lambda m: bool(m.bushings),
-        "give the bushings their stiffness and damping",
-    ),
-    factor_of_all(
-        "gyroscopic terms",
-        "the gyroscopic moments w x I w",
-        lambda m, x: Change(m, gyroscopic=x),
-        lambda m: bool(m.bodies),
-        "the rate of the angular momentum has the term w x I w",
-    ),
+_ONE_FACTOR = "the equations of motion are linear in it: one factor balances them at every state of the run"
+_UNSIGNED = {"mass", "inertia", "armature"}  # numbers that no engine has with the wrong sign
+_OF_DAMPING = "their damping, as a moment per rad/s or a force per m/s against the motion"
+# Laws of joints: key, id of the row, words, and what an author gives the joints.
+_OF_JOINTS = (
+    ("damping", "joint damping", "damping", _OF_DAMPING),
+    ("friction", "joint friction", "dry friction", "their dry friction, against the motion"),
+    ("stiffness", "joint stiffness", "stiffness", "their stiffness, per rad or per m"),
+    ("torque", "joint torque", "drives", "their drive, on the child against the parent"),
+    ("armature", "armature", "armature", "their armature"),
 )
 
 
-@hypothesis("body", "one body has another mass or inertia, or its inertia about other axes or another point")
-def of_each_body(evidence: Evidence) -> Iterator[Cause]:
-    """Hypotheses on one body: a factor on its mass or inertia, inertia in other axes or about another point."""
-    mechanism = evidence.element.mechanism
-    mass = np.array([body.mass for body in mechanism.bodies])
-    inertia, com = (np.array([getattr(body, key) for body in mechanism.bodies]) for key in ("inertia", "com"))
-    for residuals in residuals_of(evidence):
-        for i, body in enumerate(mechanism.bodies if len(mechanism.bodies) > 1 else ()):
-            which = np.arange(len(mass)) == i
+@by_rows("numbers of all", _ONE_FACTOR)
+def factors_of_all(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: the engine moves all bodies, joints or springs with one factor on a number."""
+    mechanism: Mechanism = evidence.element.mechanism
+    mass, _, inertia = _of_bodies(mechanism)
+    model = partial(Change, mechanism)
 
-            for what, values in (("mass", mass), ("inertia", inertia)):
+    def of_all(name: str, what: str, model: Any, remedy: str, quantity: str = "") -> Iterator[CauseRow[Change]]:
+        signed = name not in _UNSIGNED
+        return residuals.scaled(name, f"the engine moves it with {what}", model, remedy, quantity, signed=signed)
 
-                def change(x: float, what: str = what, values: FloatArray = values, which: Any = which) -> Change:
-                    scaled = (np.where(which, x, 1.0) * values.T).T
-                    return Change(mechanism, **{what: scaled})  # type: ignore[arg-type]  # an array by its name
+    if any(mechanism.gravity):
+        remedy = "give the engine the scene's gravity: an acceleration in the world, its sign and its unit"
+        g = np.array(mechanism.gravity)
+        yield from of_all("gravity", "gravity", lambda x: model(gravity=x * g), remedy, "gravity")
+    if mechanism.bodies:
+        remedy = "give each body its {} once"
+        yield from of_all("mass", "all masses", lambda x: model(mass=x * mass), remedy.format("mass"), "mass")
+        of_inertia = remedy.format("inertia")
+        yield from of_all("inertia", "all inertias", lambda x: model(inertia=x * inertia), of_inertia, "inertia")
+    for law, name, words, give in _OF_JOINTS:
+        if any(getattr(joint, law) for joint in mechanism.joints):
+            what, remedy = f"the {words} of the joints", f"give the joints {give}"
+            yield from of_all(name, what, lambda x, law=law: model(**{law: x}), remedy)
+    if mechanism.springs:
+        remedy = "give the springs their stiffness and free length"
+        yield from of_all("springs", "the stiffness of the springs", lambda x: model(springs=x), remedy)
+    if any(spring.damping for spring in mechanism.springs):
+        what, remedy = "the damping of the springs", "give the springs their damping, along the line between their ends"
+        yield from of_all("damping of springs", what, lambda x: model(spring_damping=x), remedy)
+        remedy = "give the springs their stiffness, damping and free length"
+        yield from of_all("springs with damping", "the springs", lambda x: model(springs=x, spring_damping=x), remedy)
+    if mechanism.bushings:
+        remedy = "give the bushings their stiffness and damping"
+        yield from of_all("bushings", "the bushings", lambda x: model(bushings=x), remedy)
+    if mechanism.bodies:
+        what, remedy = "the gyroscopic moments w x I w", "the rate of the angular momentum has the term w x I w"
+        yield from of_all("gyroscopic terms", what, lambda x: model(gyroscopic=x), remedy)
 
-                factor, number = best(residuals, change)
-                if not (possible(factor, False) and in_doubt(evidence, residuals, what, number)):
-                    continue
-                says = f"the engine moves the body {body.name} with its {what} {factor_text(factor)}"
-                model, remedy = change(factor), f"give {body.name} its {what} once"
-                yield residuals.cause(f"{what} of {body.name}", says, model, remedy, number, change_by(factor))
-        if in_doubt(evidence, residuals, "inertia"):
-            yield from _reordered(residuals, mechanism, inertia)
-        if np.any(com) and in_doubt(evidence, residuals, "inertia"):
-            yield from _about_origin(residuals, mechanism, mass, com, inertia)
-        if np.any(com):
-            says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
-            model = Change(mechanism, weight_at_origin=True)
-            yield residuals.cause("place of weight", says, model, "put the weight at the centre of mass", 0)
-        if np.any(com) and in_doubt(evidence, residuals, "centre of mass"):
-            says = "the centres of mass are taken to be at the origins of the bodies' frames"
-            model = Change(mechanism, com=np.zeros_like(com))
-            yield residuals.cause("centre of mass", says, model, "give the centres of mass", 0)
+
+def _of_bodies(mechanism: Mechanism) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Masses, centres of mass and inertias of the bodies."""
+    mass, com, inertia = (np.array([getattr(b, key) for b in mechanism.bodies]) for key in ("mass", "com", "inertia"))
+    return mass, com, inertia
 
 
-def _reordered(residuals: Residuals[Change], mechanism: Mechanism, inertia: FloatArray) -> Iterator[Cause]:
-    """Hypotheses: moments of inertia along other axes, products of inertia with the wrong sign."""
-    remedy = "look at the order of moments and products of inertia, and at the sign of the products"
+@by_rows("body", "one body has another mass or inertia, or its inertia about other axes or another point")
+def of_each_body(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows of one body: a factor on its mass or inertia, inertia in other axes or about another point."""
+    mechanism: Mechanism = evidence.element.mechanism
+    mass, com, inertia = _of_bodies(mechanism)
+    for i, body in enumerate(mechanism.bodies if len(mechanism.bodies) > 1 else ()):
+        for what, values in (("mass", mass), ("inertia", inertia)):
+
+            def change(x: float, what: str = what, values: FloatArray = values, i: int = i) -> Change:
+                scaled = (np.where(np.arange(len(values)) == i, x, 1.0) * values.T).T
+                return Change(mechanism, **{what: scaled})  # type: ignore[arg-type]  # an array by its name
+
+            says, remedy = f"the engine moves the body {body.name} with its {what}", f"give {body.name} its {what} once"
+            yield from residuals.scaled(f"{what} of {body.name}", says, change, remedy, what, signed=False)
+    for says, other_inertia in _reordered(inertia):
+        remedy = "look at the order of moments and products of inertia, and at the sign of the products"
+        yield CauseRow("order of inertia", says, Change(mechanism, inertia=other_inertia), remedy, quantity="inertia")
+    if not np.any(com):
+        return
+    for says, other_inertia in _about_origin(mass, com, inertia):
+        remedy = "the scene's inertia is about the centre of mass, in the body's axes"
+        yield CauseRow("point of inertia", says, Change(mechanism, inertia=other_inertia), remedy, quantity="inertia")
+    says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
+    model = Change(mechanism, weight_at_origin=True)
+    yield CauseRow("place of weight", says, model, "put the weight at the centre of mass")
+    says = "the centres of mass are taken to be at the origins of the bodies' frames"
+    model = Change(mechanism, com=np.zeros_like(com))
+    yield CauseRow("centre of mass", says, model, "give the centres of mass", quantity="centre of mass")
+
+
+def _reordered(inertia: FloatArray) -> Iterator[tuple[str, FloatArray]]:
+    """Moments of inertia along other axes, products of inertia with the wrong sign, each with a clause."""
     for order in list(itertools.permutations(range(3)))[1:]:
-        other_inertia = inertia[:, order][:, :, order]
         shown = ", ".join("xyz"[k] for k in order)
         says = f"the moments of inertia are in another order: those about x, y, z are the scene's about {shown}"
-        yield residuals.cause("order of inertia", says, Change(mechanism, inertia=other_inertia), remedy, 0)
+        yield says, inertia[:, order][:, :, order]
     mirrored = inertia * (2 * np.eye(3) - 1)
     if not np.array_equal(mirrored, inertia):
-        says = "the products of inertia have the wrong sign"
-        yield residuals.cause("order of inertia", says, Change(mechanism, inertia=mirrored), remedy, 0)
+        yield "the products of inertia have the wrong sign", mirrored
 
 
-def _about_origin(
-    residuals: Residuals[Change], mechanism: Mechanism, mass: FloatArray, com: FloatArray, inertia: FloatArray
-) -> Iterator[Cause]:
-    """Hypotheses: Steiner's part added once too often or too few."""
+def _about_origin(mass: FloatArray, com: FloatArray, inertia: FloatArray) -> Iterator[tuple[str, FloatArray]]:
+    """Inertias with Steiner's part added once too often or too few, of all bodies or one, each with a clause."""
     steiner = mass[:, None, None] * (
         np.einsum("ni,ni->n", com, com)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None, :]
     )
-    remedy = "the scene's inertia is about the centre of mass, in the body's axes"
     for sign, words in ((1.0, "with Steiner's part added once more"), (-1.0, "with Steiner's part taken away")):
-        says = f"the inertia is about the wrong point: that about the centre of mass {words}"
         for which in (np.ones(len(mass)), *np.eye(len(mass))):
             moved = inertia + sign * which[:, None, None] * steiner
             if np.min(np.linalg.eigvalsh(moved)) >= 0:
-                yield residuals.cause("point of inertia", says, Change(mechanism, inertia=moved), remedy, 0)
+                yield f"the inertia is about the wrong point: that about the centre of mass {words}", moved
 
 
-@hypothesis("damped motion", "the equations are linear in it: one rate balances them at every state of the run")
-def damped_motion(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: velocities or spins of bodies, or both, decay at one rate, as engines for games have it.
+@by_rows("damped motion", "the equations are linear in it: one rate balances them at every state of the run")
+def damped_motion(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: velocities or spins of bodies, or both, decay at one rate, as engines for games have it.
 
     Only free bodies, or all momenta of several, tell it from damping in joints.
     """
     mechanism, period = evidence.element.mechanism, evidence.element.natural_time
     remedy = "find the engine's own damping, drag or sleeping, and switch it off"
     free = any(joint.kind == JointKind.FREE for joint in mechanism.joints)
-    kinds = [("velocities", (1.0, 0.0)), ("spins", (0.0, 1.0))] if free else []
-    kinds += [("velocities and spins", (1.0, 1.0))] if free or len(mechanism.bodies) > 1 else []
-    for residuals in residuals_of(evidence) if kinds else ():
-        plain = residuals.left(Change(mechanism))
-        for what, which in kinds:
-            slope = residuals.left(Change(mechanism, decay=which)) - plain
-            square = float(slope @ slope)
-            rate = -float(slope @ plain) / square if square else 0.0
-            if rate > 0:
-                says = f"{what} of all bodies are damped at a rate of {rate:.4g} per second"
-                model = Change(mechanism, decay=(rate * which[0], rate * which[1]))
-                yield residuals.cause("damped motion", says, model, remedy, 1, rate * period)
+    kinds = [("velocities", 1.0, 0.0), ("spins", 0.0, 1.0)] if free else []
+    kinds += [("velocities and spins", 1.0, 1.0)] if free or len(mechanism.bodies) > 1 else []
+    for what, linear, angular in kinds:
+
+        def decaying(rate: FloatArray, linear: float = linear, angular: float = angular) -> Change:
+            return Change(mechanism, decay=(float(rate[0]) * linear, float(rate[0]) * angular))
+
+        rate = residuals.numbers_of(decaying, 1)
+        if rate[0] > 0:
+            says = f"{what} of all bodies are damped at a rate of {rate[0]:.4g} per second"
+            yield CauseRow("damped motion", says, decaying(rate), remedy, fitted=1, change=float(rate[0]) * period)
 
 
-@hypothesis(
-    "several numbers", "the equations are linear in all of them: one fit balances them at every state of the run"
-)
-def of_several(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: two or more terms of all bodies or joints have factors, or their momenta decay; solved together."""
-    mechanism = evidence.element.mechanism
-    gravity = np.array(mechanism.gravity)
-    terms: dict[str, Callable[[float], dict[str, Any]]] = {
-        "gravity": lambda x: {"gravity": (1 + x) * gravity},
-        "the gyroscopic moments w x I w": lambda x: {"gyroscopic": 1 + x},
-        "the damping of the joints": lambda x: {"damping": 1 + x},
-        "the stiffness of the joints": lambda x: {"stiffness": 1 + x},
-        "velocities and spins": lambda x: {"decay": (x, x)},
-    }
-    for residuals in residuals_of(evidence):
-        plain = residuals.left(Change(mechanism))
-        columns = {name: residuals.left(Change(mechanism, **term(1.0))) - plain for name, term in terms.items()}
-        names = [name for name, column in columns.items() if np.any(column)]
-        least = np.broadcast_to(np.minimum(residuals.leaves, residuals.closes * residuals.before), plain.shape)
-        values: FloatArray = np.zeros(0)
-        while len(names) > 1:
-            slopes = np.stack([columns[name] for name in names], axis=-1)
-            values = -np.linalg.lstsq(slopes, plain, rcond=None)[0]
-            shares = np.max(np.abs(slopes * values) / least[:, None], axis=0)  # below 1: within its error
-            if np.min(shares) > 1:
-                break
-            names.pop(int(np.argmin(shares)))
-        found = dict(zip(names, values.tolist(), strict=False))
-        rate = found.pop("velocities and spins", 0.0)
-        if (
-            len(names) < 2
-            or rate < 0
-            or not all(possible(1 + value, name == "gravity") for name, value in found.items())
-        ):
-            continue
-        says = [f"{name} {factor_text(1 + value)}" for name, value in found.items()]
-        says += [f"velocities and spins of all bodies damped at a rate of {rate:.4g} per second"] if rate else []
-        model = Change(
-            mechanism,
-            **{key: item for name, x in zip(names, values, strict=True) for key, item in terms[name](x).items()},
-        )
-        words, remedy = f"the engine moves it with {' and '.join(says)}", "find these terms in the engine, each alone"
-        yield residuals.cause("several numbers", words, model, remedy, len(names))
+@by_rows("several numbers", "the equations are linear in all of them: one fit balances them at every state of the run")
+def of_several(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: two or three of gravity, gyroscopic moments and the decay of all momenta, solved together."""
+    mechanism: Mechanism = evidence.element.mechanism
+    g = np.array(mechanism.gravity)
+    remedy = "find these terms in the engine, each alone"
+
+    def model(x: FloatArray) -> Change:
+        return Change(mechanism, gravity=(1 + x[0]) * g, gyroscopic=1 + float(x[1]), decay=(float(x[2]), float(x[2])))
+
+    rows = np.eye(3)
+    plain = residuals.left(model(np.zeros(3)))
+    least = np.minimum(residuals.leaves, residuals.closes * residuals.before)
+    kept = [k for k in range(3) if np.any(residuals.left(model(rows[k])) != plain)]
+    values = np.zeros(3)
+    while len(kept) > 1:
+        values = rows[:, kept] @ residuals.numbers_of(lambda x: model(rows[:, kept] @ x), len(kept))
+        shares = [
+            float(np.max(np.abs(residuals.left(model(values[k] * rows[k])) - plain) / least, initial=0.0)) for k in kept
+        ]
+        if min(shares) > 1:  # below it a number is within its error
+            break
+        kept.pop(int(np.argmin(shares)))
+    factors = {name: 1 + values[k] for k, name in enumerate(("gravity", "the gyroscopic moments w x I w")) if k in kept}
+    if len(kept) < 2 or values[2] < 0 or not all(possible(factor, signed=True) for factor in factors.values()):
+        return
+    words = [f"{name} {factor_text(factor)}" for name, factor in factors.items()]
+    words += [f"velocities and spins of all bodies damped at a rate of {values[2]:.4g} per second"] if 2 in kept else []
+    says = f"the engine moves it with {' and '.join(words)}"
+    yield CauseRow("several numbers", says, model(values), remedy, fitted=len(kept))
 
 
-@hypothesis(
-    "friction of one joint", "the equations are linear in it: one factor balances them at every state of the run"
-)
-def friction_of_each_joint(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: one of several joints has dry friction with a factor."""
-    mechanism = evidence.element.mechanism
-    rough = [
-        (joint, columns) for joint, columns in zip(mechanism.joints, mechanism.v_slices, strict=True) if joint.friction
-    ]
-    for residuals in residuals_of(evidence) if len(rough) > 1 else ():
-        for joint, columns in rough:
-            which = np.eye(mechanism.nv)[columns].sum(axis=0)
+@by_rows("friction of one joint", _ONE_FACTOR)
+def friction_of_each_joint(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: one of several joints has dry friction with a factor."""
+    mechanism: Mechanism = evidence.element.mechanism
+    joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
+    rough = [(joint, columns) for joint, columns in joints if joint.friction]
+    for joint, columns in rough if len(rough) > 1 else ():
+        of_joint = np.eye(mechanism.nv)[columns].sum(axis=0)
 
-            def change(x: float, which: FloatArray = which) -> Change:
-                return Change(mechanism, friction=1 + (x - 1) * which)
+        def change(x: float, which: FloatArray = of_joint) -> Change:
+            return Change(mechanism, friction=1 + (x - 1) * which)
 
-            factor, number = best(residuals, change)
-            if possible(factor, signed=True):
-                says = f"the engine moves it with the dry friction of the joint {joint.name} {factor_text(factor)}"
-                remedy = f"give {joint.name} its dry friction, against the motion"
-                name = f"friction of {joint.name}"
-                yield residuals.cause(name, says, change(factor), remedy, number, change_by(factor))
+        says = f"the engine moves it with the dry friction of the joint {joint.name}"
+        remedy = f"give {joint.name} its dry friction, against the motion"
+        yield from residuals.scaled(f"friction of {joint.name}", says, change, remedy)
 
 
-@hypothesis("joint", "the equations are linear in it: one coefficient balances them at every state of the run")
-def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: one joint, or every joint, has additional damping or armature.
+@by_rows("joint", "the equations are linear in it: one coefficient balances them at every state of the run")
+def of_each_joint(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: one joint, or every joint, has additional damping or armature.
 
-    Coarse steps have the same effect. So the cause states how large the change is: the armature, or damping times
+    Coarse steps have the same effect. So the row states how large the change is: the armature, or damping times
     natural time, relative to the inertia that the joint moves at the start. Damping that a first-order scheme adds by
     itself at the engine's step (implicit Euler: half the stiffness times the step) accuses nothing.
     """
-    mechanism = evidence.element.mechanism
+    mechanism: Mechanism = evidence.element.mechanism
     equations = JointCoordinates(mechanism)
-    q, v = mechanism.start()
-    inertia = np.diag(equations.inertial(equations.tree.at(q, v))[1])
-    for residuals in residuals_of(evidence):
-        joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
-        choices = [(f"the joint {joint.name}", np.eye(mechanism.nv)[columns].sum(axis=0)) for joint, columns in joints]
-        numbers = {
-            key: [getattr(j, key) for j in mechanism.joints for _ in range(j.nv)] for key in ("armature", "damping")
-        }
-        if len(choices) > 1:
-            choices = [("every joint", np.ones(mechanism.nv)), *choices]
-        for owner, which in choices:
-            for what, has in (("an armature (rotor inertia)", "armature"), ("damping", "damping")):
-                key = f"added_{has}"
-                columns = residuals.left(Change(mechanism))
-                slope = residuals.left(Change(mechanism, **{key: which})) - columns
-                square = float(slope @ slope)
-                if not square:
-                    continue
-                value = -float(slope @ columns) / square
-                if np.any(numbers[has] + value * which < 0):
-                    continue
-                says = f"{owner} has {what} of {value:.4g} more than the scene gives it"
-                size = value * {"armature": 1.0, "damping": evidence.element.natural_time}[has]
-                remedy = f"set {has} of the joints yourself, also where it is zero"
-                change = Change(mechanism, **{key: value * which})
-                if _by_scheme(residuals, change):
-                    continue
-                part = abs(size) / float(np.min(inertia[which > 0]))
-                yield residuals.cause(f"{what} in {owner}", says, change, remedy, 1, part)
+    inertia = np.diag(equations.inertial(equations.tree.at(*mechanism.start()))[1])
+    joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
+    choices = [(f"the joint {joint.name}", np.eye(mechanism.nv)[columns].sum(axis=0)) for joint, columns in joints]
+    if len(choices) > 1:
+        choices = [("every joint", np.ones(mechanism.nv)), *choices]
+    kinds = (("an armature (rotor inertia)", "armature", 1.0), ("damping", "damping", evidence.element.natural_time))
+    for (owner, which), (what, law, size) in itertools.product(choices, kinds):
+        numbers = np.array([getattr(joint, law) for joint in mechanism.joints for _ in range(joint.nv)])
+
+        def more(value: FloatArray, which: FloatArray = which, law: str = law) -> Change:
+            return Change(mechanism, **{f"added_{law}": value[0] * which})
+
+        value = residuals.numbers_of(more, 1)
+        if value[0] and np.all(numbers + value[0] * which >= 0):
+            says = f"{owner} has {what} of {value[0]:.4g} more than the scene gives it"
+            remedy = f"set {law} of the joints yourself, also where it is zero"
+            change = abs(float(value[0]) * size) / float(np.min(inertia[which > 0]))
+            yield CauseRow(f"{what} in {owner}", says, more(value), remedy, fitted=1, change=change)
 
 
-def _by_scheme(residuals: Residuals[Change], change: Change) -> bool:
-    """True if a change is damping alone, and a first-order scheme leaves as much by itself at the engine's step."""
-    mechanism = change.mechanism
-    damping = np.array([joint.damping for joint in mechanism.joints for _ in range(joint.nv)])
-    added = (change.damping - 1.0) * damping + change.added_damping
-    if np.any(added < 0) or not np.any(added > 0):
-        return False
-    least = np.maximum(residuals.scheme, residuals.closes * residuals.before)
-    return bool(np.all(np.abs(residuals.left(residuals.plain)) <= least))
+@by_rows("direction of gravity", "the equations are linear in gravity: one vector closes them at every state")
+def any_gravity(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: gravity has another direction or magnitude."""
+    mechanism: Mechanism = evidence.element.mechanism
+    g, name, remedy = np.array(mechanism.gravity), "direction of gravity", "look at the axes of gravity"
+    size = float(np.linalg.norm(g))
+    for axis in (*np.eye(3), *-np.eye(3)):
+        if np.any(np.cross(axis, g)):
+            says = f"the engine's gravity is ({_shown(size * axis)}) m/s^2, along another axis"
+            yield CauseRow(name, says, Change(mechanism, gravity=size * axis), remedy, quantity="gravity")
+    gravity = g + residuals.numbers_of(lambda more: Change(mechanism, gravity=g + more), 3)
+    gravity = np.where(np.abs(gravity) < 1e-6 * max(float(np.max(np.abs(gravity))), 1e-300), 0.0, gravity)
+    change, says = float(np.linalg.norm(gravity - g)), f"the engine's gravity is ({_shown(gravity)}) m/s^2"
+    model, change = Change(mechanism, gravity=gravity), change / size if size else np.inf
+    yield CauseRow(name, says, model, remedy, quantity="gravity", fitted=3, change=change)
+
+
+def _shown(gravity: FloatArray) -> str:
+    return ", ".join(f"{x:.4g}" for x in gravity + 0.0)  # not -0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, known_difference, longest
-from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis import Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import delay_text, in_steps
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import (
@@ -21,6 +21,7 @@ from proofroll.core.diagnosis.samples import (
 from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
+from proofroll.elements.mechanism.diagnosis.residuals import MOTION
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.run.dataset import quaternions
@@ -125,9 +126,9 @@ def starts_late(evidence: Evidence) -> Iterator[Cause]:
     off = np.reshape(np.subtract(line["found"], line["expected"]), v.shape)
     ahead = float(np.sum(off * v) / np.sum(v * v))
     says = f"the start is {delay_text(-ahead, evidence.step)}: the bodies have moved before time 0"
-    proof = "position at time 0", "m", longest(off), longest(off - v * ahead - a * ahead**2 / 2)
-    remedy, change = "sample before the first step", in_steps(ahead, evidence.step)
-    yield Cause("late", says, *proof, remedy=remedy, fitted=1, change=change)
+    remainder, change = longest(off - v * ahead - a * ahead**2 / 2), in_steps(ahead, evidence.step)
+    place = Difference("position at time 0", "m", longest(off))
+    yield place.cause("late", says, remainder, "sample before the first step", 1, change=change)
 
 
 @hypothesis(
@@ -151,13 +152,9 @@ def centres_at_start(evidence: Evidence) -> Iterator[Cause]:
         off = np.reshape(line["found"], (-1, 3)) - np.reshape(line["expected"], (-1, 3))
         if off.shape == arm.shape:
             says = f"{meant[name]} of the centres of mass, not of the origins of the bodies' frames"
-            proof = (
-                f"{name} at time 0",
-                str(line["unit"]),
-                known_difference(off, 0 * off),
-                known_difference(off, shifts[name]),
-            )
-            yield Cause("centre of mass", says, *proof, "give the origins of the frames")
+            apart = Difference(f"{name} at time 0", str(line["unit"]), known_difference(off, 0 * off))
+            remainder = known_difference(off, shifts[name])
+            yield apart.cause("centre of mass", says, remainder, "give the origins of the frames")
 
 
 def _size(element: Any, name: str) -> float:
@@ -171,7 +168,7 @@ def _attitudes(evidence: Evidence) -> FloatArray:
     return quaternions(evidence.truth)
 
 
-CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque", "motion"))
+CLOCK = another_clock(_state, MOTION)
 REPORTING_ERRORS: tuple[Any, ...] = (
     CLOCK,
     starts_late,

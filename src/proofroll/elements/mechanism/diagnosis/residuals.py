@@ -1,6 +1,6 @@
 """Residuals of the equations of motion for changed models of a mechanism, at its certificate and along its run."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
-from proofroll.core.diagnosis.fitting import ABOVE, FACTORS, Residuals, cached_on_evidence
+from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Cause, Evidence, Hypothesis, hypothesis
+from proofroll.core.diagnosis.fitting import ABOVE, CauseRow, Residuals, cached_on_evidence, in_doubt
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import (
@@ -23,7 +23,9 @@ from proofroll.elements.mechanism.diagnosis.equations import (
 
 # Equations with a larger relative residual for the true run prove nothing.
 _TELLS = 1e-4
+# Quantities that follow from built numbers, and from the motion.
 COVERED = ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque")
+MOTION = ("motion", *COVERED)
 # Quantities of the certificate that follow from the motion.
 _FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for when in ("", OF_FIRST_STEPS)}
 
@@ -152,15 +154,13 @@ def _residuals_at(
     def left(change: Change | None) -> FloatArray:
         return np.asarray(states.left(change or plain)[tells])
 
-    quantity = f"balance of the equations of motion {place}, relative,"
-    covers = ("motion", *COVERED)
     return Residuals(
         left=left,
-        quantity=quantity,
+        quantity=f"balance of the equations of motion {place}, relative,",
         unit="1",
         before=difference,
         closes=closes,
-        covers=covers,
+        covers=MOTION,
         plain=plain,
         others=lambda: _others(plain),
         contradicted=contradicted,
@@ -183,20 +183,36 @@ def _others(plain: Change) -> list[Change]:
     return changes
 
 
-def best(residuals: Residuals[Change], change: Callable[[float], Change]) -> tuple[float, int]:
-    """Factor that balances an equation linear in it, and number of fitted values: 0 if the factor is a known one.
+Rows = Callable[[Evidence, Residuals[Change]], Iterable[CauseRow[Change]]]
 
-    With a single equation any factor would fit, so that only factors of known mistakes are tried.
+
+def by_rows(name: str, grounds: str) -> Callable[[Rows], Hypothesis]:
+    """Decorator that makes a hypothesis of a function that gives rows for residuals.
+
+    A row is a cause unless a number read back contradicts it, or a scheme of first order leaves as much by itself.
     """
-    plain_left = residuals.left(change(1.0))
-    slope = residuals.left(change(2.0)) - plain_left
 
-    def left_by(factor: float) -> float:
-        left: FloatArray = plain_left + (factor - 1.0) * slope
-        return float(np.max(np.abs(left), initial=0.0))
+    def decorated(rows: Rows) -> Hypothesis:
+        @hypothesis(name, grounds)
+        def test(evidence: Evidence) -> Iterator[Cause]:
+            for residuals in residuals_of(evidence):
+                for row in rows(evidence, residuals):
+                    if in_doubt(evidence, residuals, row.quantity, row.fitted) and not _by_scheme(residuals, row.model):
+                        yield residuals.cause(row)
 
-    usual = min(FACTORS, key=left_by)
-    if residuals.single_equation or left_by(usual) <= residuals.closes * residuals.before:
-        return usual, 0
-    square = float(slope @ slope)
-    return (1.0 - float(slope @ plain_left) / square if square else 1.0), 1
+        return test
+
+    return decorated
+
+
+def _by_scheme(residuals: Residuals[Change], change: Change | None) -> bool:
+    """True if a change is damping alone, and a first-order scheme leaves as much by itself at the engine's step."""
+    if change is None:
+        return False
+    mechanism = change.mechanism
+    damping = np.array([joint.damping for joint in mechanism.joints for _ in range(joint.nv)])
+    added = (change.damping - 1.0) * damping + change.added_damping
+    if np.any(added < 0) or not np.any(added > 0):
+        return False
+    least = np.maximum(residuals.scheme, residuals.closes * residuals.before)
+    return bool(np.all(np.abs(residuals.left(residuals.plain)) <= least))

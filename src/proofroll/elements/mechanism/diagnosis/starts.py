@@ -7,20 +7,20 @@ from functools import lru_cache
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference, longest
-from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis import Cause, Difference, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED
+from proofroll.elements.mechanism.diagnosis.residuals import MOTION
 from proofroll.elements.mechanism.run.dataset import quaternions
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.joint import Joint
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
 from proofroll.elements.mechanism.scene.model import Mechanism
 
-_COVERS = ("state", *dict.fromkeys((*COVERS, *COVERED)))
+_COVERS = ("state", *dict.fromkeys((*COVERS, *MOTION)))
 _REMEDY = "put the scene's start into the engine's own state before the first step"
 _AT_ONCE = (
     100.0  # rate at which a dropped velocity vanishes, in natural ones: within a step, and not by a law of forces
@@ -52,16 +52,7 @@ def start_not_taken(evidence: Evidence) -> Iterator[Cause]:
         if moved is None:
             continue
         remainder = largest_difference(poses[1:_FIRST], moved[1:])
-        yield Cause(
-            id="start",
-            says=says,
-            quantity="first samples",
-            unit="m",
-            before=distance,
-            after=remainder,
-            remedy=_REMEDY,
-            covers=_COVERS,
-        )
+        yield Difference("first samples", "m", distance, _COVERS).cause("start", says, remainder, _REMEDY)
 
 
 def _lost_in_a_step(evidence: Evidence) -> Iterator[Cause]:
@@ -82,17 +73,8 @@ def _lost_in_a_step(evidence: Evidence) -> Iterator[Cause]:
     if rate * element.natural_time > _AT_ONCE:
         distance, remainder = longest(poses - expected), longest(poses - expected + rate * velocity)
         says = "the start was not taken: the velocities of the start vanish in the first step"
-        name = "acceleration of the first steps"
-        yield Cause(
-            id="start",
-            says=says,
-            quantity=name,
-            unit="m/s^2",
-            before=distance,
-            after=remainder,
-            remedy=_REMEDY,
-            covers=_COVERS,
-        )
+        off = Difference("acceleration of the first steps", "m/s^2", distance, _COVERS)
+        yield off.cause("start", says, remainder, _REMEDY)
 
 
 def _poses(places: FloatArray, turns: FloatArray) -> FloatArray:

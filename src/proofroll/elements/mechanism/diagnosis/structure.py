@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import CLOSES, Cause, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals
 from proofroll.core.diagnosis.lines import differing, scale_of
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import InputError
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of, stretch
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED, residuals_of
+from proofroll.elements.mechanism.diagnosis.residuals import MOTION, by_rows
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
@@ -53,10 +54,9 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
             placed, parent, child, fitted, axis
         ):
             says = f"the joint {joint.name} turns about ({_shown(fitted)}) of its parent, not about ({_shown(axis)})"
-            covered = ("p_WB", "v_WB", "w_WB", "q_WB", "motion", "force", "torque")
-            what = (f"turning of {joint.name} across its axis", "rad/s", difference, remainder)
             change = float(np.linalg.norm(fitted - axis))
-            yield Cause(f"axis of {joint.name}", says, *what, remedy=_REMEDY, fitted=2, covers=covered, change=change)
+            off = Difference(f"turning of {joint.name} across its axis", "rad/s", difference, MOTION)
+            yield off.cause(f"axis of {joint.name}", says, remainder, _REMEDY, 2, change=change)
 
 
 def _turns_about(placed: Placed, parent: int, child: int, seen: FloatArray, axis: FloatArray) -> bool:
@@ -75,21 +75,12 @@ def _axes_at_start(evidence: Evidence) -> Iterator[Cause]:
         return
     axes, expected = (np.reshape(line[key], (-1, 3)) for key in ("found", "expected"))
     off = np.nan_to_num(np.max(np.abs(axes - expected), axis=1))
+    difference = Difference("joint axes at time 0", "1", float(np.max(off)), ("motion",))
     for i, joint in enumerate(joints):
         both = f"({_shown(axes[i])}) in the world, not ({_shown(expected[i])})"
         says = f"the joint {joint.name} was built with the axis {both}"
         remainder = float(np.max(np.delete(off, i), initial=0.0))
-        yield Cause(
-            id="joint axis",
-            says=says,
-            quantity="joint axes at time 0",
-            unit="1",
-            before=float(np.max(off)),
-            after=remainder,
-            remedy=_REMEDY,
-            fitted=0,
-            covers=("motion",),
-        )
+        yield difference.cause("joint axis", says, remainder, _REMEDY)
 
 
 @hypothesis(
@@ -134,19 +125,10 @@ def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
         left = float(np.max((remainder / np.where(seen, difference, 1.0))[seen], initial=0.0))
         says = f"the joint {joint.name} turns about ({_shown(axis_seen)}) of its parent, not about ({_shown(axis)})"
         largest = float(np.max(difference))
-        what = ("first motion and reactions, in tolerances,", "1", largest, left * largest)
-        covered = ("motion", *COVERED)
+        off = Difference("first motion and reactions, in tolerances,", "1", largest, MOTION)
         explains, change = int(np.sum(seen)), float(np.linalg.norm(axis_seen - axis))
-        yield Cause(
-            f"axis of {joint.name}",
-            says,
-            *what,
-            remedy=_REMEDY,
-            fitted=2,
-            covers=covered,
-            explains=explains,
-            change=change,
-        )
+        name = f"axis of {joint.name}"
+        yield off.cause(name, says, left * largest, _REMEDY, 2, explains=explains, change=change)
 
 
 def _first(element: Any) -> dict[str, FloatArray]:
@@ -178,26 +160,21 @@ _OPEN = 1e-4
 _BALANCED = 1e-3
 
 
-@hypothesis(
+@by_rows(
     "tree out of order",
     "the equations balance without the terms that an algorithm for depth-first order loses",
 )
-def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: the mass matrix lacks terms between a body and its descendants."""
-    mechanism = evidence.element.mechanism
+def lost_coupling(evidence: Evidence, _: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: the mass matrix lacks terms between a body and its descendants, all or one pair."""
+    mechanism: Mechanism = evidence.element.mechanism
     pairs = _ancestry(mechanism)
-    if not np.any(pairs):
-        return
     says = "the mass matrix lacks terms between a body and those that hang on it, as when a tree is not depth-first"
     remedy = "add bodies depth-first, or take the mass matrix from an algorithm that does not need that order"
-    for residuals in residuals_of(evidence):
-        singles = []
-        for row, column in np.argwhere(np.triu(pairs)):
-            single = np.zeros_like(pairs)
-            single[row, column] = single[column, row] = 1.0
-            singles.append(single)
-        for lost in [pairs, *singles]:
-            yield residuals.cause("tree out of order", says, Change(mechanism, coupling=lost), remedy, 0)
+    singles = [np.zeros_like(pairs) for _ in range(int(np.sum(pairs)) // 2)]
+    for single, (row, column) in zip(singles, np.argwhere(np.triu(pairs)), strict=True):
+        single[row, column] = single[column, row] = 1.0
+    for lost in [pairs, *singles] if singles else ():
+        yield CauseRow("tree out of order", says, Change(mechanism, coupling=lost), remedy)
 
 
 def _ancestry(mechanism: Mechanism) -> FloatArray:
@@ -231,6 +208,7 @@ def loop_lacks_row(evidence: Evidence) -> Iterator[Cause]:
     opened = np.max(np.abs([row.residual for row in rows]), axis=0)
     if np.max(opened) <= _OPEN * evidence.element.length:
         return
+    off = Difference("opening of loops", "m", float(np.max(opened)), MOTION)
     for k, loop in enumerate(mechanism.loops):
         of_loop = rows[0].loop == k
         lost = np.flatnonzero(of_loop & (opened > CLOSES * np.max(opened)))
@@ -240,15 +218,4 @@ def loop_lacks_row(evidence: Evidence) -> Iterator[Cause]:
         many = "a row" if len(lost) == 1 else f"{len(lost)} of its rows"
         says = f"the loop {loop.name} lacks {many}: it opens there freely, and holds less than a {loop.kind} joint"
         remedy = f"a {loop.kind} loop has {int(np.sum(of_loop))} rows; a point that is held gives three of them"
-        covered = ("motion", *COVERED)
-        yield Cause(
-            id="missing row",
-            says=says,
-            quantity="opening of loops",
-            unit="m",
-            before=float(np.max(opened)),
-            after=remainder,
-            remedy=remedy,
-            fitted=0,
-            covers=covered,
-        )
+        yield off.cause("missing row", says, remainder, remedy)

@@ -15,7 +15,8 @@ from proofroll.core.events import Event
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.engines.pinocchio.contact.impulses import Impulses, ImpulseSteps
+from proofroll.engines.pinocchio.contact.impulses import ImpulseSteps
+from proofroll.engines.pinocchio.contact.step_terms import Impulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
@@ -23,6 +24,10 @@ from proofroll.engines.pinocchio.smooth.null_space import LoopRows, NullSpace
 
 # Fraction of a step over which the initial accelerations are evaluated, and factor on their errors.
 _PART, _MARGIN = 1 / 16, 4.0
+_BLOCKS = (
+    "Pinocchio's admm solver did not reach solver_tolerance at one step; from there proofroll solves its matrices by "
+    "blocks"
+)
 _PARTS = "in the convex problem a slipping contact separates"
 _FOUND = "an impulse opposes the slip at its end, which turns, is found to solver_tolerance"
 _LATER = f"{_FOUND}, and follows the turning of its contact (J̇v) one step later"
@@ -92,6 +97,10 @@ class ImpulseRun(MechanismRun):
         kick = self._kick()
         forces = self.steps.joints.along_joints(self.steps.q, kick.along) if kick.along.size else {}
         return replace(super().sample(), contact_force=kick.impulse if self.steps.contacts else None, **forces)
+
+    def remarks(self) -> Sequence[str]:
+        """See :class:`proofroll.core.engine_abilities.TellsRemarks`."""
+        return [_BLOCKS] if self.steps.blocks.solved else []
 
     def events(self) -> Sequence[Event] | None:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""

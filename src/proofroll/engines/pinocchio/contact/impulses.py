@@ -8,7 +8,7 @@ contacts separate.
 import math
 from collections.abc import Mapping, Sequence
 from itertools import accumulate, pairwise, starmap
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -20,10 +20,12 @@ from proofroll.elements.mechanism.contact.touching import AT_REST, ONE_POINT, Mo
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
-from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK, States
+from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK
 from proofroll.elements.mechanism.scene.rotations import Array, carried, frame_of_axis
+from proofroll.engines.pinocchio.contact.blocks import Block, BlockSolver
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
 from proofroll.engines.pinocchio.contact.solver import LARGEST_FRICTION, SolverParts, solver_of
+from proofroll.engines.pinocchio.contact.step_terms import Impulses, StepTerms
 from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningImpulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
@@ -66,44 +68,6 @@ def family(settings: PinocchioSettings) -> Mapping[str, str]:
     return of_contact(Family.CONVEX if settings.convex else Family.HARD)
 
 
-class Impulses(NamedTuple):
-    """Impulses of a step.
-
-    Attributes:
-        v: velocity after it, shape (nv,).
-        impulse: on body a of each contact, world axes [N s], shape (contacts, 3).
-        states: of the contacts: open, sticking or with their impulse on the cone.
-        moment: of friction against turning on body a of each contact, world axes [N m s], shape (contacts, 3).
-        along: impulses of joint rows [N s, N m s], shape (rows,).
-        driving: impulses that impose motions [N s, N m s], shape (motions,).
-    """
-
-    v: Array
-    impulse: Array
-    states: States
-    moment: Array
-    along: Array
-    driving: Array
-
-
-class StepTerms(NamedTuple):
-    """Terms of a step's equations.
-
-    Attributes:
-        J: contact rows, (contacts, 3, nv): slip velocities along the normal's :func:`frame_of_axis`, the normal last.
-        free: velocity after the step without impulses, (nv,).
-        inverse: of the mass matrix, (nv, nv).
-        touching: geometry of the contacts.
-        frames: of their normals.
-    """
-
-    J: Array
-    free: Array
-    inverse: Array
-    touching: list[Touching]
-    frames: list[Array]
-
-
 class ImpulseSteps:
     """Steps of a tree with contacts, dry friction and stops of joints.
 
@@ -112,6 +76,7 @@ class ImpulseSteps:
         restitution: of each contact [1].
         events: of the contacts.
         joints: joint rows, numbered after the contacts.
+        blocks: solver that goes on where Pinocchio's ADMM stops.
     """
 
     def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
@@ -138,6 +103,7 @@ class ImpulseSteps:
         self._moments = TurningImpulses(tree, float(settings.solver_tolerance or 0.0))
         self._pressed_by = [friction.pressed_by for friction in self._moments.frictions]
         self._solvers: dict[tuple[int, ...], SolverParts] = {}
+        self.blocks = BlockSolver(float(settings.solver_tolerance or 0.0))
         nv, self._all = tree.model.nv, tuple(range(len(self.contacts)))
         ends = list(accumulate([3] * len(self.contacts) + [1] * len(self.joints.J), initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
@@ -307,7 +273,7 @@ class ImpulseSteps:
         point.joint2_placement = data.oMi[point.joint2_id].actInv(place)
         point.calc(self._model, data, solver.point_datas[number])
         rows: Array = point.jacobian(self._model, data, solver.point_datas[number])
-        return rows
+        return rows.reshape(3, -1)  # of a model of one velocity Pinocchio gives a vector
 
     def _solver(self, which: tuple[int, ...]) -> SolverParts:
         if which not in self._solvers:
@@ -429,7 +395,7 @@ class ImpulseSteps:
             rows = all_rows[chosen]
             to_joints = inverse @ rows.T
             g = rows @ free + all_shifts[chosen]
-            got = self._found(which, rows @ to_joints, g, terms, span, convex=convex)
+            got = self._by_any(which, rows @ to_joints, g, terms, span, convex=convex)
             v, pushed = free + to_joints @ got, rows.T @ got
             impulse[:], along_rows[:] = 0.0, 0.0
             for end, k in zip(self._ends(which), which, strict=True):
@@ -443,6 +409,31 @@ class ImpulseSteps:
     def _ends(self, which: tuple[int, ...]) -> list[int]:
         """Ends of some contacts and joint rows among the rows of these alone."""
         return list(accumulate(len(self._rows[k]) for k in which))
+
+    def _by_any(
+        self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool
+    ) -> Array:
+        """Impulses as by :meth:`_found`, or by blocks, which go first from where Pinocchio's ADMM stopped.
+
+        Raises:
+            Diverged: neither finds them.
+        """
+        if not self.blocks.solved:
+            try:
+                return self._found(which, G, g, terms, span, convex=convex)
+            except Diverged:
+                if convex or self._settings.solver != "admm":
+                    raise
+        count, rubbing, parts = len(self.contacts), self.joints.friction, dict[int, Block]()
+        for k, end in zip(which, self._ends(which), strict=True):
+            if k < count:
+                self._check(k, G[end - 3 : end, end - 3 : end], terms.touching[k].flat)
+                parts[k] = Block(end - 3, self._friction(k))
+            else:
+                rubs = k < count + len(rubbing)
+                parts[k] = Block(end - 1, None, span * rubbing[k - count].joint.friction if rubs else math.inf)
+        impulses = self.blocks.impulses(G, g, parts)
+        return self._found(which, G, g, terms, span, convex=convex) if impulses is None else impulses
 
     def _found(
         self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool

@@ -191,20 +191,12 @@ class AirRobot:
 
     def state(self, time: float, q: Array, v: Array) -> RobotState:
         """State of the driven joints and of the base, which is the world if it is fixed."""
-        p, quaternion, velocity, spin = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3)
-        if self.base is not None:
-            p, quaternion = q[self.base[0]][:3], q[self.base[0]][3:]
-            R = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
-            velocity, spin = R @ v[self.base[1]][:3], R @ v[self.base[1]][3:]
-        return RobotState(
-            time=time,
-            q=q[self.driven[:, 0]],
-            v=v[self.driven[:, 1]],
-            p_WB=p,
-            q_WB=quaternion,
-            v_WB=velocity,
-            w_WB=spin,
-        )
+        state = RobotState(time=time, q=q[self.driven[:, 0]], v=v[self.driven[:, 1]])
+        if self.base is None:
+            return state
+        pose, twist = q[self.base[0]], v[self.base[1]]
+        R = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
+        return replace(state, p_WB=pose[:3], q_WB=pose[3:], v_WB=R @ twist[:3], w_WB=R @ twist[3:])
 
     def load(self, efforts: Array) -> Array:
         """Efforts of the driven joints along all velocities, (nv)."""

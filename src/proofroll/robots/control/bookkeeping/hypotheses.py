@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis import Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
-from proofroll.elements.mechanism.diagnosis.residuals import COVERED
+from proofroll.elements.mechanism.diagnosis.residuals import MOTION
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, LAYERS
 from proofroll.robots.control.bookkeeping.search import MistakeExplanation, MotionSearch, explained_start
@@ -22,6 +22,7 @@ from proofroll.robots.control.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
 _SAME: Mapping[str, str] = {
     "kp": "actuators: kp", "kd": "actuators: kd", "clamp": "actuators: the limits", "clamp_missing": "actuators: limit",
 }  # fmt: skip
+_COVERS = (*MOTION, "effort")
 
 
 @hypothesis(
@@ -41,16 +42,9 @@ def of_bookkeeping(evidence: Evidence) -> Iterator[Cause]:
         elif (search := _of_run(evidence, law)) is not None:
             yield from (_cause(item, search.before, of_run=True) for item in search.explanations[:2])
             if search.imitated:
-                yield Cause(
-                    id="bookkeeping: implicit kd",
-                    says=IMPLICIT,
-                    quantity="motion",
-                    unit="rad or m",
-                    before=search.explicit,
-                    after=search.before,
-                    remedy="run it at a second step, and look at its armatures and at its integrator",
-                    covers=("motion", *COVERED, "effort"),
-                )
+                remedy = "run it at a second step, and look at its armatures and at its integrator"
+                off = Difference("motion", "rad or m", search.explicit, _COVERS)
+                yield off.cause("bookkeeping: implicit kd", IMPLICIT, search.before, remedy)
     except InputError:  # motors with gears
         return
 
@@ -88,15 +82,8 @@ def _in_air(mechanism: Mechanism) -> bool:
 
 def _cause(item: MistakeExplanation, before: float, *, of_run: bool) -> Cause:
     mistake = item.mistake
-    return Cause(
-        id=_SAME.get(mistake.id, f"bookkeeping: {mistake.id}"),
-        says=f"it moves as if {item.sentence}",
-        quantity="motion" if of_run else "accelerations at time 0",
-        unit="rad or m" if of_run else "1/s^2",
-        before=before,
-        after=item.after,
-        remedy=f"look at the {mistake.layer} ({LAYERS[mistake.layer]}) in the program around the engine",
-        fitted=item.fitted,
-        covers=("motion", *COVERED, "effort"),
-        change=abs(item.size - 1) if mistake.sized else np.inf,
-    )
+    what = ("motion", "rad or m") if of_run else ("accelerations at time 0", "1/s^2")
+    name, says = _SAME.get(mistake.id, f"bookkeeping: {mistake.id}"), f"it moves as if {item.sentence}"
+    remedy = f"look at the {mistake.layer} ({LAYERS[mistake.layer]}) in the program around the engine"
+    change = abs(item.size - 1) if mistake.sized else np.inf
+    return Difference(*what, before, _COVERS).cause(name, says, item.after, remedy, item.fitted, change=change)

@@ -27,7 +27,7 @@ SCALED = ("q", "v", "v_WB_W", "w_WB_B", "last")  # parts of an observation that 
 
 @dataclass(frozen=True)
 class RobotState:
-    """State of a robot at a time, SI units; W is the world, B the frame of the base.
+    """State of a robot at a time, SI units; W is the world, B the frame of the base, which is by default the world's.
 
     Attributes:
         time: [s].
@@ -41,10 +41,10 @@ class RobotState:
     time: float
     q: Array
     v: Array
-    p_WB: Array
-    q_WB: Array
-    v_WB: Array
-    w_WB: Array
+    p_WB: Array = dataclasses.field(default_factory=lambda: np.zeros(3))
+    q_WB: Array = dataclasses.field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
+    v_WB: Array = dataclasses.field(default_factory=lambda: np.zeros(3))
+    w_WB: Array = dataclasses.field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,9 @@ _TOLD = 1e-3  # least part of the largest offset of a pose that is told
 SEARCH_TIME = 10.0  # processor seconds after which a search ends
 
 
+LawChange = Callable[[ControlLaw, float], ControlLaw]  # law, size -> law with a mistake
+
+
 class SearchTime:
     """Processor time of a search."""
 
@@ -77,7 +80,7 @@ class Mistake:
     id: str
     words: str
     layer: str
-    changed: Callable[[ControlLaw, float], ControlLaw]
+    changed: LawChange
     sized: bool = False
     starts: tuple[float, ...] = (0.95,)
     numbers: int = 0
@@ -132,15 +135,8 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
     if law.armature.any():
         yield _sized("armature", "the armature is {size} of the right one", "acceleration", "armature", (0.9, 0.2))
     else:
-        yield Mistake(
-            id="armature",
-            words="there is an armature of {size} kg m²",
-            layer="acceleration",
-            changed=_armed,
-            sized=True,
-            starts=_ARMATURES,
-            none=0.0,
-        )
+        words = "there is an armature of {size} kg m²"
+        yield _fitted("armature", words, "acceleration", _armed, _ARMATURES, none=0.0)
     yield _signed("gravity", "gravity", "acceleration", "gravity")
 
 
@@ -177,16 +173,9 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
         yield _seen("quaternion", sentence, scalar_last=last, conjugated=True)
     yield _seen("rotation", "the rotation of the base is used the other way around", turned_back=True)
     yield _seen("gravity_sign", "the observed gravity has the other sign", gravity_sign=-law.gravity_sign)
-    yield Mistake(
-        id="observed_gravity",
-        words="gravity is observed at {size} of the right size",
-        layer="observation",
-        changed=partial(_scaled, "gravity_sign"),
-        sized=True,
-        starts=(0.95, _STANDARD),
-        absent="gravity is not observed",
-        later=True,
-    )
+    observed, starts = "gravity is observed at {size} of the right size", (0.95, _STANDARD)
+    gravity = _sized("observed_gravity", observed, "observation", "gravity_sign", starts)
+    yield dataclasses.replace(gravity, absent="gravity is not observed", later=True)
     yield _seen("observed_before", "the policy sees the state of the step before", observed_lag=1)
     velocity, spin = "the velocity of the base is", "the angular velocity of the base is"
     yield _seen("velocity_frame", f"{velocity} observed in the base's axes", velocity_turns=1)
@@ -214,28 +203,15 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
 
 def _of_actions(law: ControlLaw) -> Iterator[Mistake]:
     """Mistakes of what an action means."""
-    yield Mistake(
-        id="action_clip",
-        words="actions are clipped to ±{size}",
-        layer="action",
-        changed=lambda law, size: law.change(clip=size),
-        sized=True,
-        starts=(0.05, 0.1, 0.3, 1.0, 3.0),
-        none=math.inf,
-        later=True,
-    )
+    clips = (0.05, 0.1, 0.3, 1.0, 3.0)
+    clipped = _fitted("action_clip", "actions are clipped to ±{size}", "action", _clipped, clips, none=math.inf)
+    yield dataclasses.replace(clipped, later=True)
     for words, order in orders(law.joints):
         yield _fixed("joint_order", f"actions are for joints in another order ({words})", "target", action_order=order)
     yield _fixed("pose_missing", "the default pose is missing", "target", pose=np.zeros(len(law.joints)))
     yield _signed("scale", "the scale of actions", "target", "scale", (0.95, 1.9, -0.5))
-    yield Mistake(
-        id="smoothing",
-        words="actions pass a filter, of which {size} is new at each instant",
-        layer="target",
-        changed=lambda law, size: law.change(smoothing=size),
-        sized=True,
-        starts=(0.8, 0.3),
-    )
+    words = "actions pass a filter, of which {size} is new at each instant"
+    yield _sized("smoothing", words, "target", "smoothing", (0.8, 0.3))
 
 
 def _seen(name: str, words: str, **changes: object) -> Mistake:
@@ -249,24 +225,23 @@ def _factor(place: int, words: str, absent: str) -> Mistake:
         factors = (*law.factors[:place], size * law.factors[place], *law.factors[place + 1 :])
         return law.change(factors=factors)
 
-    return Mistake(
-        id=f"observed_{SCALED[place]}",
-        words=words,
-        layer="observation",
-        changed=changed_part,
-        sized=True,
-        starts=(0.95, 0.1),  # a policy that saturates leads from either to the scales near it alone
-        absent=absent,
-        later=True,
-    )
+    starts = (0.95, 0.1)  # a policy that saturates leads from either to the scales near it alone
+    mistake = _fitted(f"observed_{SCALED[place]}", words, "observation", changed_part, starts)
+    return dataclasses.replace(mistake, absent=absent, later=True)
 
 
 def _fixed(name: str, words: str, layer: str, *, later: bool = False, **changes: object) -> Mistake:
     return Mistake(name, words, layer, lambda law, _: law.change(**changes), later=later)
 
 
+def _fitted(
+    name: str, words: str, layer: str, changed: LawChange, starts: tuple[float, ...], none: float = 1.0
+) -> Mistake:
+    return Mistake(id=name, words=words, layer=layer, changed=changed, sized=True, starts=starts, none=none)
+
+
 def _sized(name: str, words: str, layer: str, attribute: str, starts: tuple[float, ...] = (0.95,)) -> Mistake:
-    return Mistake(id=name, words=words, layer=layer, changed=partial(_scaled, attribute), sized=True, starts=starts)
+    return _fitted(name, words, layer, partial(_scaled, attribute), starts)
 
 
 def _signed(name: str, what: str, layer: str, attribute: str, starts: tuple[float, ...] = (0.95, -0.5)) -> Mistake:
@@ -281,6 +256,10 @@ def _scaled(attribute: str, law: ControlLaw, size: float) -> ControlLaw:
 
 def _armed(law: ControlLaw, size: float) -> ControlLaw:
     return law.change(armature=law.armature + size)
+
+
+def _clipped(law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(clip=size)
 
 
 def orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:

@@ -51,6 +51,11 @@ def expand_robot(path: str) -> dict[str, Any]:
     return _defined(Path(path), lambda reader: {"text": reader.expanded(Path(path))})
 
 
+def find_near_shapes(path: str, asked: dict[str, Any]) -> dict[str, Any]:
+    """Worker's side of :func:`near_shapes`: shapes and pairs as plain data."""
+    return _defined(Path(path), lambda reader: {"near": reader.near_shapes(Path(path), **asked)})
+
+
 def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
     """Answer of the engine that defines MJCF, with its name as ``by``; or the reason of failure.
 
@@ -94,6 +99,29 @@ def compiled_robot(worker: Worker, file: RobotFile, written: Path, time_limit: f
             if endless and key not in {"lower", "upper", "effort", "speed"}:  # most joints have no limits
                 raise InputError(f"{file.path}: {key} of {name}", "nan", "numbers must be finite")
     return robot, Compiler(*answer["by"])
+
+
+def near_shapes(
+    worker: Worker, path: Path, copy: Path, asked: Mapping[str, Any], time_limit: float
+) -> tuple[dict[str, Any], Compiler]:
+    """Shapes of a robot file that come near each other, and the engine that says so.
+
+    Args:
+        worker: process of the engine.
+        path: path of the user's file, for messages.
+        copy: its copy, with contacts.
+        asked: further arguments of :meth:`proofroll.robots.importers.mujoco.MujocoRobots.near_shapes`.
+        time_limit: limit for the answer [s].
+
+    Raises:
+        InputError: the engine that defines MJCF cannot read the copy, or is not installed.
+        WorkerDied: the engine crashed or took too long.
+    """
+    answer = worker.request(call(find_near_shapes, path=str(copy), asked=dict(asked)), time_limit)
+    if "near" not in answer:
+        message = answer.get("message") or answer["uncovered"]
+        raise InputError("ground", path, f"its shapes cannot be read: {message}; take --ground none")
+    return answer["near"], Compiler(*answer["by"])
 
 
 def expand(worker: Worker, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:

@@ -4,12 +4,12 @@ import contextlib
 import copy
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError
-from proofroll.robots.files.mjcf.defaults import classed
+from proofroll.robots.files.mjcf.defaults import Classed, classed
 from proofroll.robots.files.mjcf.meshes import remove_height_fields, remove_meshes
 from proofroll.robots.files.robot_file import (
     MOST_ELEMENTS,
@@ -42,23 +42,26 @@ _LOOKS = {
 _UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
 # Attributes that say where an actuator acts.
 _PLACES = {"name", "joint", "jointinparent", "tendon", "site", "refsite", "slidersite", "cranksite", "body"}
+# Of a remark on a shape that collides in the file, and that no copy has.
+NO_SHAPE = "it collides in the file, and no copy has it"
 COMPENSATION = "its gravity compensation is left out, as actuators are; all engines read it without"
 # Macros, which the engine that defines the format writes out.
 _MACROS = {"replicate", "attach", "composite"}
 
 
 def neutral_mjcf(
-    root: Element, path: Path, inside: Path, expand: Expand | None = None
+    root: Element, path: Path, inside: Path, expand: Expand | None = None, *, contacts: bool = False
 ) -> tuple[Element, list[LintRemark], bool, tuple[Keyframe, ...]]:
     """Copy of an MJCF, remarks on omissions, True if all its files lie in ``inside``, and its keyframes.
 
-    The only files that the copy names are meshes that exist in that folder.
+    The only files that the copy names are meshes that exist in that folder. ``contacts``: it keeps the pairs of shapes
+    that the file names, and a remark :data:`NO_SHAPE` says which shapes that collide it lacks.
 
     Raises:
         InputError: the MJCF includes a file outside the folder, or has an element that the check does not cover.
     """
     parts: dict[str, Element] = {}
-    remarks, contained = _add(root, path, path.resolve(), inside, parts)
+    remarks, contained = _add(root, path, path.resolve(), inside, parts, contacts=contacts)
     root = next(iter(parts.values()))
     keyframes = tuple(_keyframe(key) for part in root.findall("keyframe") for key in part.findall("key"))
     for part in parts.values():
@@ -95,7 +98,7 @@ def _written_out(element: Element) -> float:
 
 
 def _add(
-    root: Element, path: Path, file: Path, inside: Path, parts: dict[str, Element]
+    root: Element, path: Path, file: Path, inside: Path, parts: dict[str, Element], *, contacts: bool
 ) -> tuple[list[LintRemark], bool]:
     """Adds the stripped copy of a file, and of the files that it attaches, to ``parts`` under unique names.
 
@@ -120,13 +123,15 @@ def _add(
         if element.tag in _UNCOVERED:
             raise InputError("file", path, f"the check does not cover <{element.tag}>")
     shapes = list(classed(root, "geom"))
+    looks = _LOOKS - {"contact"} if contacts else _LOOKS
     for parent in list(root.iter()):
         for child in list(parent):
-            if child.tag in _LOOKS:
+            if child.tag in looks:
                 parent.remove(child)
         parent.attrib.pop("material", None)
     remove_height_fields(root, shapes)
     remarks = [*remove_meshes(root, shapes, file.parent, inside), *_gravity_compensations(root)]
+    remarks += _lost_shapes(root, shapes) if contacts else []
     parts[f"{len(parts)}.xml"] = root
     for model in root.iter("model"):
         target = required_file(file.parent, model, inside)
@@ -134,7 +139,7 @@ def _add(
             raise InputError("<model file>", model.get("file"), f"more than {_MOST_MODELS} models are attached")
         model.attrib.setdefault("name", target.stem)
         model.set("file", f"{len(parts)}.xml")
-        noticed, within = _add(read_xml(target), path, target, inside, parts)
+        noticed, within = _add(read_xml(target), path, target, inside, parts, contacts=contacts)
         remarks, contained = [*remarks, *noticed], contained and within
     return remarks, contained
 
@@ -190,6 +195,23 @@ def _merge_worlds(root: Element) -> None:
     worlds[-1][:] = [child for world in worlds for child in world]
     for world in worlds[:-1]:
         root.remove(world)
+
+
+def _lost_shapes(root: Element, shapes: Sequence[Classed]) -> Iterator[LintRemark]:
+    """Yields a remark for each shape that collides and is no longer in the copy; removes the pairs that name it."""
+    kept = set(root.iter("geom"))
+    lost = [shape for shape in shapes if shape.element not in kept]
+    names = {shape.element.get("name") for shape in lost} - {None}
+    paired: set[str | None] = set()
+    for contact in root.findall("contact"):
+        for pair in [pair for pair in contact.findall("pair") if names & {pair.get("geom1"), pair.get("geom2")}]:
+            paired |= {pair.get("geom1"), pair.get("geom2")}
+            contact.remove(pair)
+    for shape in lost:
+        collides = any(shape.given.get(key, "1") != "0" for key in ("contype", "conaffinity"))
+        if collides or shape.element.get("name") in paired - {None}:
+            kind = "mesh" if shape.given.get("mesh") else "height field"
+            yield LintRemark("note", f"{kind} of {shape.body.get('name', 'the world')}", NO_SHAPE)
 
 
 def _gravity_compensations(root: Element) -> Iterator[LintRemark]:

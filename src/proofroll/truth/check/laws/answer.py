@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.truth.check.laws.determinacy import determinate_reactions
 from proofroll.truth.check.laws.integrals import integral
 from proofroll.truth.check.laws.joint_forces import law_of, target_of
 from proofroll.truth.check.laws.loads import BodyLoads
@@ -18,6 +19,7 @@ from proofroll.truth.check.laws.residuals import COARSE, INSTANT, LAWS, STRUCK, 
 from proofroll.truth.check.laws.samples import force_laws, kinetic_energy, on_the_motion
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.signals import value_of
+from proofroll.truth.check.laws.strikes import kicked, strikes_follow, struck_borders
 from proofroll.truth.check.laws.tiled import Turns, changed_velocity, laws_at_all_times, start_of
 from proofroll.truth.check.laws.tiles import Places, Tiles
 from proofroll.truth.check.laws.values import values_follow
@@ -119,17 +121,20 @@ def works_follow(
         _note(
             name, (published.values[name], places.at(work), natural + places.at(size)), published, residuals, bars[name]
         )
-    if any({"slip", SPREAD} & {*mode.contacts, *mode.rolling, *mode.spinning} for mode in tiles.modes):
-        return
-    if (changed_velocity(scene, tiles) > STRUCK).any():
+    rubs = [k for k, contact in enumerate(scene.contacts) if contact.pair.friction]
+    if any(
+        {"slip", SPREAD} & {*(mode.contacts[k] for k in rubs), *mode.rolling, *mode.spinning} for mode in tiles.modes
+    ):
         return
     energy, parts = kinetic_energy(scene, tiles)
+    lost, borders = np.zeros(len(energy)), struck_borders(scene, tiles)  # by what is struck
+    lost[borders + 1] = energy[borders + 1, 0] - energy[borders, -1]
     loads = BodyLoads(scene, tiles)
     power, size = loads.power + 0.0, loads.power_size + 0.0
     for number in range(len(scene.mechanism.joints)):
         joint_power = _passive_power(scene, tiles, turns, number)
         power, size = power + joint_power, size + np.abs(joint_power)
-    work = energy - energy[0, 0] - _summed(power, tiles)
+    work = energy - energy[0, 0] - _summed(power, tiles) + (kicked(scene, tiles) - np.cumsum(lost))[:, None]
     sizes = natural + places.at(_summed(size, tiles) + parts) + float(parts[0, 0])
     value = np.sum([published.values[name] for name in names], axis=0)
     _note("all drives", (value, places.at(work), sizes), published, residuals, sum(bars[name] for name in names))
@@ -241,6 +246,7 @@ class AnswerCheck:
                 start_of(scene, moving, residuals, struck)
                 break
         changes_of(scene, tiles, published, residuals, min(last, horizon - _UNCERTAIN * max(1 / scene.rate, horizon)))
+        strikes_follow(scene, tiles, turns, published, residuals, min(last, sure))
         reached = time.copy()
         for item in published.changes:  # within the bracket of an event a sample is that of the later side
             reached[(item.low <= time) & (time < item.time)] = item.time
@@ -253,6 +259,7 @@ class AnswerCheck:
         self.held = len(rows)
         if rows.size:
             published, places = self._of(published, turns, places, rows)
+            determinate_reactions(scene, published, residuals)
             works_follow(scene, tiles, turns, places, published, residuals)
             values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
             self._forces(published, tiles, places)

@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.check.laws.contacts import gap_of, slide_of
 from proofroll.truth.check.laws.integrals import norm, turned
 from proofroll.truth.check.laws.joints import coordinate_of
-from proofroll.truth.check.laws.record import Array, Passage, Pieces
+from proofroll.truth.check.laws.record import Array, BodyPoses, Passage, Pieces
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import FREE, HELD_PLACES, HELD_TURNS, JointFrames, LawScene
 from proofroll.truth.check.laws.surfaces import PairContact
@@ -62,7 +62,10 @@ def impact(scene: LawScene, passage: Passage, residuals: LawResiduals, fastest: 
     m, fast = scene.mechanism, scene.speed + float(np.abs(pieces_before.v).max())
     columns, moving, stops, driven = list[Array](), dict[str, Coordinate](), list[Stop](), dict[int, int]()
     for number, connection in enumerate(scene.connections):
-        columns += _held(scene, pieces_before, connection)
+        ends, place = (connection.b, connection.a), scene.placed(connection, pieces_before).origin_b[0, 0]
+        columns += [
+            _column(scene, pieces_before, ends, place, *pair) for pair in held(scene, pieces_before, connection)
+        ]
         if number < len(m.joints) and m.joints[number].nq == 1:
             moving[connection.name] = _coordinate(scene, passage, number)
             reached = _reached(scene, pieces_before, number, moving[connection.name])
@@ -113,18 +116,15 @@ def _column(
     return momenta[:-1].ravel()
 
 
-def _held(scene: LawScene, pieces_before: Pieces, connection: JointFrames) -> list[Array]:
-    """Columns of the impulses that a connection can give."""
-    placed = scene.placed(connection, pieces_before)
-    A, B, place = placed.A[0, 0], placed.B[0, 0], placed.origin_b[0, 0]
-    ends, none = (connection.b, connection.a), np.zeros(3)
+def held(scene: LawScene, pieces: BodyPoses, connection: JointFrames) -> list[tuple[Array, Array]]:
+    """Forces and moments on its second body that a connection can give, at its place there."""
+    placed, none = scene.placed(connection, pieces), np.zeros(3)
+    A, B = placed.A[0, 0], placed.B[0, 0]
     if connection.kind == DISTANCE:
-        apart = place - placed.origin_a[0, 0]
-        return [_column(scene, pieces_before, ends, place, apart / np.linalg.norm(apart), none)]
-    forces = [A[:, k] for k in HELD_PLACES.get(connection.kind, (0, 1, 2))]
-    moments = [np.cross(A[:, i], B[:, k]) for i, k in HELD_TURNS.get(connection.kind, ())]
-    columns = [_column(scene, pieces_before, ends, place, force, none) for force in forces]
-    return columns + [_column(scene, pieces_before, ends, place, none, moment) for moment in moments]
+        apart = (placed.origin_b - placed.origin_a)[0, 0]
+        return [(apart / np.linalg.norm(apart), none)]
+    forces = [(A[:, k], none) for k in HELD_PLACES.get(connection.kind, (0, 1, 2))]
+    return forces + [(none, np.cross(A[:, i], B[:, k])) for i, k in HELD_TURNS.get(connection.kind, ())]
 
 
 def _coordinate(scene: LawScene, passage: Passage, number: int) -> Coordinate:

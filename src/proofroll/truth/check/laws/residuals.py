@@ -50,10 +50,13 @@ LAWS: dict[str, tuple[float, str]] = {
     "times": (1e-14, "samples are at the times that were asked for"),
     "newton": (5e-11, "mass times acceleration = sum of the published forces"),
     "euler": (5e-11, "rate of angular momentum = sum of the published moments"),
+    "unknown": (1e-1, "what the laws of motion determine is known"),
     "along": (5e-11, "a joint transmits along a free direction what its drives, springs and friction give"),
     "power": (5e-11, "rate of the energy = power of the published forces"),
     "value": (1e-13, "a published value follows from places and velocities"),
     "spelling": (1e-13, "two variables of one quantity are equal"),
+    "strike": (1e-12, "what is told of an impact follows from the motion beside it"),
+    "rebound": (1e-11, "the rate of a gap or coordinate turns at an impact with the restitution"),
     "work": (1e-11, "work = integral of force times rate"),
     "change": (1e-11, "an event lies where the motion changes, and each change has its event"),
 }

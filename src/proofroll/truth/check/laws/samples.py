@@ -17,7 +17,7 @@ from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiles import Places, Tiles
 
 _ARM = 1e-2  # part of the natural length by which a force turns at least, for sizes of moments
-_NOISE = 20 * COUNT * 3e-14  # of a derivative at the end of a tile of unit half length, relative to the values
+NOISE = 20 * COUNT * 3e-14  # of a derivative at the end of a tile of unit half length, relative to the values
 _LEAST = 1e-3  # part of the mechanism's natural force that the size of forces on a body has at least, massless or not
 _DENSE = 100.0  # factor for samples on dense output of DOP853, whose long steps miss up to 1.4e-9 of a state inside
 _RANK = 1e-12  # relative singular value below which unknown forces are one
@@ -81,8 +81,8 @@ def _newton_and_euler(
     )
     half, bars = np.maximum(places.half, np.finfo(float).tiny)[:, None, None], published.bars
     off = (
-        _NOISE * (scene.speed + np.abs(pieces.v).max()) + bars["v_WB"],
-        _NOISE * (scene.rate + np.abs(pieces.w).max()) + bars["w_WB"],
+        NOISE * (scene.speed + np.abs(pieces.v).max()) + bars["v_WB"],
+        NOISE * (scene.rate + np.abs(pieces.w).max()) + bars["w_WB"],
     )
     digits = (
         loads.force_digits[..., :bodies] + mass * off[0] / half,
@@ -169,7 +169,7 @@ def _along(
             faster = places.rate(rate)[:, None]
             expected = expected - joint.armature * faster
             size = size + joint.armature * np.abs(faster)
-            noise = _NOISE / np.maximum(places.half, np.finfo(float).tiny)[:, None]
+            noise = NOISE / np.maximum(places.half, np.finfo(float).tiny)[:, None]
             digits = digits + joint.armature * noise * (scene.rate + np.abs(rate).max())
         if axis.turns:
             size = size + np.nan_to_num(norm(wrench[..., :3])) * _ARM * scene.length
@@ -203,6 +203,6 @@ def _power(
     rate, natural = places.rate(total)[:, None], scene.mass.sum() * scene.speed**2
     sizes = np.nan_to_num(loads.power_size) + (natural + places.at(size)[:, None]) * scene.rate
     sizes = sizes + scene.force * norm(published.pieces.v).max(-1)
-    noise = _NOISE * (natural + places.at(size)[:, None]) + published.bars["energy"]
+    noise = NOISE * (natural + places.at(size)[:, None]) + published.bars["energy"]
     noise = noise / np.maximum(places.half, np.finfo(float).tiny)[:, None]
     residuals.note("power", "", rate - loads.power, sizes, published.pieces.time, noise)

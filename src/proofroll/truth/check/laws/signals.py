@@ -39,7 +39,7 @@ def value_of(signal: Any, time: Array) -> Array:
     if hasattr(signal, "text"):
         second, factor = getattr(signal, "second", 1.0), getattr(signal, "factor", 1.0)  # of one in other units
         names = {"t": second * time - getattr(signal, "delay", 0.0), **dict(signal.numbers)}
-        value = factor * _formula(signal.text, names)
+        value = factor * formula(signal.text, names)
     elif hasattr(signal, "times"):
         value = _of_table(signal, (time[:, :1] + time[:, -1:]) / 2 if signal.hold else time)
     else:
@@ -50,7 +50,7 @@ def value_of(signal: Any, time: Array) -> Array:
 def pull_by(law: Any, length: Array, rate: Array) -> Array:
     """Pull of a spring with a formula of its own [N], at lengths [m] and their rates [m/s], (pieces, points)."""
     metre, speed, newton = law.units
-    value = _formula(law.text, {"L": metre * length, "dL": speed * rate, **dict(law.numbers)}) / newton
+    value = formula(law.text, {"L": metre * length, "dL": speed * rate, **dict(law.numbers)}) / newton
     return np.asarray(np.broadcast_to(np.asarray(value, float), length.shape))
 
 
@@ -70,8 +70,8 @@ def _parsed(text: str) -> ast.expr:
     return ast.parse(text.replace("^", "**").strip(), mode="eval").body
 
 
-def _formula(text: str, names: Mapping[str, Any]) -> Any:
-    """Value of a formula whose variables are arrays (pieces, points)."""
+def formula(text: str, names: Mapping[str, Any]) -> Any:
+    """Value of a formula whose variables are numbers, or arrays (pieces, points)."""
     with np.errstate(all="ignore"):
         return _evaluated(_parsed(text), {"pi": np.pi, **names})
 

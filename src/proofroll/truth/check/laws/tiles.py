@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -31,6 +31,7 @@ class Tiles(BodyPoses):
         borders: times at which stretches meet, those without a tile included [s].
         resolved: False of a tile in which no polynomial follows the states, as in the last instants of a slip.
         drives: forces whose work is a result [N, N m], (tiles, points, drives); without any where none was asked for.
+        impulses: time of each impact [s], and impulses along driven joints by their numbers [N s, N m s].
     """
 
     stretch: NDArray[np.intp]
@@ -38,6 +39,7 @@ class Tiles(BodyPoses):
     resolved: NDArray[np.bool_]
     borders: Array = field(default_factory=lambda: np.zeros(0))
     drives: Array = field(default_factory=lambda: np.zeros(0))
+    impulses: tuple[tuple[float, Mapping[int, float]], ...] = ()
 
     def ordered(self, order: NDArray[np.intp]) -> Tiles:
         """Tiles in another order, or some of them."""

@@ -10,7 +10,7 @@ from proofroll.truth.check.laws.contacts import gap_of, slide_of
 from proofroll.truth.check.laws.integrals import dot, norm, of_angles, of_quaternion, turned
 from proofroll.truth.check.laws.joints import coordinate_of
 from proofroll.truth.check.laws.loads import bushing_load, rotation_vector, spring_ends, spring_pull
-from proofroll.truth.check.laws.record import Array, PublishedValues
+from proofroll.truth.check.laws.record import Array, BodyPoses, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 
@@ -52,11 +52,9 @@ def _coordinates(scene: LawScene, published: PublishedValues, residuals: LawResi
             residuals.note("value", f"{name}.{joint.name}", off, size + np.abs(value), pieces.time)
 
 
-def _energies(
-    scene: LawScene, published: PublishedValues, residuals: LawResiduals, kinetic: tuple[Array, Array]
-) -> None:
-    """Energy is kinetic, of gravity, and of springs."""
-    m, pieces, (total, size) = scene.mechanism, published.pieces, kinetic
+def energy_of(scene: LawScene, pieces: BodyPoses, kinetic: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Energy, and the sizes of its parts [J], from kinetic energy and that of gravity; ``pieces`` tell whole turns."""
+    m, (total, size) = scene.mechanism, kinetic
     size = size + _PART * scene.mass.sum() * scene.speed**2
     for spring in m.springs:
         ends = spring_ends(scene, pieces, spring)
@@ -72,7 +70,7 @@ def _energies(
         part = 0.5 * (stretched**2 @ stiffness[:3] + bent**2 @ stiffness[3:])
         total = total + part
         size = size + part + _PART * (stiffness[:3].max() * scene.length**2 + stiffness[3:].max())
-    assert pieces.turns is not None  # of all samples
+    assert pieces.turns is not None
     for number, joint in enumerate(m.joints):
         if not joint.stiffness:
             continue
@@ -83,6 +81,15 @@ def _energies(
             part = 0.5 * joint.stiffness * (place - joint.rest) ** 2
             unit = 1.0 if turns else scene.length
             total, size = total + part, size + part + _PART * joint.stiffness * unit**2
+    return total, size
+
+
+def _energies(
+    scene: LawScene, published: PublishedValues, residuals: LawResiduals, kinetic: tuple[Array, Array]
+) -> None:
+    """Energy is kinetic, of gravity, and of springs."""
+    pieces = published.pieces
+    total, size = energy_of(scene, pieces, kinetic)
     energy = published.values["energy"][:, None]
     residuals.note("value", "energy", energy - total, size, pieces.time)
     for name in ("energy_error", "energy_change"):

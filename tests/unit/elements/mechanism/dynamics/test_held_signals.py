@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from proofroll import Refused, simulate
+from proofroll import simulate
 from proofroll.core.errors import InputError
 from proofroll.core.multi_element import asking, build
 from proofroll.core.parameters import Parameters
@@ -246,18 +246,6 @@ def test_a_policy_that_is_not_there(name: str, says: str) -> None:
     """The name of a policy that cannot be found is one line."""
     with pytest.raises(InputError, match=says):
         PolicySource(name)
-
-
-def test_contacts_under_held_targets_are_refused() -> None:
-    """The truth of a robot on the ground under held targets is refused, with the reason."""
-    from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
-
-    scene = SCENES["table"]
-    (element,) = scene.elements
-    shapes = (Geometry("foot", "shank", "sphere", radius=0.02), Geometry("floor", "world", "plane"))
-    mechanism = replace(element.mechanism, geometries=shapes, pairs=(Pair("step", ("foot", "floor"), 0.5),))
-    with pytest.raises(Refused, match="contacts under held targets"):
-        simulate(replace(scene, elements=(MechanismElement(mechanism),)), until=0.1)
 
 
 def test_a_run_tells_what_its_policy_set() -> None:

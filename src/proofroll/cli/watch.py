@@ -1,0 +1,136 @@
+"""Command ``watch``: a scene run again whenever its files change."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from proofroll.cli import options
+from proofroll.core.errors import InputError, ProofrollError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.running.idle_workers import Workers
+
+# Engines that are run, as far as they are installed and can represent the scene.
+_ENGINES = ("mujoco", "exudyn", "pinocchio")
+# Interval between two looks at the files, and limit of a run [s].
+_LOOK, _LIMIT = 0.3, 30.0
+# Share of an interval of whole milliseconds in a run, which steps of 1, 2 and 5 ms divide.
+_INTERVALS, _UNIT = 100, 0.01
+
+
+def watch(
+    scene: options.SceneName,
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Only this engine: its name, or name[key=value,…]; repeat.", autocompletion=options.runs_like
+        ),
+    ] = None,
+    settings: options.Set = None,
+    _root: options.Root = None,
+    control: options.Control = None,
+    until: options.Until = None,
+    out: Annotated[Path, typer.Option(help="Page to write, which loads itself again in a browser.")] = Path(
+        "watch.html"
+    ),
+    once: Annotated[bool, typer.Option("--once", help="Run the scene as it is now, and end.")] = False,
+) -> None:
+    """Run a scene in three engines whenever its files are saved, in motion on a page that reloads. Ctrl-C ends it.
+
+    The page has every engine that is done beside the truth. A file that makes no sense is one line here, and the page
+    stays.
+    """
+    from proofroll.running.idle_workers import Workers
+
+    options.require_writable(out)
+    options.require_pages()
+    if out.suffix.lower() != ".html":
+        raise InputError("--out", out, "what is watched is a page: end the name of the file in .html")
+    named, seen, workers = options.controlled(scene, control), "", Workers(patience=_LIMIT)
+    while True:
+        if (now := _written(scene, control)) != seen:
+            seen = now
+            try:
+                _show(named, engine or _ENGINES, options.assignments(settings), until, out, workers)
+            except ProofrollError as problem:
+                if once:
+                    raise
+                options.complain(str(problem))
+            if once:
+                return
+        time.sleep(_LOOK)
+
+
+def _written(scene: str, control: Path | None) -> str:
+    """Names, times and sizes of the files beside those of a scene, which change when one is saved."""
+    from proofroll.files.scene_sources import resolved
+
+    places = [Path(resolved(scene)), *([control.resolve()] if control else [])]
+    folders = {place if place.is_dir() else place.parent for place in places}
+    files = sorted(file for folder in folders for file in folder.iterdir() if file.is_file())
+    stats = [(file, file.stat()) for file in files]
+    return repr([(str(file), stat.st_mtime_ns, stat.st_size) for file, stat in stats])
+
+
+def _write(out: Path, scene: str, runs: Sequence[xr.Dataset], begun: float, **others: Any) -> None:
+    """Writes the page of runs, and the script that tells it that it is a new one; ``others``: of the replay page."""
+    from proofroll.report.run.replay import replay_page
+    from proofroll.running.store import write_text
+
+    version = str(time.time_ns())
+    write_text(out, replay_page(out, runs[0], scene, runs[1:], script=f"{out.stem}.js", version=version, **others))
+    write_text(out.with_suffix(".js"), f"window.proofrollVersion = {version!r};\n")
+    shown = ", ".join([*(str(run.attrs["engine"]) for run in runs), *(["truth"] if "true" in others else [])])
+    options.complain(f"{out}: {shown}, {time.monotonic() - begun:.1f} s")
+
+
+def _show(
+    scene: str, engines: Sequence[str], settings: dict[str, str], until: float | None, out: Path, workers: Workers
+) -> None:
+    """Runs a scene in engines one after another, and writes the page after each.
+
+    Raises:
+        ProofrollError: the scene makes no sense, or no engine runs it.
+    """
+    import tempfile
+    from functools import partial
+
+    from proofroll.core.truth import truth
+    from proofroll.files.trajectory_file import STORED, import_xarray, read
+    from proofroll.running.runner import run_one
+    from proofroll.studies.cases import length_of, scene_of_run, single_case
+
+    import_xarray()
+    loaded, length = scene_of_run(scene, settings), length_of(scene, until)
+    every = max(_UNIT, round(length / _INTERVALS / _UNIT) * _UNIT)
+    runs: list[xr.Dataset] = []
+    true: xr.Dataset | None = None
+    page = partial(_write, begun=time.monotonic())
+    with tempfile.TemporaryDirectory() as folder:
+        for name in engines:
+            try:
+                case = single_case(scene, settings, name, until=length, every=every, time_limit=_LIMIT, workers=workers)
+                target = Path(folder) / f"{len(runs)}{STORED}"
+                result = run_one(case, target, workers)
+            except ProofrollError as problem:
+                options.complain(f"{name}: {problem}")
+                continue
+            if result.trajectory is None:
+                options.complain(f"{name} {result.status}: {result.message}")
+                continue
+            runs.append(read(target).load())
+            if true is None:
+                page(out, scene, runs, untold="its truth is still being computed")
+            longest = max((run["time"].to_numpy() for run in runs), key=len)
+            if true is None or true.sizes["time"] < len(longest):
+                true = truth(loaded.fully_asked, longest)
+            page(out, scene, runs, true=true)
+    if not runs:
+        raise ProofrollError(f"{scene}: no engine runs it; proofroll engines tells what is installed")

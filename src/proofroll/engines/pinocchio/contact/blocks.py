@@ -1,0 +1,169 @@
+"""Impulses of a step by blocks: Gauss-Seidel over contacts with their exact cones, dry friction and stops of joints.
+
+It takes Pinocchio's matrices, and finds impulses where Pinocchio's own solvers stop, as with dry friction in joints.
+Each block is solved exactly for the impulses of the others: a contact sticks, or slips along a direction that is the
+root of one equation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.elements.mechanism.scene.rotations import Array
+
+# Change of velocity in a sweep, relative to the largest speed, at which it ends; and largest number of sweeps.
+_SETTLED, _SWEEPS = 1e-12, 2000
+_TURNS, _LONGEST_TURN = 40, 0.7  # steps of a search for a direction, and the longest of them [rad]
+_ALONG = 1e-10  # slip across a direction, relative to the largest speed, that is found
+
+
+class Block(NamedTuple):
+    """Rows of one contact, or of one joint's friction or stop.
+
+    Attributes:
+        first: number of the first row; those of a contact are two slips and the normal.
+        friction: coefficient of a contact; None: a joint's row.
+        bound: largest impulse of a joint's dry friction [N m s or N s]; inf: a stop, which only presses.
+    """
+
+    first: int
+    friction: float | None
+    bound: float = math.inf
+
+    @property
+    def rows(self) -> slice:
+        """All rows."""
+        return slice(self.first, self.first + (1 if self.friction is None else 3))
+
+
+class BlockSolver:
+    """Solver of a run, which begins each time with the impulses of the last.
+
+    Attributes:
+        solved: number of problems that it has solved.
+    """
+
+    def __init__(self, tolerance: float) -> None:
+        """``tolerance``: largest change of velocity in the last sweep, relative to the largest speed."""
+        self._tolerance, self._last, self.solved = tolerance, dict[int, Array](), 0
+
+    def impulses(self, G: Array, g: Array, blocks: Mapping[int, Block]) -> Array | None:
+        """Impulses of the rows; None: the sweeps do not reach the tolerance.
+
+        Args:
+            G: Delassus matrix of the rows.
+            g: their velocities without impulses, with shifts.
+            blocks: all rows, by a number that a contact or joint keeps from step to step.
+        """
+        guess = np.zeros(len(g))
+        for number, block in blocks.items():
+            guess[block.rows] = self._last.get(number, 0.0)
+        impulses, change = impulses_by_blocks(G, g, list(blocks.values()), guess)
+        self._last = {number: impulses[block.rows] for number, block in blocks.items()}
+        if not change <= self._tolerance:
+            return None
+        self.solved += 1
+        return impulses
+
+
+def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array) -> tuple[Array, float]:
+    """Impulses, and the change of velocity in the last sweep relative to the largest speed; see :class:`BlockSolver`.
+
+    ``guess``: impulses to begin with.
+    """
+    f, speed = guess.copy(), float(np.abs(g).max()) or 1.0
+    u, change = g + G @ f, math.inf
+    mobilities = [G[block.rows, block.rows].tolist() for block in blocks]
+    for _ in range(_SWEEPS):
+        change = 0.0
+        for block, mobility in zip(blocks, mobilities, strict=True):
+            rows = block.rows
+            old, velocities = f[rows].tolist(), u[rows].tolist()
+            if block.friction is None:
+                impulse = old[0] - velocities[0] / mobility[0][0]
+                new = [max(impulse, 0.0 if math.isinf(block.bound) else -block.bound)]
+                new = [min(new[0], block.bound)]
+            else:
+                free = [
+                    velocity - sum(row[k] * old[k] for k in range(3))
+                    for velocity, row in zip(velocities, mobility, strict=True)
+                ]
+                new = _contact(mobility, free, block.friction, old, speed)
+            steps = [a - b for a, b in zip(new, old, strict=True)]
+            if any(steps):
+                u += steps @ G[rows]
+                f[rows] = new
+                change = max(change, *(abs(step * mobility[k][k]) for k, step in enumerate(steps)))
+        if not change > _SETTLED * speed:
+            break
+    return f, change / speed
+
+
+def _contact(
+    G: Sequence[Sequence[float]], b: Sequence[float], mu: float, guess: Sequence[float], speed: float
+) -> list[float]:
+    """Impulse of a contact: slips and normal; ``b``: its velocity without it, ``guess``: the one before."""
+    if b[2] >= 0:
+        return [0.0, 0.0, 0.0]
+    if not mu:
+        return [0.0, 0.0, -b[2] / G[2][2]]
+    x, y, normal = _sticking(G, b)
+    if normal > 0 and math.hypot(x, y) <= mu * normal:
+        return [x, y, normal]
+    best, least = list(guess), math.inf
+    directions = [(-guess[0], -guess[1]), (b[0], b[1]), (-x, -y)]
+    for x, y in directions:
+        if not (x or y):
+            continue
+        impulse, off = _slipping(G, b, mu, math.atan2(y, x))
+        if off < least:
+            best, least = impulse, off
+        if least < _ALONG * speed:
+            break
+    return best
+
+
+def _sticking(G: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[float, float, float]:
+    """Impulse by which a contact comes to rest: the solution of G f = -b."""
+    (g00, g01, g02), (_, g11, g12), (_, _, g22) = G
+    c00, c01, c02 = g11 * g22 - g12 * g12, g02 * g12 - g01 * g22, g01 * g12 - g02 * g11
+    c11, c12, c22 = g00 * g22 - g02 * g02, g01 * g02 - g00 * g12, g00 * g11 - g01 * g01
+    size = -(g00 * c00 + g01 * c01 + g02 * c02)
+    return (
+        (b[0] * c00 + b[1] * c01 + b[2] * c02) / size,
+        (b[0] * c01 + b[1] * c11 + b[2] * c12) / size,
+        (b[0] * c02 + b[1] * c12 + b[2] * c22) / size,
+    )
+
+
+def _slipping(G: Sequence[Sequence[float]], b: Sequence[float], mu: float, angle: float) -> tuple[list[float], float]:
+    """Impulse N (-mu cos, -mu sin, 1) of a slip in the direction of an angle near this one, and the slip across it.
+
+    N stops the approach; the direction is that of the slip that is left. The slip across is inf where none is found.
+    """
+    (g00, g01, g02), (_, g11, g12), (_, _, g22) = G
+    step = math.inf
+    for _ in range(_TURNS):
+        c, s = math.cos(angle), math.sin(angle)
+        press = g22 - mu * (g02 * c + g12 * s)
+        if press <= 0:
+            return [0.0, 0.0, 0.0], math.inf
+        normal = -b[2] / press
+        pull_x, pull_y = g02 - mu * (g00 * c + g01 * s), g12 - mu * (g01 * c + g11 * s)
+        x, y = b[0] + normal * pull_x, b[1] + normal * pull_y
+        if abs(step) < _SETTLED:
+            break
+        rate = normal * mu * (g12 * c - g02 * s) / press
+        dx = rate * pull_x + normal * mu * (g00 * s - g01 * c)
+        dy = rate * pull_y + normal * mu * (g01 * s - g11 * c)
+        slope = c * dy - s * dx - (s * y + c * x)
+        if not slope:
+            break
+        step = min(max(-(c * y - s * x) / slope, -_LONGEST_TURN), _LONGEST_TURN)
+        angle += step
+    impulse = [-mu * normal * c, -mu * normal * s, normal]
+    return impulse, abs(c * y - s * x) if c * x + s * y >= 0 else math.inf

@@ -1,0 +1,340 @@
+"""Shapes of a robot file that touch, its floor and their pairs, as tables of a scene.
+
+MuJoCo's own search finds the pairs, and says with which coefficients it combines two shapes: so all that a file can say
+of who touches whom needs no rules of ours. Of a URDF the pairs with a floor count, as it says nothing of others.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import fromstring, tostring
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.errors import InputError, require_known
+from proofroll.core.limits import TIME_LIMIT
+from proofroll.core.number_format import counted
+from proofroll.elements.mechanism import WORLD
+from proofroll.elements.mechanism.scene.rotations import to_rpy
+from proofroll.files.json_data import plain
+from proofroll.robots.files import reading
+from proofroll.robots.files.meaning import by_definer, opened
+from proofroll.robots.files.mjcf.compiler import near_shapes
+from proofroll.robots.files.mjcf.parse import NO_SHAPE
+from proofroll.robots.files.robot_file import RobotFile, read_xml
+from proofroll.robots.files.urdf import BASE_JOINT
+from proofroll.robots.model import NO_BODY, Array, Robot
+from proofroll.robots.states import RobotStates
+
+# What a robot stands on: the number of each in the parameter ``ground`` of a scene.
+NO_GROUND, OF_FILE, ON_A_PLANE = "none", "file", "plane"
+GROUNDS = (NO_GROUND, OF_FILE, ON_A_PLANE)
+FLOOR = "floor"
+_NAMED = 4  # links in a clause
+_FRICTION = 1.0  # of shapes of a URDF, which has none
+_ANOTHER_WAY = "give [ground] feet = {LINK = radius}, or take --ground none"
+# Pairs of shapes that have a rule of contact in a scene.
+_RULED = {frozenset(("plane", kind)) for kind in ("sphere", "capsule", "box", "cylinder", "ellipsoid")} | {
+    frozenset(("sphere", "capsule")),
+    frozenset(("sphere", "box")),
+    frozenset(("sphere", "cylinder")),
+    frozenset(("capsule", "box")),
+    *(frozenset((kind,)) for kind in ("sphere", "capsule", "box")),
+}
+_ROUND = ("sphere", "capsule")  # a margin around these is a larger radius
+_THIN = 1e-3  # m: margin around other shapes that is left out
+_REBOUNDS = 0.5  # damping ratio of a soft contact below which it visibly rebounds
+_SLIDES, _SPINS, _ROLLS = 1, 4, 6  # dimensions of MuJoCo's contacts without friction, and with more than sticking
+
+
+class GroundTables(NamedTuple):
+    """Tables of what a robot touches.
+
+    Attributes:
+        geometries, pairs: tables of a scene.
+        about: clause on what stands on what, for people.
+        left_out: clauses on shapes that collide in the file and not here.
+    """
+
+    geometries: list[dict[str, Any]]
+    pairs: list[dict[str, Any]]
+    about: str
+    left_out: list[str]
+
+
+@dataclass(frozen=True)
+class StandingRobot:
+    """A robot at its start, with what holds its joints.
+
+    Attributes:
+        file, robot: the file and its robot.
+        bodies: link that moves -> its body in the scene.
+        start: its state.
+        servos: joint -> gains kp and kd and target of its servo.
+        drop: height of its lowest shape over the floor [m]; None: as in the file.
+    """
+
+    file: RobotFile
+    robot: Robot
+    bodies: Mapping[str, str]
+    start: RobotStates
+    servos: Mapping[str, tuple[float, float, float]]
+    drop: float | None = None
+
+    def armature(self, joint: str) -> float:
+        """Inertia that is added to a joint's own coordinate."""
+        return next(item.armature for item in self.robot.moving if item.name == joint)
+
+    def place(self, link: str) -> tuple[str, Array, Array]:
+        """Body of the scene that carries a link, with the place [m] and axes of the link in it."""
+        home, p, R = self.robot.welded[link]
+        carrier = next((joint.child for joint in self.robot.moving if joint.name == home), NO_BODY)
+        return (self.bodies[carrier] if carrier != NO_BODY else WORLD), p, R
+
+
+def ground_tables(
+    standing: StandingRobot, ground: str, feet: str | Mapping[str, float], friction: float | None
+) -> GroundTables:
+    """Shapes and pairs of a robot on a ground.
+
+    Args:
+        standing: the robot.
+        ground: one of :data:`GROUNDS` but the first.
+        feet: link -> radius of a ball at its origin [m]; or a word: the shapes of the file.
+        friction: coefficient of all pairs with a floor; None: that of the file, or 1 where it has none.
+
+    Raises:
+        InputError: shapes touch that no scene has, or none touches.
+    """
+    if not isinstance(feet, str):
+        return _balls(standing, feet, _FRICTION if friction is None else friction)
+    file = standing.file
+    of_urdf = file.kind == "urdf"
+    content, lost = _with_contacts(file)
+    asked = {
+        "start": _coordinates(standing.start),
+        "servos": {name: [*gains, standing.armature(name)] for name, gains in standing.servos.items()},
+        "base_joint": BASE_JOINT if of_urdf and file.base == "free" else "",
+        "floor": of_urdf or ground == ON_A_PLANE,
+        "drop": standing.drop,
+    }
+    found = _near(file.path, file.kind, content, json.dumps(plain(asked)))
+    shapes = [_shape(standing, row) for row in found["shapes"]]
+    pairs = [_NearPair(**row | {"shapes": tuple(shapes[k] for k in row["shapes"])}) for row in found["pairs"]]
+    pairs = [pair for pair in pairs if pair.moves and (pair.on_floor or not of_urdf)]
+    return _tables(file, pairs, friction, lost)
+
+
+class _Shape(NamedTuple):
+    """A shape of the file: unique name, body of the scene and its link, MuJoCo's kind and size, pose in the body."""
+
+    name: str
+    body: str
+    link: str
+    kind: str
+    size: Sequence[float]
+    p: Array
+    R: Array
+
+    def table(self, margin: float) -> dict[str, Any]:
+        """Table of the geometry, with a margin added around it."""
+        grown = f"{self.name} and {margin:g} m" if margin else self.name
+        row: dict[str, Any] = {"name": grown, "body": self.body, "kind": self.kind, "position": self.p.tolist()}
+        size, axis = list(self.size), self.R[:, 2].tolist()
+        if self.kind == "plane":
+            return row | {"normal": axis}
+        if self.kind == "sphere":
+            return row | {"radius": size[0] + margin}
+        if self.kind in {"capsule", "cylinder"}:
+            return row | {"radius": size[0] + margin, "length": 2 * size[1], "axis": axis}
+        turned = {"orientation": list(to_rpy(self.R))}
+        return row | turned | ({"size": [2 * half for half in size]} if self.kind == "box" else {"axes": size})
+
+
+@dataclass(frozen=True)
+class _NearPair:
+    """Two shapes that come near each other, the one of the world last, with MuJoCo's laws of their contact.
+
+    Attributes:
+        dim: its dimension; 1: without friction.
+        friction: coefficients along two directions [1], of spin [m], of rolling about two axes [m].
+        softness: time constant [s] and damping ratio, or two negative numbers.
+        margin: distance from which it presses [m].
+        distance: the least one that was seen [m].
+    """
+
+    shapes: tuple[_Shape, ...]
+    dim: int
+    friction: Sequence[float]
+    softness: Sequence[float]
+    margin: float
+    distance: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "shapes", tuple(sorted(self.shapes, key=lambda shape: shape.body == WORLD)))
+
+    @property
+    def moves(self) -> bool:
+        """True if the shapes are of two bodies."""
+        return self.shapes[0].body != self.shapes[1].body
+
+    @property
+    def on_floor(self) -> bool:
+        """True if one shape is a plane of the world."""
+        return self.shapes[1].kind == "plane" and self.shapes[1].body == WORLD
+
+    @property
+    def grown(self) -> int | None:
+        """Number of the shape to which the margin is added; None: there is no margin, or no round shape."""
+        rounds = [place for place, shape in enumerate(self.shapes) if shape.kind in _ROUND]
+        return rounds[0] if self.margin > 0 and rounds else None
+
+    def reasons(self) -> Iterator[str]:
+        """Reasons that a scene has no such pair."""
+        kinds = [shape.kind for shape in self.shapes]
+        if frozenset(kinds) not in _RULED:
+            yield " on ".join(kinds)
+        if self.dim > _SLIDES and self.friction[0] != self.friction[1]:
+            yield "friction of another size along another direction"
+        if self.dim >= _ROLLS and self.friction[3] != self.friction[4]:
+            yield "rolling friction of another size about another axis"
+        several = {"capsule", "cylinder", "box"} & set(kinds) and "sphere" not in kinds
+        if several and (self.table(None).keys() & {"spinning_friction", "rolling_resistance"}):
+            yield f"{' on '.join(kinds)} with friction against turning"
+        if self.margin > _THIN and self.grown is None:
+            yield f"a margin of {self.margin:g} m around {kinds[0]}"
+        if self.softness[0] > 0 and self.softness[1] < _REBOUNDS:
+            yield "a contact that rebounds by its softness"
+
+    def table(self, friction: float | None) -> dict[str, Any]:
+        """Table of the pair's laws; ``friction``: in place of the file's."""
+        coefficient = friction if friction is not None and self.on_floor else self.friction[0]
+        rows: dict[str, Any] = {"friction": float(coefficient) if self.dim > _SLIDES else 0.0}
+        if self.dim >= _SPINS and self.friction[2]:
+            rows["spinning_friction"] = float(self.friction[2])
+        if self.dim >= _ROLLS and self.friction[3]:
+            rows["rolling_resistance"] = float(self.friction[3])
+        return rows
+
+
+def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None, lost: list[str]) -> GroundTables:
+    """Tables of pairs that a scene has; those that do not touch are left out where it has not.
+
+    Raises:
+        InputError: shapes touch that no scene has, or none comes near another.
+    """
+    geometries: dict[str, dict[str, Any]] = {}
+    rows, left_out, wrong = list[dict[str, Any]](), list(lost), list[str]()
+    for pair in pairs:
+        names = " and ".join(shape.name for shape in pair.shapes)
+        if reasons := list(pair.reasons()):
+            if pair.distance > max(pair.margin, 0.0):
+                left_out.append(f"contact of {names}, {1e3 * pair.distance:.0f} mm apart ({reasons[0]})")
+            else:
+                wrong.append(f"{names} ({reasons[0]})")
+            continue
+        ends = [shape.table(pair.margin if place == pair.grown else 0.0) for place, shape in enumerate(pair.shapes)]
+        geometries |= {end["name"]: end for end in ends}
+        rows.append({"name": f"{ends[0]['name']} on {ends[1]['name']}", "geometries": [end["name"] for end in ends]})
+        rows[-1] |= pair.table(friction)
+    if wrong:
+        more = f" and {counted(len(wrong) - 1, 'other pairs')}" if len(wrong) > 1 else ""
+        raise InputError("ground", file.path, f"a scene has no contact of {wrong[0]}{more}; {_ANOTHER_WAY}")
+    if not rows:
+        advice = (
+            "no shape of it comes near a floor or another shape within a second; give [ground] feet = {LINK = radius}"
+        )
+        raise InputError("ground", file.path, f"{advice}, or take --ground plane")
+    return GroundTables(list(geometries.values()), rows, _about(geometries, rows), left_out)
+
+
+def _balls(standing: StandingRobot, feet: Mapping[str, float], friction: float) -> GroundTables:
+    """Balls at the origins of links, on the plane z = 0."""
+    geometries: dict[str, dict[str, Any]] = {}
+    for link, radius in feet.items():
+        require_known("ground.feet", link, standing.robot.welded, "the robot has no such link; choose from")
+        body, p, R = standing.place(link)
+        if body == WORLD:
+            raise InputError("ground.feet", link, "this link does not move; name one that does")
+        shape = _Shape(name=link, body=body, link=link, kind="sphere", size=(radius,), p=p, R=R)
+        geometries[link] = shape.table(0.0)
+    rows = [{"name": link, "geometries": [link, FLOOR], "friction": friction} for link in geometries]
+    geometries[FLOOR] = {"name": FLOOR, "body": WORLD, "kind": "plane"}
+    return GroundTables(list(geometries.values()), rows, _about(geometries, rows), ["shapes of the file"])
+
+
+def _about(geometries: Mapping[str, Mapping[str, Any]], pairs: Sequence[Mapping[str, Any]]) -> str:
+    """Clause on what stands on what."""
+    floors = {name for name, row in geometries.items() if row["kind"] == "plane" and row["body"] == WORLD}
+    on_floor = [pair for pair in pairs if floors & set(pair["geometries"])]
+    feet = {name for pair in on_floor for name in pair["geometries"]} - floors
+    least, *_, most = sorted(f"{pair['friction']:g}" for pair in on_floor) * 2 or [""] * 2
+    rough = f"friction {least}" if least == most else f"friction {least} to {most}"
+    stands = f"{counted(len(feet), 'shapes')} on a floor, {rough}" if on_floor else "no floor"
+    others = len(pairs) - len(on_floor)
+    return f"{stands}; {counted(others, 'other pairs')}" if others else stands
+
+
+def _shape(standing: StandingRobot, row: Mapping[str, Any]) -> _Shape:
+    """A shape that MuJoCo's process described."""
+    body, p, R = standing.place(row["body"])
+    name = row["name"] or f"{row['body'] or WORLD} shape {row['number']}"
+    return _Shape(
+        name=name.translate(dict.fromkeys(map(ord, "./\\"), "_")),
+        body=body,
+        link=row["body"],
+        kind=row["kind"],
+        size=row["size"],
+        p=p + R @ np.array(row["position"]),
+        R=R @ np.array(row["rotation"]),
+    )
+
+
+def _coordinates(start: RobotStates) -> dict[str, list[float]]:
+    """Joint -> coordinates of a start, as :func:`proofroll.robots.importers.mujoco_shapes.near_shapes` takes them."""
+    rows: dict[str, list[float]] = {name: values[:1].tolist() for name, values in start.angle.items()}
+    for name, matrices in start.rotation.items():
+        turned = Rotation.from_matrix(matrices[0]).as_quat(scalar_first=True).tolist()
+        rows[name] = [*start.position[name][0].tolist(), *turned] if name in start.position else turned
+    return rows
+
+
+def _with_contacts(file: RobotFile) -> tuple[bytes, list[str]]:
+    """Text of the copy of a file that keeps its contacts, and clauses on shapes that it lacks."""
+    if file.kind == "urdf":
+        links = [link for link in read_xml(file.path).iter("link") if link.find("collision//mesh") is not None]
+        return tostring(file.root, "utf-8"), _meshes([link.get("name", "") for link in links])
+    copy = opened(file.path, file.base, contacts=True)
+    lost = dict.fromkeys(remark.where for remark in copy.remarks if remark.what == NO_SHAPE)
+    meshes = [where.removeprefix("mesh of ") for where in lost if where.startswith("mesh of ")]
+    return tostring(copy.root, "utf-8"), [
+        *_meshes(meshes),
+        *(where for where in lost if not where.startswith("mesh of ")),
+    ]
+
+
+def _meshes(links: Sequence[str]) -> list[str]:
+    """Clause on the meshes of links that collide in a file."""
+    if not links:
+        return []
+    named = ", ".join(links[:_NAMED]) + (f" and {counted(len(links) - _NAMED, 'others')}" if links[_NAMED:] else "")
+    return [f"collision meshes of {named}"]
+
+
+@lru_cache(maxsize=8)
+def _near(path: Path, kind: str, content: bytes, asked: str) -> dict[str, Any]:
+    """Shapes that come near each other in a robot file of this content; see the function that answers."""
+    file = RobotFile(path, kind, fromstring(content))
+    with tempfile.TemporaryDirectory() as folder:
+        copy = reading.write(file, Path(folder))
+        found, _ = by_definer(
+            "mjcf", path, None, lambda worker: near_shapes(worker, path, copy, json.loads(asked), TIME_LIMIT)
+        )
+    return found

@@ -1,0 +1,170 @@
+"""Shapes of a robot that come near each other in a run of MuJoCo's, with the laws that it combines for each pair."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.robots.protocol import lift
+
+# Distance that counts as near, and the largest one between a floor and the lowest shape above it [m].
+_NEAR, _HIGH = 0.02, 10.0
+# Duration of the run [s], and its largest number of steps times velocities.
+_SECONDS, _MOST = 1.0, 2e5
+_KINDS = {
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")): name.lower().replace("hfield", "height field")
+    for name in ("plane", "sphere", "capsule", "box", "cylinder", "ellipsoid", "mesh", "hfield", "sdf")
+}
+
+
+def near_shapes(
+    path: Path,
+    start: Mapping[str, Sequence[float]],
+    servos: Mapping[str, Sequence[float]],
+    base_joint: str,
+    floor: bool,
+    drop: float | None,
+) -> dict[str, Any]:
+    """Shapes that come nearer than 2 cm to another one within a second, as plain data.
+
+    The robot starts in a state at rest, its lowest shape above the floor, and springs and dampers hold its joints.
+
+    Args:
+        path: of an MJCF, or of a URDF without meshes.
+        start: joint -> coordinates: those of one axis from the file's pose [rad or m], a quaternion, a place and one.
+        servos: joint -> gains kp and kd, target from the file's pose, armature.
+        base_joint: name of the joint that frees the root of a URDF; empty: nothing does.
+        floor: True to add a floor z = 0, which collides with every shape that collides with any.
+        drop: height of the lowest shape over the floor [m]; None: as it is, or 1 cm where it overlaps the floor.
+
+    Returns:
+        ``shapes`` as by :func:`_shape`; ``pairs`` with the numbers of two ``shapes``, their laws and the least
+        ``distance`` [m].
+    """
+    model = _compiled(path, base_joint, floor=floor)
+    data = mujoco.MjData(model)
+    _put(model, data, start, servos)
+    _lift(model, data, drop)
+    found: dict[tuple[int, int], dict[str, Any]] = {}
+    _widen(model.geom_gap, model.geom_margin, _NEAR / 2 if _gap_widens() else _NEAR)
+    _widen(model.pair_gap, model.pair_margin, _NEAR)
+    for _ in range(min(int(_SECONDS / model.opt.timestep), int(_MOST / max(model.nv, 1)))):
+        mujoco.mj_step(model, data)
+        if not np.isfinite(data.qacc).all() or data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number:
+            break
+        for contact in data.contact[: data.ncon]:
+            first, second = sorted(contact.geom.tolist())
+            laws = found.setdefault((first, second), _laws(contact))
+            laws["distance"] = min(laws["distance"], float(contact.dist))
+    geoms = sorted({geom for pair in found for geom in pair})
+    pairs = [{"shapes": [geoms.index(geom) for geom in pair]} | laws for pair, laws in sorted(found.items())]
+    return {"shapes": [_shape(model, geom) for geom in geoms], "pairs": pairs}
+
+
+def _laws(contact: Any) -> dict[str, Any]:
+    """Laws of a contact as MuJoCo combined those of its shapes."""
+    return {
+        "dim": int(contact.dim),
+        "friction": contact.friction.tolist(),
+        "softness": contact.solref.tolist(),
+        "margin": float(contact.includemargin),
+        "distance": float(contact.dist),
+    }
+
+
+def _compiled(path: Path, base_joint: str, *, floor: bool) -> Any:
+    """Model of a file; masses too small for MuJoCo are raised, as shapes alone are read."""
+    text = path.read_text(encoding="utf-8")
+    if "</robot>" in text:
+        compiler = '<mujoco><compiler fusestatic="false" balanceinertia="true" discardvisual="true"/></mujoco>'
+        at_end = text.rindex("</robot>")
+        spec = mujoco.MjSpec.from_string(f"{text[:at_end]}{compiler}{text[at_end:]}")
+    else:
+        spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.boundmass, spec.compiler.boundinertia = 1e-6, 1e-9
+    if base_joint:
+        spec.worldbody.bodies[0].add_freejoint().name = base_joint
+    if floor:
+        every = 2**31 - 1
+        spec.worldbody.add_geom(
+            name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=every, conaffinity=every
+        )
+    return spec.compile()
+
+
+def _put(model: Any, data: Any, start: Mapping[str, Sequence[float]], servos: Mapping[str, Sequence[float]]) -> None:
+    """Sets the start, and the springs and dampers of joints in place of actuators."""
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+    for name, values in start.items():
+        joint = model.joint(name)
+        place = int(joint.qposadr[0])
+        data.qpos[place : place + len(values)] = values
+        if len(values) == 1:
+            data.qpos[place] += model.qpos0[place]
+    for name, (kp, kd, target, armature) in servos.items():
+        joint = model.joint(name)
+        place, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
+        model.jnt_stiffness[joint.id] = kp
+        model.qpos_spring[place] = model.qpos0[place] + target
+        model.dof_damping[dof] += kd
+        model.dof_armature[dof] = armature
+
+
+def _lift(model: Any, data: Any, drop: float | None) -> None:
+    """Moves the first body that floats up or down until its lowest shape has its height over the floor."""
+    free = np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
+    if not len(free):
+        return
+    floors = (model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)) & (model.body_weldid[model.geom_bodyid] == 0)
+    gaps, margins = model.geom_gap.copy(), model.geom_margin.copy()
+    _widen(model.geom_gap, model.geom_margin, _HIGH * floors)
+    mujoco.mj_forward(model, data)
+    root = int(model.body_rootid[model.jnt_bodyid[free[0]]])
+    lowest = [
+        float(contact.dist)
+        for contact in data.contact[: data.ncon]
+        if floors[contact.geom].any() and root in model.body_rootid[model.geom_bodyid[contact.geom]]
+    ]
+    model.geom_gap[:], model.geom_margin[:] = gaps, margins
+    if lowest:
+        data.qpos[int(model.jnt_qposadr[free[0]]) + 2] += lift(min(lowest), drop)
+
+
+def _widen(gaps: Any, margins: Any, width: Any) -> None:
+    """Widens the distances at which contacts are listed, without changing those at which they press."""
+    gaps += width
+    if not _gap_widens():
+        margins += width
+
+
+@cache
+def _gap_widens() -> bool:
+    """True if a gap is added to the margin of detection (MuJoCo 4), False if it is taken from that of pressing."""
+    ball = '<body pos="0 0 .11"><freejoint/><geom size=".1" gap=".01"/></body>'
+    text = f'<mujoco><worldbody><geom type="plane" size="1 1 1" gap=".01"/>{ball}</worldbody></mujoco>'
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return bool(data.ncon)
+
+
+def _shape(model: Any, geom: int) -> dict[str, Any]:
+    """A shape: name (empty: it has none), body (empty: the world), kind, MuJoCo's size, place and axes in the body."""
+    axes = np.zeros(9)
+    mujoco.mju_quat2Mat(axes, model.geom_quat[geom])
+    body = int(model.geom_bodyid[geom])
+    return {
+        "name": model.geom(geom).name,
+        "number": geom - int(model.body_geomadr[body]),
+        "body": model.body(body).name if body else "",
+        "kind": _KINDS[int(model.geom_type[geom])],
+        "size": model.geom_size[geom].tolist(),
+        "position": model.geom_pos[geom].tolist(),
+        "rotation": axes.reshape(3, 3).tolist(),
+    }

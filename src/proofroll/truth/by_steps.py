@@ -1,0 +1,193 @@
+"""Reference by steps: a motion with contacts under held targets, which no route of the truth follows.
+
+Pinocchio's impulses at three steps, each half of the one before: the finest run is the reference, and three times its
+largest change so far is its error bar. It is no truth: one formulation alone leads to it, which it never judges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import Columns, Variable
+from proofroll.core.controlled_engine import commanded
+from proofroll.core.dataset import BY_STEPS, CONTINUOUS, ENDED, ENDS, HORIZON, columns_of
+from proofroll.core.engine_abilities import require_provided
+from proofroll.core.errors import Diverged, Missing, Refused
+from proofroll.core.events import JUMPS, Event, with_events
+from proofroll.core.multi_element import copied, events_of_engine, watch_events
+from proofroll.core.number_format import number
+from proofroll.core.observable import Role
+from proofroll.core.pace import PACE
+from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NO_ROUTE = "no route of the truth follows contacts under held targets yet"
+# Engine and formulation of the steps, the longest of them [s], and how many there are.
+_ENGINE, _FORMULATION, _LONGEST, _RUNGS = "pinocchio", "impulses", 1e-3, 3
+# Engine and formulation of twins, which cost a tenth of that; how many, how far apart they start [m, rad], and the
+# distances up to which a motion is told [m].
+_OF_TWINS, _TWINS, _NUDGE, _TOLD = ("mujoco", "geoms"), 5, 1e-4, (1e-3, 1e-2)
+_SAFETY = 3.0  # times the last change of the finest run
+_ON_STEP = 1e-6  # part of a step by which a time may be beside its end
+
+
+@dataclass(frozen=True)
+class _SteppedRun:
+    """Run with one step: its variables at the times that were asked for, and the events."""
+
+    step: float
+    columns: Columns
+    events: Sequence[Event]
+
+
+def reference_by_steps(element: MechanismElement, times: FloatArray) -> xr.Dataset:
+    """The finest run as a dataset, each variable with its error bar.
+
+    Raises:
+        Refused: the engine of the steps is not installed, or cannot represent the mechanism.
+        Diverged: a run ends early.
+    """
+    try:
+        runs = [_run(element, times, step) for step in _steps(element)]
+    except Missing as error:
+        raise Refused(f"{NO_ROUTE}, and {error}, whose steps would be a reference") from None
+    coarse, fine = runs[-2:]
+    near = _SAFETY * coarse.step
+    events = [replace(item, time_low=item.time_low - near, time_high=item.time_high + near) for item in fine.events]
+    beside = np.zeros(len(times), dtype=bool)
+    for event in events:
+        if event.kind in JUMPS:
+            beside |= (event.time_low <= times) & (times <= event.time_high)
+    # a force of a step is its impulse over its length: beside a touch no two steps have the same
+    reactions = {item.name for item in element.observables if item.role is Role.REACTION}
+    variables = {}
+    for name, item in fine.columns.variables.items():
+        bar = math.inf if name in reactions else _bar(name, coarse.columns.variables[name], item, beside)
+        variables[name] = item if bar is None else item._replace(attrs={**item.attrs, "error_bar": bar})
+    words = ", ".join(number(run.step, 3) for run in runs)
+    attrs = {
+        "route": f"reference by steps of {_ENGINE} {_FORMULATION}, dt {words} s",
+        "second_route": f"{_SAFETY:g} times their last change",
+        BY_STEPS: f"{_ENGINE}[formulation={_FORMULATION}]",
+    }
+    dataset = Columns(variables, {**fine.columns.attrs, **attrs}).dataset()
+    dataset = with_events(dataset, events) if element.mechanism.has_events else dataset
+    apart = _twins_apart(element, times, runs[0].step)
+    return dataset if apart is None else _to_horizon(dataset, apart, _distances(coarse, fine))
+
+
+def _twins_apart(element: MechanismElement, times: FloatArray, step: float) -> FloatArray | None:
+    """Largest distance so far of any body of twins, whose starts are a little apart [m]; None: they cannot be run."""
+    random, mechanism = np.random.default_rng(0), element.mechanism
+    twins = [element]
+    for _ in range(_TWINS):
+        joints = []
+        for joint in mechanism.joints:
+            moved = np.array(joint.q0)
+            places = slice(0, 0 if joint.kind == JointKind.SPHERICAL else 3)  # an attitude stays a unit quaternion
+            moved[places] += _NUDGE * random.uniform(-1, 1, moved[places].size)
+            joints.append(replace(joint, q0=tuple(moved.tolist())))
+        twins.append(replace(element, mechanism=replace(mechanism, joints=tuple(joints))))
+    try:
+        runs = [_run(twin, times, step, *_OF_TWINS) for twin in twins]
+    except (Missing, Refused, Diverged):
+        return None
+    apart: FloatArray = np.max([_distances(runs[0], run) for run in runs[1:]], axis=0)
+    return apart
+
+
+def _distances(run: _SteppedRun, other_run: _SteppedRun) -> FloatArray:
+    """Largest distance so far between the places of any body in two runs [m], shape (time,)."""
+    places, other_places = (item.columns.variables["p_WB"].values for item in (run, other_run))
+    apart = np.linalg.norm(places - other_places, axis=-1).reshape(len(places), -1).max(axis=1)
+    return np.maximum.accumulate(apart)
+
+
+def _to_horizon(dataset: xr.Dataset, apart: FloatArray, change: FloatArray) -> xr.Dataset:
+    """The reference up to where it tells the motion, with the words about it.
+
+    Args:
+        dataset: the reference.
+        apart: largest distance of twins so far [m], shape (time,).
+        change: last change of places by a shorter step, the largest so far [m], shape (time,).
+    """
+    times = dataset["time"].to_numpy()
+    words = []
+    for told in _TOLD:
+        beyond = np.flatnonzero((apart > told) | (change > told / _SAFETY))
+        until = "to the end" if not beyond.size else f"until {times[max(beyond[0] - 1, 0)]:.3g} s"
+        words.append(f"{1e3 * told:g} mm {until}")
+    text = f"starts {number(_NUDGE, 1)} m or rad apart, and shorter steps, stay within {', '.join(words)}"
+    dataset.attrs[HORIZON] = text
+    if not beyond.size or beyond[0] < 1:
+        return dataset
+    cut = dataset.isel(time=slice(0, int(beyond[0])))
+    return cut.assign_attrs({ENDS: float(times[beyond[0]]), ENDED: f"it is too sensitive from there on: {text}"})
+
+
+def _steps(element: MechanismElement) -> list[float]:
+    """Steps, each half of the one before; whole numbers of them lie between instants of a controller."""
+    control = element.mechanism.control
+    longest = _LONGEST if control is None else 1 / control.rate / math.ceil(1 / control.rate / _LONGEST - _ON_STEP)
+    return [longest / 2**rung for rung in range(_RUNGS)]
+
+
+def _run(
+    element: MechanismElement, times: FloatArray, step: float, name: str = _ENGINE, formulation: str = _FORMULATION
+) -> _SteppedRun:
+    """Run of a mechanism in an engine with one step; between two steps its variables are interpolated."""
+    scene = Scene(name=element.name, title=element.name, elements=(element,))
+    kind = load_engine(name)
+    settings = resolve_settings(kind, {"formulation": formulation, "preset": "matched", "dt": step})
+    require_provided(kind, settings.formulation, scene)
+    engine = commanded(kind.build(scene.for_an_engine, settings), element, step)
+    watch_events(engine)
+    before, part = np.floor(times / step + _ON_STEP), times / step
+    part = np.where(np.abs(part - np.round(part)) <= _ON_STEP, 0.0, part - before)
+    counts = np.union1d(before, before[part > 0] + 1)
+    PACE.follow("second", float(times[-1]))
+    samples = [copied(engine.sample())]
+    for count in counts[1:].tolist():
+        engine.advance(count * step)
+        PACE.reached(count * step)
+        samples.append(copied(engine.sample()))
+    PACE.leave()
+    columns = columns_of(scene, counts * step, samples)
+    first, last = np.searchsorted(counts, before), np.searchsorted(counts, before + (part > 0))
+    variables = {}
+    for key, item in columns.variables.items():
+        if item.dims[:1] != ("time",):
+            variables[key] = item
+            continue
+        weight = part.reshape(-1, *[1] * (item.values.ndim - 1))
+        between = item.values[first] + weight * (item.values[last] - item.values[first])
+        variables[key] = item._replace(values=times if key == "time" else between)
+    found = events_of_engine(engine, element) or ()
+    return _SteppedRun(
+        step, Columns(variables, columns.attrs), tuple(event for event in found if event.time <= times[-1])
+    )
+
+
+def _bar(name: str, coarse: Variable, fine: Variable, beside: npt.NDArray[np.bool_]) -> float | None:
+    """Error bar of a variable; None: it has no times. Samples ``beside`` an impact do not count for jumps."""
+    if name == "time" or fine.dims[:1] != ("time",) or fine.values.dtype.kind != "f":
+        return None
+    change = np.abs(fine.values - coarse.values)
+    if fine.dims[-1:] == ("wxyz",):  # of two signs of a quaternion
+        change = np.minimum(change, np.abs(fine.values + coarse.values))
+    if fine.attrs.get("units") not in CONTINUOUS:
+        change = change[~beside]
+    known = change[np.isfinite(change)]
+    return _SAFETY * float(known.max(initial=0.0)) if known.size else math.inf

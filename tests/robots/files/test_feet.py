@@ -1,0 +1,199 @@
+"""Shapes, floors and pairs of robot files: what MuJoCo's own search says becomes the scene, or is refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll import load_scene, simulate
+from proofroll.core.errors import InputError
+from proofroll.core.scene import Scene
+from proofroll.files.scene_sources import with_control
+from proofroll.robots.protocol import lift
+
+pytest.importorskip("mujoco")
+pytestmark = pytest.mark.drill
+
+# A trunk on three bent legs, each a hip and a foot; its home pose lies 3 cm below the floor that it stands on.
+FOOT = '<geom name="{name}_foot" type="sphere" size=".02" pos="0 0 -.2" friction=".4" priority="1"/>'
+LEG = (
+    '<body name="{name}" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 1 0" damping=".1" frictionloss=".05" '
+    'armature=".01"/><inertial mass=".3" pos="0 0 -.1" diaginertia="1e-3 1e-3 2e-4"/>{foot}</body>'
+)
+PLACES = {"left": (0.15, 0.1), "right": (0.15, -0.1), "rear": (-0.2, 0.0)}
+CONTROL = "rate = 50\n[pose]\nleft_hip = 0.1\n[ground]\n"
+
+
+def robot(foot: str = FOOT, trunk: str = "", after: str = "", z: float = 0.19) -> str:
+    """MJCF of the robot."""
+    legs = "".join(LEG.format(name=name, x=x, y=y, foot=foot.format(name=name)) for name, (x, y) in PLACES.items())
+    servos = "".join(f'<position joint="{name}_hip" kp="20" kv=".5"/>' for name in PLACES)
+    return (
+        '<mujoco model="stool"><worldbody><geom name="floor" type="plane" size="0 0 1" friction="1"/>'
+        f'<body name="trunk" pos="0 0 {z}"><freejoint name="root"/>'
+        f'<inertial mass="3" pos="0 0 0" diaginertia=".02 .03 .04"/>{trunk}{legs}</body></worldbody>'
+        f"<actuator>{servos}</actuator>{after}</mujoco>"
+    )
+
+
+@pytest.fixture
+def stood(tmp_path: Path) -> Callable[..., Scene]:
+    """Scene of a robot's text under a controller's."""
+
+    def scene(text: str, control: str = CONTROL, ending: str = "xml", **parameters: float) -> Scene:
+        path, controller = tmp_path / f"stool.{ending}", tmp_path / "stand.toml"
+        path.write_text(text, encoding="utf-8")
+        controller.write_text(control, encoding="utf-8")
+        return load_scene(with_control(str(path), controller), **parameters)
+
+    return scene
+
+
+def _pairs(scene: Scene) -> dict[str, Any]:
+    return {pair.name: pair for pair in scene.elements[0].mechanism.pairs}  # type: ignore[attr-defined]
+
+
+def _height(scene: Scene) -> float:
+    joints = scene.elements[0].mechanism.joints  # type: ignore[attr-defined]
+    return next(float(joint.q0[2]) for joint in joints if joint.kind == "free")
+
+
+def test_feet_stand_on_the_floor_of_the_file(stood: Callable[..., Scene]) -> None:
+    """Friction is as MuJoCo combines it, by priority; the robot is lifted out of its floor, and words say so."""
+    scene = stood(robot())
+    pairs = _pairs(scene)
+    assert {name: pair.friction for name, pair in pairs.items()} == dict.fromkeys(
+        [f"{name}_foot on floor" for name in PLACES], 0.4
+    )
+    # the turned leg is shorter, so the others are the lowest: 3 cm below the floor, then 1 cm above it
+    assert _height(scene) == pytest.approx(0.23, abs=1e-12)
+    assert "3 shapes on a floor, friction 0.4; moved up by 40 mm" in scene.title
+    assert "contacts" not in scene.omitted
+    assert stood(robot(), ground=0).omitted[-1] == "contacts"
+
+
+def test_a_drop_is_the_height_of_the_lowest_foot(stood: Callable[..., Scene]) -> None:
+    """[start] drop puts the lowest shape there, from above or below."""
+    for z in (0.1, 0.5):
+        assert _height(stood(robot(z=z), CONTROL + "[start]\ndrop = 0.05\n")) == pytest.approx(0.27, abs=1e-12)
+
+
+def test_excluded_pairs_do_not_touch(stood: Callable[..., Scene]) -> None:
+    """What the file excludes, or gives laws of its own, is as the file says."""
+    after = (
+        '<contact><exclude body1="rear" body2="world"/>'
+        '<pair geom1="left_foot" geom2="floor" friction=".9 .9 .005 .0001 .0001"/></contact>'
+    )
+    pairs = _pairs(stood(robot(after=after)))
+    assert {name: pair.friction for name, pair in pairs.items()} == {
+        "left_foot on floor": 0.9, "right_foot on floor": 0.4,
+    }  # fmt: skip
+
+
+def test_a_margin_is_a_larger_radius(stood: Callable[..., Scene]) -> None:
+    """A contact that presses from a distance on is one of a larger ball."""
+    scene = stood(robot(FOOT.replace("size", 'margin=".005" size')))
+    radii = {shape.radius for shape in scene.elements[0].mechanism.geometries if shape.kind == "sphere"}  # type: ignore[attr-defined]
+    assert radii == {0.025}
+
+
+def test_turning_friction_of_balls_is_taken(stood: Callable[..., Scene]) -> None:
+    """Condim 6 adds friction against spin and rolling, with the file's lengths."""
+    foot = FOOT.replace('friction=".4"', 'condim="6" friction=".4 .003 .0002"')
+    pair = _pairs(stood(robot(foot)))["rear_foot on floor"]
+    assert (pair.spinning_friction, pair.rolling_resistance) == (0.003, 0.0002)
+
+
+@pytest.mark.parametrize(
+    ("foot", "says"),
+    [
+        (FOOT.replace('"sphere" size=".02"', '"capsule" size=".02 .02" condim="4"'), "against turning"),
+        (FOOT.replace("priority", 'solref=".02 .1" priority'), "rebounds"),
+        (FOOT.replace('"sphere" size=".02"', '"box" size=".02 .02 .02" margin=".01"'), "a margin of 0.01 m around box"),
+    ],
+)
+def test_what_no_scene_has_is_refused_by_name(stood: Callable[..., Scene], foot: str, says: str) -> None:
+    """Shapes that touch without a rule are named with the reason, and with what can be done."""
+    with pytest.raises(InputError) as caught:
+        stood(robot(foot))
+    for text in ("left_foot and floor", says, "2 other pairs", "[ground] feet"):
+        assert text in str(caught.value)
+
+
+def test_balls_may_stand_for_feet(stood: Callable[..., Scene]) -> None:
+    """[ground] feet puts balls at the origins of links, on z = 0, and names a link that is not there."""
+    control = CONTROL + "feet = {left = 0.03, rear = 0.04}\nfriction = 0.7\n"
+    scene = stood(robot(), control)
+    assert {name: pair.friction for name, pair in _pairs(scene).items()} == {"left": 0.7, "rear": 0.7}
+    with pytest.raises(InputError, match=r"ground.feet = 'front': the robot has no such link"):
+        stood(robot(), CONTROL + "feet = {front = 0.03}\n")
+
+
+def test_a_plane_stands_under_a_file_without_a_floor(stood: Callable[..., Scene]) -> None:
+    """Ground = 2 adds the plane; with the file's own floor alone there is none."""
+    bare = robot().replace('<geom name="floor" type="plane" size="0 0 1" friction="1"/>', "")
+    assert len(_pairs(stood(bare, ground=2))) == 3
+    with pytest.raises(InputError, match="take --ground plane"):
+        stood(bare, ground=1)
+
+
+def test_meshes_that_collide_are_told(stood: Callable[..., Scene]) -> None:
+    """A mesh whose file is not there takes no part, and the answer says so."""
+    trunk = '<geom name="shell" type="mesh" mesh="shell"/>'
+    text = robot(trunk=trunk).replace("<worldbody>", '<asset><mesh name="shell" file="no.stl"/></asset><worldbody>')
+    assert "collision meshes of trunk" in stood(text).omitted
+
+
+URDF = """<robot name="stool"><link name="trunk"><inertial><mass value="3"/>
+<inertia ixx=".02" iyy=".03" izz=".04" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0 0 -.1"/><geometry><box size=".4 .2 .1"/></geometry></collision>
+<collision><geometry><mesh filename="package://a/b.stl"/></geometry></collision></link>{links}</robot>"""
+
+
+def test_a_urdf_stands_on_a_plane(stood: Callable[..., Scene]) -> None:
+    """Its collision shapes that come near the plane z = 0 touch it, with friction 1 unless the controller says."""
+    scene = stood(URDF.format(links=""), "rate = 50\n[ground]\n", "urdf")
+    (pair,) = _pairs(scene).values()
+    assert pair.friction == 1
+    assert _height(scene) == pytest.approx(0.16, abs=1e-12)
+    assert "collision meshes of trunk" in scene.omitted
+    rough = stood(URDF.format(links=""), "rate = 50\n[ground]\nfriction = 0.3\n", "urdf")
+    assert [pair.friction for pair in _pairs(rough).values()] == [0.3]
+
+
+def test_a_scene_moves_as_the_file_in_plain_mujoco(stood: Callable[..., Scene]) -> None:
+    """The file itself in MuJoCo, with the settings of matched, lands and stands as its scene does there."""
+    import mujoco
+
+    scene = stood(robot(), CONTROL + "[start]\nbase = [0, 0, 0.24, 0.9998, 0.015, 0.0132287566, 0]\n")
+    step, until = 1e-3, 0.3
+    ours = simulate(scene, "mujoco[formulation=geoms,preset=matched,damping_armature=false]", dt=step, until=until)
+    model = mujoco.MjModel.from_xml_string(robot())
+    model.opt.timestep, model.opt.cone, model.opt.integrator = step, 1, 0
+    for name in ("geom_solref", "dof_solref", "pair_solref"):
+        getattr(model, name)[:] = 2 * step, 1
+    for name in ("geom_solimp", "dof_solimp", "pair_solimp"):
+        getattr(model, name)[:] = 0.9999, 0.9999, 1e-3, 0.5, 2
+    data = mujoco.MjData(model)
+    for joint in scene.elements[0].mechanism.joints:  # type: ignore[attr-defined]
+        place = int(model.joint(joint.name).qposadr[0])
+        data.qpos[place : place + len(joint.q0)] = joint.q0
+    data.ctrl[:] = 0.1, 0, 0
+    places = [data.qpos[:3].copy()]
+    for _ in range(round(until / 0.01)):
+        for _ in range(10):
+            mujoco.mj_step(model, data)
+        places.append(data.qpos[:3].copy())
+    moved = float(np.abs(np.diff(places, axis=0)).max())
+    assert moved > 1e-3
+    assert np.abs(ours["p_WB"].values[:, 0] - places).max() < 1e-8
+
+
+@pytest.mark.parametrize(("lowest", "drop", "way"), [(-0.02, None, 0.03), (0.02, None, 0.0), (0.02, 0.01, -0.01)])
+def test_a_robot_is_lifted_out_of_its_floor_alone(lowest: float, drop: float | None, way: float) -> None:
+    """Above the floor it stays where it is, unless a height is asked for."""
+    assert lift(lowest, drop) == pytest.approx(way)

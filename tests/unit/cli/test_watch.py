@@ -1,0 +1,84 @@
+"""``proofroll watch``: a scene of one's own in motion whenever it is saved; runs that are kept, and shown together."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from proofroll.cli.watch import _written
+from proofroll.files.data_folders import data_folder
+from proofroll.files.kept_runs import kept_lines, kept_path, run_file
+
+Proofroll = Callable[..., tuple[int, str, str]]
+
+
+@pytest.mark.drill
+def test_a_watched_scene_is_shown_beside_the_truth(proofroll: Proofroll, tmp_path: Path) -> None:
+    """The page has the truth and all engines that run, and the script beside it sets the version that it has."""
+    folder, page = tmp_path / "mine", tmp_path / "mine.html"
+    shutil.copytree(data_folder("models") / "pendulum", folder)
+    words = ["--engine", "mujoco", "--engine", "exudyn", "--until", "0.2", "--out", str(page), "--once"]
+    code, _, err = proofroll("watch", str(folder), *words)
+    assert code == 0, err
+    html = page.read_text(encoding="utf-8")
+    assert "The truth, solid, and mujoco" in html
+    assert "Exudyn redundant" in html
+    (version,) = re.findall(r"'(\d+)'", page.with_suffix(".js").read_text(encoding="utf-8"))
+    assert f'shown = "{version}"' in html
+    assert [line.rpartition(",")[0].partition(": ")[2] for line in err.splitlines()][-1].endswith(
+        "mujoco, exudyn, truth"
+    )
+
+
+def test_a_saved_file_is_seen(tmp_path: Path) -> None:
+    """What is looked at changes when a file beside the scene is saved, and only then."""
+    (tmp_path / "scene.toml").write_text("title = 'a'\n", encoding="utf-8")
+    seen = _written(str(tmp_path), None)
+    assert _written(str(tmp_path), None) == seen
+    (tmp_path / "scene.toml").write_text("title = 'another'\n", encoding="utf-8")
+    assert _written(str(tmp_path), None) != seen
+
+
+def test_a_page_of_another_kind_is_refused(proofroll: Proofroll, tmp_path: Path) -> None:
+    """What is watched is a page."""
+    code, _, err = proofroll("watch", "pendulum", "--out", str(tmp_path / "page.svg"))
+    assert (code, "end the name of the file in .html" in err) == (2, True)
+
+
+@pytest.mark.drill
+def test_kept_runs_are_listed_and_shown_together(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run kept by a name is listed; two of one scene share a page, two of several scenes or instants do not."""
+    monkeypatch.chdir(tmp_path)
+    assert [*kept_lines()] == ["No run is kept in out/runs; proofroll run … --keep NAME keeps one."]
+    run = ["run", "pendulum", "--until", "0.2"]
+    assert proofroll(*run, "--engine", "mujoco", "--every", "0.02", "--keep", "a")[0] == 0
+    assert proofroll(*run, "--engine", "exudyn", "--every", "0.04", "--keep", "b")[0] == 0
+    assert proofroll(*run, "--engine", "exudyn", "--set", "length=2", "--keep", "c")[0] == 0
+    code, out, _ = proofroll("replay")
+    assert code == 0
+    assert re.search(r"^a +\d{4}-\d\d-\d\d \d\d:\d\d  pendulum in mujoco: done$", out, re.MULTILINE)
+    assert proofroll("replay", "a", "b")[0] == 0
+    page = Path("out/runs/a-replay.html").read_text(encoding="utf-8")
+    assert "MuJoCo joints" in page
+    assert "Exudyn redundant" in page
+    code, _, err = proofroll("replay", "a", "c")
+    assert (code, "several scenes or parameters" in err) == (2, True)
+
+
+def test_a_path_wins_over_a_kept_name(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file is read by its path; a name that is no path is that of a kept run, and has no folder in it."""
+    monkeypatch.chdir(tmp_path)
+    kept_path("a").parent.mkdir(parents=True)
+    kept_path("a").touch()
+    assert run_file("a") == kept_path("a")
+    Path("a").touch()
+    assert run_file("a") == Path("a")
+    assert [line.split()[-3:] for line in kept_lines()] == [["cannot", "be", "read"]]
+    code, _, err = proofroll("run", "pendulum", "--engine", "mujoco", "--keep", "../a")
+    assert (code, "letters, digits" in err) == (2, True)

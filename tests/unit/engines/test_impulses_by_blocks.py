@@ -1,0 +1,61 @@
+"""Impulses by blocks: the exact cone of each contact and the bounds of dry friction, where Pinocchio's ADMM stops."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pinocchio")
+
+from proofroll.core.errors import Diverged
+from proofroll.core.plugins import load_engine
+from proofroll.engines.pinocchio.contact.blocks import Block, impulses_by_blocks
+from proofroll.engines.pinocchio.contact.impulses import ImpulseSteps
+from proofroll.files.scene_file import load_scene
+
+PRESETS = load_engine("pinocchio").presets["impulses"]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_impulses_obey_the_laws(seed: int) -> None:
+    """Contacts press, stay in their cones and slip against their friction; joints stay in their bounds."""
+    random = np.random.default_rng(seed)
+    blocks = [Block(0, 0.6), Block(3, 0.1), Block(6, 0.0), Block(9, None, 0.02), Block(10, None)]
+    rows = random.normal(size=(11, 14))
+    G, g = rows @ rows.T, random.normal(size=11)
+    f, change = impulses_by_blocks(G, g, blocks, np.zeros(11))
+    u = g + G @ f
+    assert change < 1e-11
+    for block in blocks[:3]:
+        (x, y, normal), (slip_x, slip_y, gap) = f[block.rows], u[block.rows]
+        assert min(normal, gap) >= -1e-9
+        assert abs(normal * gap) < 1e-9
+        friction, slip, bound = np.hypot(x, y), np.hypot(slip_x, slip_y), block.friction * normal  # type: ignore[operator]
+        assert friction <= bound + 1e-9
+        assert abs(x * slip_x + y * slip_y + bound * slip) < 1e-8, "friction is largest where it slips, and against it"
+    assert abs(f[9]) <= 0.02
+    assert abs(f[9]) == pytest.approx(0.02) or abs(u[9]) < 1e-9
+    assert min(f[10], u[10]) >= -1e-9
+    assert abs(f[10] * u[10]) < 1e-9
+
+
+@pytest.mark.drill
+def test_blocks_and_admm_find_the_same_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where Pinocchio's ADMM finds the impulses, blocks find the same; a run that had to take them says so."""
+    scene, settings = load_scene("sled"), replace(PRESETS["matched"], dt=1e-3)
+    kind = load_engine("pinocchio")
+    usual = kind.build(scene, settings)
+    usual.advance(0.1)
+    places = usual.sample().p_WB
+    assert not usual.remarks()
+
+    def stops(*_: object, **__: object) -> None:
+        raise Diverged("it stops")
+
+    monkeypatch.setattr(ImpulseSteps, "_found", stops)
+    run = kind.build(scene, settings)
+    run.advance(0.1)
+    np.testing.assert_allclose(run.sample().p_WB, places, atol=1e-8)
+    assert "solves its matrices by blocks" in run.remarks()[0]

@@ -1,0 +1,101 @@
+"""Reference by steps: contacts under held targets, which the truth does not follow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from proofroll import Refused, simulate
+from proofroll.core.dataset import BY_STEPS, ENDS, HORIZON
+from proofroll.core.errors import Missing
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.control import Control
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.truth import by_steps
+
+pytest.importorskip("pinocchio")
+UNTIL = 0.12
+
+
+def hopper(*, held: bool) -> Scene:
+    """A ball on a vertical slide, pulled down on the floor by a servo whose target changes at 50 Hz or never."""
+    slide = Joint("slide", "prismatic", "world", "ball", axis=(0, 0, 1), q0=(0.03,))
+    servo = Actuator("servo", "slide", "position", 0.01, kp=40.0, kd=2.0)
+    mechanism = Mechanism(
+        (Body("ball", 1.0, (0.0, 0.0, 0.0), tuple(np.diag([1e-3] * 3).tolist())),),
+        (slide,),
+        actuators=(servo,),
+        geometries=(Geometry("foot", "ball", "sphere", radius=0.02), Geometry("floor", "world", "plane")),
+        pairs=(Pair("step", ("foot", "floor"), 0.5),),
+        impacts="together",
+        control=Control(50.0, ("servo",)) if held else None,
+    )
+    return Scene("hopper", "A ball that a servo presses on the floor", (MechanismElement(mechanism),))
+
+
+@pytest.mark.drill
+def test_the_reference_is_within_its_bar_of_the_truth() -> None:
+    """Targets that never change are a motion that the truth knows: the reference by steps is near it, and says so."""
+    truth, reference = (simulate(hopper(held=held), until=UNTIL) for held in (False, True))
+    assert BY_STEPS not in truth.attrs
+    assert reference.attrs[BY_STEPS] == "pinocchio[formulation=impulses]"
+    assert reference.attrs["route"].startswith("reference by steps of pinocchio impulses, dt 1e-3, 5e-4, 2.5e-4 s")
+    error = float(np.abs(truth["p_WB"].values - reference["p_WB"].values).max())
+    bar = float(reference["p_WB"].attrs["error_bar"])
+    assert 0 < error <= bar < 1e-3
+    assert np.isinf(reference["contact_forces"].attrs["error_bar"])
+
+
+def test_steps_lie_between_instants() -> None:
+    """The longest step is at most a millisecond, and divides the time between two instants."""
+    (element,) = hopper(held=True).elements
+    assert isinstance(element, MechanismElement)
+    for rate, longest in ((50.0, 1e-3), (30.0, 1 / 30 / 34)):
+        mechanism = replace(element.mechanism, control=Control(rate, ("servo",)))
+        assert by_steps._steps(MechanismElement(mechanism)) == pytest.approx([longest, longest / 2, longest / 4])
+
+
+def test_without_its_engine_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the engine of the steps is not installed, the refusal says what is missing."""
+
+    def missing(name: str) -> Any:
+        raise Missing(f"{name} is not installed here")
+
+    monkeypatch.setattr(by_steps, "load_engine", missing)
+    with pytest.raises(Refused, match="contacts under held targets yet, and pinocchio is not installed"):
+        simulate(hopper(held=True), until=0.01)
+
+
+@pytest.mark.parametrize(
+    ("apart", "change", "words", "end"),
+    [
+        ([0, 1e-4, 2e-4, 3e-4], [0, 0, 0, 0], "1 mm to the end, 10 mm to the end", None),
+        ([0, 5e-4, 5e-3, 9e-3], [0, 0, 0, 0], "1 mm until 0.1 s, 10 mm to the end", None),
+        ([0, 1e-4, 1e-4, 1e-4], [0, 5e-4, 5e-4, 5e-3], "1 mm until 0 s, 10 mm until 0.2 s", 0.3),
+        ([0, 1e-4, 2e-2, 3e-2], [0, 0, 0, 0], "1 mm until 0.1 s, 10 mm until 0.1 s", 0.2),
+    ],
+)
+def test_a_reference_ends_at_its_horizon(
+    apart: list[float], change: list[float], words: str, end: float | None
+) -> None:
+    """Where twins part by a centimetre, or shorter steps still change a third of it, nothing is judged any more."""
+    whole = xr.Dataset({"x": ("time", np.arange(4.0))}, coords={"time": 0.1 * np.arange(4)})
+    cut = by_steps._to_horizon(whole, np.array(apart), np.array(change))
+    assert words in cut.attrs[HORIZON]
+    assert cut.attrs.get(ENDS) == (None if end is None else pytest.approx(end))
+    assert cut.sizes["time"] == (4 if end is None else round(end / 0.1))
+
+
+@pytest.mark.drill
+def test_twins_of_a_pressed_ball_stay_together() -> None:
+    """Twins start a tenth of a millimetre apart and come to rest on the same floor."""
+    pytest.importorskip("mujoco")
+    attrs = simulate(hopper(held=True), until=0.05).attrs
+    assert "1 mm to the end, 10 mm to the end" in attrs[HORIZON]
