@@ -39,6 +39,7 @@ nightly: install
 	$(BIN)/proofroll report --out $(OUT)/nightly --budget 3600 || failed=1; \
 	$(BIN)/python -m proofroll_drill arithmetic --no-comparisons --tests nightly --kind haswell --kind prescott --jobs 2 || failed=1; \
 	$(BIN)/python -m pytest -n 2 -m drill || failed=1; \
+	.ci/engines nightly || failed=1; \
 	exit $$failed
 
 # Speed, and what proofroll itself costs; faults on purpose, other arithmetic, a referee. Each has more to offer:

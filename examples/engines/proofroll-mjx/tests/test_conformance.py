@@ -5,7 +5,8 @@ from proofroll_mjx.engine import Mjx
 
 from proofroll.conformance import checks
 
-KNOWN: dict[str, str] = {}
+ORDER = "connects lack the acceleration by velocities, whose error falls faster than the step"
+KNOWN = {"order_is_as_declared[f64-matched]": ORDER}
 
 
 @pytest.mark.nightly

@@ -114,6 +114,7 @@ class Residuals(Generic[M]):
         exact: True if the engine's own accelerations leave nothing but round-off to its model. They show that numbers
             read back are not those by which it moves; a run with the errors of its steps does not.
         scheme: residual that a scheme of first order leaves by itself at the engine's step, as ``left``.
+        leaves: residual that rounding and the step may leave of a right model, as ``left``.
     """
 
     left: Callable[[M | None], FloatArray]
@@ -127,6 +128,7 @@ class Residuals(Generic[M]):
     contradicted: Callable[[M], bool] = lambda _: False
     exact: bool = False
     scheme: FloatArray | float = 0.0
+    leaves: FloatArray | float = np.inf
 
     @cached_property
     def _changes(self) -> FloatArray:
@@ -167,7 +169,8 @@ class Residuals(Generic[M]):
         """Cause: the engine behaves as a row says."""
         remainder = self.largest(row.model)
         closes = remainder <= self.closes * self.before
-        if closes and (row.model is None or self.contradicted(row.model)):
+        rest = closes and bool(np.any(np.abs(self.left(row.model)) > self.leaves))
+        if closes and (row.model is None or rest or self.contradicted(row.model)):
             remainder = np.inf
         explains = self.explained(row.model) if row.fitted and closes else None
         proof = self.quantity, self.unit, self.before, remainder, row.remedy, row.fitted, self.covers, self.closes

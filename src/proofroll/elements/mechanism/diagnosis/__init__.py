@@ -29,6 +29,7 @@ from proofroll.elements.mechanism.diagnosis.numbers import (
     friction_of_each_joint,
     of_each_body,
     of_each_joint,
+    of_several,
 )
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
 from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS
@@ -59,6 +60,7 @@ _OF_WHOLE_RUNS: tuple[Hypothesis, ...] = (
     axis_of_first_steps,
     factors_of_all,
     damped_motion,
+    of_several,
     rolling_resistance,
     of_motions,
     of_applied_forces,

@@ -80,6 +80,7 @@ class MechanismStates:
         acceleration: FloatArray,
         which: FloatArray,
         limits: ContactLimits | None = None,
+        step: float = 0.0,
     ) -> None:
         self.mechanism, self.tree = mechanism, Tree(mechanism)
         self._limits, self._pressing = limits or ContactLimits.of(0.0, 0.0), dict[tuple[int, Resisting], Pressing]()
@@ -92,7 +93,9 @@ class MechanismStates:
             twists = np.concatenate([placed.v_WB[i], placed.w_WB[i]], axis=-1)
             v = np.linalg.lstsq(rest.J[:-1].reshape(-1, mechanism.nv), twists.ravel(), rcond=None)[0]
             off = np.abs(rest.J[:-1].reshape(-1, mechanism.nv) @ v - twists.ravel())
-            self.consistent &= bool(np.max(off) <= _CONSISTENT * max(float(np.max(np.abs(twists))), 1e-300))
+            # Velocities of a scheme of first order belong to the poses of up to a step before.
+            aside = _CONSISTENT + step * float(np.max(np.abs(placed.w_WB[i]), initial=0.0))
+            self.consistent &= bool(np.max(off) <= aside * max(float(np.max(np.abs(twists))), 1e-300))
             self.each.append(
                 MechanismState(
                     t=float(placed.time[i]), q=q, v=v, motion=self.tree.at(q, v), acceleration=acceleration[i]
@@ -304,10 +307,11 @@ def is_motion(dataset: Any) -> bool:
     )
 
 
-def is_one_motion(run: Any, truth: Any, length: float) -> bool:
+def is_one_motion(run: Any, truth: Any, length: float, step: float = 0.0) -> bool:
     """False if errors of places are none that errors of velocities make: the report is wrong then, and no law.
 
-    Intervals in which a velocity jumps are left out. ``length``: size of the mechanism [m].
+    Intervals in which a velocity jumps are left out. A scheme of first order moves places by velocities of up to a step
+    away. ``length``: size of the mechanism [m]; ``step``: of the engine [s].
     """
     count = min(dataset.sizes["time"] for dataset in (run, truth))
     h = np.diff(truth["time"].to_numpy()[:count])[:, None]
@@ -320,7 +324,9 @@ def is_one_motion(run: Any, truth: Any, length: float) -> bool:
         smooth &= changes <= _JUMPS * np.median(changes)
     off, rate = p - true_p, v - true_v
     unexplained = np.cumsum((np.diff(off, axis=0) - h * (rate[1:] + rate[:-1]) / 2)[smooth], axis=0)
-    least = max(_UNEXPLAINED * float(np.max(np.abs(off))), _LEAST_ERROR * length)
+    least = max(
+        _UNEXPLAINED * float(np.max(np.abs(off))), _LEAST_ERROR * length, step * float(np.max(np.ptp(v, axis=0)))
+    )
     return float(np.max(np.abs(unexplained), initial=0.0)) <= least
 
 
@@ -383,10 +389,10 @@ def _fit(part: slice) -> tuple[int, int] | None:
     return next(((degree, ends) for degree, ends in _FITS if part.stop - part.start > degree + 2 * ends), None)
 
 
-def of_run(element: Any, dataset: Any, part: slice, ahead: float = 0.0) -> MechanismStates:
+def of_run(element: Any, dataset: Any, part: slice, ahead: float = 0.0, step: float = 0.0) -> MechanismStates:
     """States of a run of an element at some samples of a stretch, away from its ends.
 
-    ``ahead``: time by which the accelerations are those of later [s].
+    ``ahead``: time by which the accelerations are those of later [s]; ``step``: of the engine [s].
     """
     mechanism = element.mechanism
     placed = placed_of(mechanism, dataset)
@@ -398,7 +404,7 @@ def of_run(element: Any, dataset: Any, part: slice, ahead: float = 0.0) -> Mecha
     later = np.minimum(time + ahead, time[-1])
     acceleration[part] = make_interp_spline(time, twists[part], k=degree).derivative()(later)
     which = np.unique(np.linspace(part.start + ends, part.stop - 1 - ends, _SAMPLES).astype(int))
-    return MechanismStates(mechanism, placed, acceleration, which, limits_of(element))
+    return MechanismStates(mechanism, placed, acceleration, which, limits_of(element), step)
 
 
 def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | None:

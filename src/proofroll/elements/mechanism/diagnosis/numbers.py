@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Evidence
-from proofroll.core.diagnosis.fitting import CauseRow, Residuals
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals, factor_text, possible
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import by_rows
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
@@ -132,13 +132,14 @@ def _about_origin(mass: FloatArray, com: FloatArray, inertia: FloatArray) -> Ite
 def damped_motion(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: velocities or spins of bodies, or both, decay at one rate, as engines for games have it.
 
-    Only free bodies tell it from damping in joints.
+    Only free bodies, or all momenta of several, tell it from damping in joints.
     """
     mechanism, period = evidence.element.mechanism, evidence.element.natural_time
     remedy = "find the engine's own damping, drag or sleeping, and switch it off"
-    if not any(joint.kind == JointKind.FREE for joint in mechanism.joints):
-        return
-    for what, linear, angular in (("velocities", 1.0, 0.0), ("spins", 0.0, 1.0), ("velocities and spins", 1.0, 1.0)):
+    free = any(joint.kind == JointKind.FREE for joint in mechanism.joints)
+    kinds = [("velocities", 1.0, 0.0), ("spins", 0.0, 1.0)] if free else []
+    kinds += [("velocities and spins", 1.0, 1.0)] if free or len(mechanism.bodies) > 1 else []
+    for what, linear, angular in kinds:
 
         def decaying(rate: FloatArray, linear: float = linear, angular: float = angular) -> Change:
             return Change(mechanism, decay=(float(rate[0]) * linear, float(rate[0]) * angular))
@@ -147,6 +148,38 @@ def damped_motion(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[
         if rate[0] > 0:
             says = f"{what} of all bodies are damped at a rate of {rate[0]:.4g} per second"
             yield CauseRow("damped motion", says, decaying(rate), remedy, fitted=1, change=float(rate[0]) * period)
+
+
+@by_rows("several numbers", "the equations are linear in all of them: one fit balances them at every state of the run")
+def of_several(evidence: Evidence, residuals: Residuals[Change]) -> Iterator[CauseRow[Change]]:
+    """Rows: two or three of gravity, gyroscopic moments and the decay of all momenta, solved together."""
+    mechanism: Mechanism = evidence.element.mechanism
+    g = np.array(mechanism.gravity)
+    remedy = "find these terms in the engine, each alone"
+
+    def model(x: FloatArray) -> Change:
+        return Change(mechanism, gravity=(1 + x[0]) * g, gyroscopic=1 + float(x[1]), decay=(float(x[2]), float(x[2])))
+
+    rows = np.eye(3)
+    plain = residuals.left(model(np.zeros(3)))
+    least = np.minimum(residuals.leaves, residuals.closes * residuals.before)
+    kept = [k for k in range(3) if np.any(residuals.left(model(rows[k])) != plain)]
+    values = np.zeros(3)
+    while len(kept) > 1:
+        values = rows[:, kept] @ residuals.numbers_of(lambda x: model(rows[:, kept] @ x), len(kept))
+        shares = [
+            float(np.max(np.abs(residuals.left(model(values[k] * rows[k])) - plain) / least, initial=0.0)) for k in kept
+        ]
+        if min(shares) > 1:  # below it a number is within its error
+            break
+        kept.pop(int(np.argmin(shares)))
+    factors = {name: 1 + values[k] for k, name in enumerate(("gravity", "the gyroscopic moments w x I w")) if k in kept}
+    if len(kept) < 2 or values[2] < 0 or not all(possible(factor, signed=True) for factor in factors.values()):
+        return
+    words = [f"{name} {factor_text(factor)}" for name, factor in factors.items()]
+    words += [f"velocities and spins of all bodies damped at a rate of {values[2]:.4g} per second"] if 2 in kept else []
+    says = f"the engine moves it with {' and '.join(words)}"
+    yield CauseRow("several numbers", says, model(values), remedy, fitted=len(kept))
 
 
 @by_rows("friction of one joint", _ONE_FACTOR)

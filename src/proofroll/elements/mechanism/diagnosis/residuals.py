@@ -42,6 +42,8 @@ GIVEN = (
 _OPEN = 1e-2
 # Time by which the loads of a first-order scheme act too early or late, in steps: 0.5, and what a fit of it leaves.
 _FIRST_ORDER = 0.6
+# Largest residual of a right model: in those of a scheme of first order, and by rounding and soft constraints alone.
+_BY_STEP, _ROUNDED = 3.0, 1e-3
 # Error of the accelerations at the start, in imbalances of the first steps.
 _KNOWN = 10.0
 # Part of the load that is left where a change moves the mechanism with accelerations of another order of magnitude.
@@ -68,9 +70,10 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
     part = stretch(evidence.element, evidence.run, evidence.truth)
     if float(np.max(evidence.run["drift"].to_numpy())) > _OPEN * evidence.element.length:
         return
-    if part is None or not is_one_motion(evidence.run, evidence.truth, evidence.element.length):
+    if part is None or not is_one_motion(evidence.run, evidence.truth, evidence.element.length, evidence.step or 0.0):
         return
-    seen, true = (of_run(evidence.element, data, part) for data in (evidence.run, evidence.truth))
+    seen = of_run(evidence.element, evidence.run, part, step=evidence.step or 0.0)
+    true = of_run(evidence.element, evidence.truth, part)
     if not seen.consistent:
         return
     true_sizes = np.abs(true.left(plain))
@@ -84,7 +87,9 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
         allowed = CLOSES * difference + _KNOWN * _doubt(evidence, at_start)
         contradicted = partial(contradicts_first_steps, at_start, allowed)
         residuals = _residuals_at(seen, "along the run", difference, CLOSES, contradicted, tells)
-        yield replace(residuals, scheme=_left_by_scheme(evidence, seen, part)[tells])
+        scheme = _left_by_scheme(evidence, seen, part)[tells]
+        leaves = np.maximum(_BY_STEP * scheme, max(_ROUNDED, ABOVE * floor))
+        yield replace(residuals, scheme=scheme, leaves=leaves)
 
 
 def _left_by_scheme(evidence: Evidence, seen: MechanismStates, part: slice) -> FloatArray:
