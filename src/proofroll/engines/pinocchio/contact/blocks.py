@@ -21,7 +21,7 @@ _SETTLED, _SWEEPS = 1e-12, 2000
 # Sweeps after which it may go round in circles, as contacts of one foot share its load; then each step is a part of it.
 _CIRCLES, _SHORTER = 200, 0.6
 # Sweeps between two solutions of all equations of what sticks and presses at once.
-_TOGETHER = 4
+_TOGETHER = 2
 _ACCEPTED = 1e-5  # change that is taken where no solver reaches the tolerance
 _TURNS, _LONGEST_TURN = 40, 0.7  # steps of a search for a direction, and the longest of them [rad]
 _ALONG = 1e-10  # slip across a direction, relative to the largest speed, that is found
@@ -39,6 +39,11 @@ class Block(NamedTuple):
     first: int
     friction: float | None
     bound: float = math.inf
+
+    @property
+    def least(self) -> float:
+        """Least impulse of a joint's row."""
+        return 0.0 if math.isinf(self.bound) else -self.bound
 
     @property
     def rows(self) -> slice:
@@ -93,27 +98,33 @@ def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array
     """
     f, speed = guess.copy(), float(np.abs(g).max()) or 1.0
     u, change = g + G @ f, math.inf
-    mobilities = [G[block.rows, block.rows].tolist() for block in blocks]
+    joints = [(block.first, block.least, block.bound) for block in blocks if block.friction is None]
+    contacts = [
+        (block.rows, G[block.rows, block.rows].tolist(), G[block.rows], block.friction)
+        for block in blocks
+        if block.friction is not None
+    ]
+    diagonal = G.diagonal().tolist()
     part = 1.0  # of the way to a block's own solution
     for sweep in range(1, _SWEEPS):
         part = part if sweep % _CIRCLES else _SHORTER * part
         change = 0.0
-        for block, mobility in zip(blocks, mobilities, strict=True):
-            rows = block.rows
-            old, velocities = f[rows].tolist(), u[rows].tolist()
-            if block.friction is None:
-                impulse = old[0] - velocities[0] / mobility[0][0]
-                new = [max(impulse, 0.0 if math.isinf(block.bound) else -block.bound)]
-                new = [min(new[0], block.bound)]
-            else:
-                free = [
-                    velocity - sum(row[k] * old[k] for k in range(3))
-                    for velocity, row in zip(velocities, mobility, strict=True)
-                ]
-                new = _contact(mobility, free, block.friction, old, speed)
-            steps = [part * (a - b) for a, b in zip(new, old, strict=True)]
+        for row, least, bound in joints:
+            old, mobility = float(f[row]), diagonal[row]
+            if step := part * (min(max(old - float(u[row]) / mobility, least), bound) - old):
+                u += step * G[row]
+                f[row] += step
+                change = max(change, abs(step * mobility))
+        for rows, mobility, response, friction in contacts:
+            impulse, velocities = f[rows].tolist(), u[rows].tolist()
+            free = [
+                velocity - (x * impulse[0] + y * impulse[1] + z * impulse[2])
+                for velocity, (x, y, z) in zip(velocities, mobility, strict=True)
+            ]
+            new = _contact(mobility, free, friction, impulse, speed)
+            steps = [part * (a - b) for a, b in zip(new, impulse, strict=True)]
             if any(steps):
-                u += steps @ G[rows]
+                u += steps @ response
                 f[rows] += steps
                 change = max(change, *(abs(step * mobility[k][k]) for k, step in enumerate(steps)))
         if not change > _SETTLED * part * speed:
@@ -151,7 +162,7 @@ def _at_once(G: Array, u: Array, f: Array, blocks: Sequence[Block]) -> Array:
 def _allowed(impulse: Sequence[float], block: Block) -> bool:
     """True if a block can have an impulse, but for round-off."""
     if block.friction is None:
-        return (0.0 if math.isinf(block.bound) else -block.bound) <= impulse[0] <= block.bound
+        return block.least <= impulse[0] <= block.bound
     return math.hypot(*impulse[:2]) <= block.friction * impulse[2] * (1 + _SETTLED)
 
 
