@@ -25,8 +25,8 @@ _MOST = 5000
 _defines: dict[str, str] = {}
 
 
-class Asked(Protocol):
-    """What answers questions about a file: a process of an engine, or what it answered before."""
+class AnswersQuestions(Protocol):
+    """Protocol of a process of an engine, or of its earlier answers."""
 
     def request(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
         """See :meth:`proofroll.running.process.Worker.request`."""

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, fromstring
 from proofroll.core.errors import InputError
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.robots.files import reading
-from proofroll.robots.files.definer import Asked, Definer
+from proofroll.robots.files.definer import AnswersQuestions, Definer
 from proofroll.robots.files.mjcf.compiler import Compiler, compiled_robot, expand
 from proofroll.robots.files.opening import open_robot
 from proofroll.robots.files.robot_file import RobotFile
@@ -110,7 +110,7 @@ def opened(
 
 
 def by_definer(
-    kind: str, path: Path, workers: Workers | None, ask: Callable[[Asked], tuple[_Answer, Compiler]]
+    kind: str, path: Path, workers: Workers | None, ask: Callable[[AnswersQuestions], tuple[_Answer, Compiler]]
 ) -> tuple[_Answer, Compiler]:
     """Answer of the engine that defines a format, and its name. Raises InputError if its process dies."""
     with lent_workers(workers) as lent:

@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.errors import InputError, Missing, Refused
 from proofroll.files.json_data import plain
-from proofroll.robots.files.definer import Asked
+from proofroll.robots.files.definer import AnswersQuestions
 from proofroll.robots.files.reading import call, load_reader, reader_names, robot_from, words_of
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.model import Robot
@@ -78,7 +78,9 @@ def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, A
     return {"message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"}
 
 
-def compiled_robot(worker: Asked, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
+def compiled_robot(
+    worker: AnswersQuestions, file: RobotFile, written: Path, time_limit: float
+) -> tuple[Robot, Compiler]:
     """Robot of an MJCF, and the engine that compiled it.
 
     Raises:
@@ -102,7 +104,7 @@ def compiled_robot(worker: Asked, file: RobotFile, written: Path, time_limit: fl
 
 
 def near_shapes(
-    worker: Asked, path: Path, copy: Path, asked: Mapping[str, Any], time_limit: float
+    worker: AnswersQuestions, path: Path, copy: Path, asked: Mapping[str, Any], time_limit: float
 ) -> tuple[dict[str, Any], Compiler]:
     """Shapes of a robot file that come near each other, and the engine that says so.
 
@@ -124,7 +126,9 @@ def near_shapes(
     return answer["near"], Compiler(*answer["by"])
 
 
-def expand(worker: Asked, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
+def expand(
+    worker: AnswersQuestions, path: Path, parts: Mapping[str, Element], time_limit: float
+) -> tuple[Element, Compiler]:
     """Root of an MJCF with macros written out, and the engine that did so.
 
     Args:
