@@ -1,4 +1,4 @@
-"""Answers of the engine that defines a format: asked once by the processes of a command, and again if a file changes."""
+"""Answers of the engine that defines a format: asked once in a command, and again if a file changes."""
 
 from __future__ import annotations
 
