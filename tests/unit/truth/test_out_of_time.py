@@ -32,7 +32,7 @@ def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("name", "parameters"),
-    [("bouncing_ball", {"restitution": 0.8}), ("stopped_fall", {})],
+    [("bouncing_ball", {"restitution": 0.8}), ("stopped_fall", {}), ("double_pendulum", {})],
 )
 @pytest.mark.usefixtures("ticking")
 def test_a_limit_keeps_what_came_before(name: str, parameters: dict[str, float]) -> None:
