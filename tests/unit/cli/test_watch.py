@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from proofroll.cli.watch import _written
+from proofroll.core.errors import InputError
 from proofroll.files.data_folders import data_folder
 from proofroll.files.kept_runs import kept_lines, kept_path, run_file
 
@@ -41,6 +42,25 @@ def test_a_saved_file_is_seen(tmp_path: Path) -> None:
     assert _written(str(tmp_path), None) == seen
     (tmp_path / "scene.toml").write_text("title = 'another'\n", encoding="utf-8")
     assert _written(str(tmp_path), None) != seen
+
+
+def test_a_page_beside_its_scene_is_no_change(tmp_path: Path) -> None:
+    """A page that is written beside the scene, a file that is half written and a link to nothing run nothing again."""
+    (tmp_path / "scene.toml").write_text("title = 'a'\n", encoding="utf-8")
+    seen = _written(str(tmp_path), None)
+    for name in ("watch.html", "watch.js", ".watch.html.0123456789ab"):
+        (tmp_path / name).touch()
+    (tmp_path / "gone").symlink_to(tmp_path / "nowhere")
+    assert _written(str(tmp_path), None) == seen
+    shutil.rmtree(tmp_path)
+    assert _written(str(tmp_path), None) != seen
+
+
+@pytest.mark.parametrize("until", ["nan", "-1"])
+def test_a_time_that_is_none_is_refused(proofroll: Proofroll, tmp_path: Path, until: str) -> None:
+    """A time that no run has is one line, before any engine starts."""
+    code, _, err = proofroll("watch", "pendulum", "--out", str(tmp_path / "page.html"), "--until", until, "--once")
+    assert (code, err.count("\n"), "until" in err) == (2, 1, True)
 
 
 def test_a_page_of_another_kind_is_refused(proofroll: Proofroll, tmp_path: Path) -> None:
@@ -79,6 +99,14 @@ def test_a_path_wins_over_a_kept_name(proofroll: Proofroll, tmp_path: Path, monk
     assert run_file("a") == kept_path("a")
     Path("a").touch()
     assert run_file("a") == Path("a")
+    kept_path("gone").symlink_to("nowhere")
     assert [line.split()[-3:] for line in kept_lines()] == [["cannot", "be", "read"]]
     code, _, err = proofroll("run", "pendulum", "--engine", "mujoco", "--keep", "../a")
     assert (code, "letters, digits" in err) == (2, True)
+
+
+@pytest.mark.parametrize("name", ["a b", "-a", ".a", ""])
+def test_a_name_that_a_command_would_misread_is_refused(name: str) -> None:
+    """A name is one word that is no option."""
+    with pytest.raises(InputError, match="letters, digits"):
+        kept_path(name)
