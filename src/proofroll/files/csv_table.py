@@ -4,16 +4,20 @@ The header names each column as ``q.pivot [rad]``. An array has a column for eac
 follow its name: ``p_WB/rod/x [m]``. Attributes, and variables without the dimension time, are left out.
 """
 
+from __future__ import annotations
+
 import csv
 import io
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from proofroll.core.unit_conversion import name_and_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _LONGEST = 300  # characters of names that a message lists
 _AXES = ("xyz", "wxyz")
@@ -100,6 +104,8 @@ def read_csv(text: str, new_names: Mapping[str, str] | None = None) -> xr.Datase
             if not names[0].isdigit():
                 coordinates[dims[-1]] = list(names)
         variables[name] = (dims, values, {"units": units[name].pop()} if name in units else {})
+    import xarray as xr
+
     return xr.Dataset(variables, coordinates)
 
 

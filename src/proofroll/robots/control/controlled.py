@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,7 +23,6 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import TOGETHER
 from proofroll.elements.mechanism.scene.policy import PolicySource
 from proofroll.robots.control.base_frames import BaseFrame, base_frames
-from proofroll.robots.control.bookkeeping.air import HeldRobot, links_of
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
 from proofroll.robots.control.imported import imported_robots
 from proofroll.robots.files.actuators import scene_actuators
@@ -43,6 +42,9 @@ from proofroll.robots.files.scene_tables import (
 from proofroll.robots.model import Array, Robot
 from proofroll.robots.protocol import lift
 from proofroll.robots.states import RobotStates
+
+if TYPE_CHECKING:
+    from proofroll.robots.control.bookkeeping.air import HeldRobot
 
 _DURATION = 0.1  # s: what is wrong with the bookkeeping of a controller shows in the air within it
 _GRID, _STEP = 4e-3, 5e-4  # s: sampling of a first look, and its longest step
@@ -147,6 +149,8 @@ class ControlledScenes:
             return made_mechanism(tables, (x, y, z), Parameters({}, {}))
 
         def held(robot: Robot, frame: BaseFrame | None) -> HeldRobot:
+            from proofroll.robots.control.bookkeeping.air import HeldRobot, links_of
+
             based = robot if frame is None else frame.based(robot)
             return HeldRobot(mechanism_of(based), links_of(based))
 

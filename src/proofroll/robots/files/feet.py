@@ -6,11 +6,9 @@ of who touches whom needs no rules of ours. Of a URDF the pairs with a floor cou
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree.ElementTree import fromstring, tostring
@@ -125,7 +123,7 @@ def ground_tables(
         "floor": of_urdf or ground == ON_A_PLANE,
         "drop": standing.drop,
     }
-    found = _near(file.path, file.kind, content, json.dumps(plain(asked)))
+    found = _near(file.path, file.kind, content, dict(plain(asked)))
     shapes = [_shape(standing, row) for row in found["shapes"]]
     pairs = [_NearPair(**row | {"shapes": tuple(shapes[k] for k in row["shapes"])}) for row in found["pairs"]]
     pairs = [pair for pair in pairs if pair.moves and (pair.on_floor or not of_urdf)]
@@ -328,13 +326,10 @@ def _meshes(links: Sequence[str]) -> list[str]:
     return [f"collision meshes of {named}"]
 
 
-@lru_cache(maxsize=8)
-def _near(path: Path, kind: str, content: bytes, asked: str) -> dict[str, Any]:
+def _near(path: Path, kind: str, content: bytes, asked: dict[str, Any]) -> dict[str, Any]:
     """Shapes that come near each other in a robot file of this content; see the function that answers."""
     file = RobotFile(path, kind, fromstring(content))
     with tempfile.TemporaryDirectory() as folder:
         copy = reading.write(file, Path(folder))
-        found, _ = by_definer(
-            "mjcf", path, None, lambda worker: near_shapes(worker, path, copy, json.loads(asked), TIME_LIMIT)
-        )
+        found, _ = by_definer("mjcf", path, None, lambda worker: near_shapes(worker, path, copy, asked, TIME_LIMIT))
     return found

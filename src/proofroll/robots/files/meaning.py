@@ -3,7 +3,6 @@
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 from xml.etree.ElementTree import Element, fromstring
@@ -11,6 +10,7 @@ from xml.etree.ElementTree import Element, fromstring
 from proofroll.core.errors import InputError
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.robots.files import reading
+from proofroll.robots.files.definer import Asked, Definer
 from proofroll.robots.files.mjcf.compiler import Compiler, compiled_robot, expand
 from proofroll.robots.files.opening import open_robot
 from proofroll.robots.files.robot_file import RobotFile
@@ -18,12 +18,9 @@ from proofroll.robots.files.urdf import read_urdf
 from proofroll.robots.model import Robot
 from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
-from proofroll.running.process import Worker, WorkerDied
+from proofroll.running.process import WorkerDied
 
 _Answer = TypeVar("_Answer")
-# Format -> engine that was last found to define it, whose idle process is asked first. Until it is known, the process
-# is named by the format, and renamed after its first answer.
-_defines: dict[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -113,24 +110,18 @@ def opened(
 
 
 def by_definer(
-    kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, Compiler]]
+    kind: str, path: Path, workers: Workers | None, ask: Callable[[Asked], tuple[_Answer, Compiler]]
 ) -> tuple[_Answer, Compiler]:
     """Answer of the engine that defines a format, and its name. Raises InputError if its process dies."""
-    asked = _defines.get(kind, kind)
     with lent_workers(workers) as lent:
         try:
-            with lent.lend(asked) as worker:
-                answer, by = ask(worker)
+            return ask(Definer(kind, path, lent))
         except WorkerDied as error:
             raise InputError("file", path, f"it could not be compiled: {error}") from None
-        _defines[kind] = by.engine
-        lent.rename(asked, by.engine)  # the process has loaded this engine, which is asked for its reading next
-    return answer, by
 
 
-@lru_cache(maxsize=8)
 def robot_of_text(path: Path, kind: str, base: str, content: bytes) -> Robot:
-    """Robot of a file with this content; cached, for an MJCF is compiled in a separate process.
+    """Robot of a file with this content.
 
     Raises:
         InputError: the file describes no robot.

@@ -41,7 +41,7 @@ class MjxSettings:
 
     @property
     def precision(self) -> str:
-        """Of the arithmetic."""
+        """Precision of the arithmetic."""
         return _PRECISIONS[self.formulation]
 
     @property

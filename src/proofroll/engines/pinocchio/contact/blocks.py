@@ -20,6 +20,8 @@ from proofroll.elements.mechanism.scene.rotations import Array
 _SETTLED, _SWEEPS = 1e-12, 2000
 # Sweeps after which it may go round in circles, as contacts of one foot share its load; then each step is a part of it.
 _CIRCLES, _SHORTER = 200, 0.6
+# Sweeps between two solutions of all equations of what sticks and presses at once.
+_TOGETHER = 4
 _ACCEPTED = 1e-5  # change that is taken where no solver reaches the tolerance
 _TURNS, _LONGEST_TURN = 40, 0.7  # steps of a search for a direction, and the longest of them [rad]
 _ALONG = 1e-10  # slip across a direction, relative to the largest speed, that is found
@@ -116,7 +118,41 @@ def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array
                 change = max(change, *(abs(step * mobility[k][k]) for k, step in enumerate(steps)))
         if not change > _SETTLED * part * speed:
             break
+        if sweep % _TOGETHER == 0 and part == 1.0:
+            closer = f + _at_once(G, u, f, blocks)
+            if all(_allowed(closer[block.rows].tolist(), block) for block in blocks):
+                f, u = closer, g + G @ closer
     return f, change / (part * speed)
+
+
+def _at_once(G: Array, u: Array, f: Array, blocks: Sequence[Block]) -> Array:
+    """Change of impulses that stops all rows that stick or press, while slips keep their directions."""
+    columns, held = [], []
+    for block in blocks:
+        impulse = f[block.rows]
+        if block.friction is None:
+            moves = [np.ones(1)] if 0 < abs(impulse[0]) < block.bound else []
+        elif math.hypot(*impulse[:2]) < block.friction * impulse[2] * (1 - _SETTLED):
+            moves = list(np.eye(3))
+        else:
+            moves = [impulse / impulse[2]] if impulse[2] > 0 else []
+        rows = range(block.rows.stop - len(moves), block.rows.stop)
+        for row, move in zip(rows, moves, strict=True):
+            column = np.zeros(len(f))
+            column[block.rows] = move
+            columns.append(column)
+            held.append(row)
+    if not columns:
+        return np.zeros(len(f))
+    basis = np.array(columns).T
+    return np.asarray(basis @ np.linalg.lstsq(G[held] @ basis, -u[held], rcond=None)[0])
+
+
+def _allowed(impulse: Sequence[float], block: Block) -> bool:
+    """True if a block can have an impulse, but for round-off."""
+    if block.friction is None:
+        return (0.0 if math.isinf(block.bound) else -block.bound) <= impulse[0] <= block.bound
+    return math.hypot(*impulse[:2]) <= block.friction * impulse[2] * (1 + _SETTLED)
 
 
 def _contact(

@@ -12,10 +12,10 @@ import numpy as np
 
 from proofroll.core.errors import InputError, Missing, Refused
 from proofroll.files.json_data import plain
+from proofroll.robots.files.definer import Asked
 from proofroll.robots.files.reading import call, load_reader, reader_names, robot_from, words_of
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.model import Robot
-from proofroll.running.process import Worker
 
 
 class Compiler(NamedTuple):
@@ -78,7 +78,7 @@ def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, A
     return {"message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"}
 
 
-def compiled_robot(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
+def compiled_robot(worker: Asked, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
     """Robot of an MJCF, and the engine that compiled it.
 
     Raises:
@@ -102,12 +102,12 @@ def compiled_robot(worker: Worker, file: RobotFile, written: Path, time_limit: f
 
 
 def near_shapes(
-    worker: Worker, path: Path, copy: Path, asked: Mapping[str, Any], time_limit: float
+    worker: Asked, path: Path, copy: Path, asked: Mapping[str, Any], time_limit: float
 ) -> tuple[dict[str, Any], Compiler]:
     """Shapes of a robot file that come near each other, and the engine that says so.
 
     Args:
-        worker: process of the engine.
+        worker: answers for the engine.
         path: path of the user's file, for messages.
         copy: its copy, with contacts.
         asked: further arguments of :meth:`proofroll.robots.importers.mujoco.MujocoRobots.near_shapes`.
@@ -124,11 +124,11 @@ def near_shapes(
     return answer["near"], Compiler(*answer["by"])
 
 
-def expand(worker: Worker, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
+def expand(worker: Asked, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
     """Root of an MJCF with macros written out, and the engine that did so.
 
     Args:
-        worker: process of the engine.
+        worker: answers for the engine.
         path: path of the user's file, for messages.
         parts: name -> content of the file (first) and of the files that it attaches.
         time_limit: limit for the answer [s].

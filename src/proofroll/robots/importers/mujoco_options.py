@@ -1,0 +1,65 @@
+"""Options of a person's own MJCF: integrator, step and cone, and what else differs from MuJoCo's defaults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from proofroll.core.engine_abilities import OwnOptions
+from proofroll.core.errors import InputError
+from proofroll.core.number_format import counted, number
+from proofroll.robots.files.robot_file import read_xml
+
+# Integrators that the adapter has, by their number in MuJoCo.
+_INTEGRATORS = {
+    int(getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}")): name for name in ("Euler", "RK4", "implicitfast")
+}
+_CONES = {int(mujoco.mjtCone.mjCONE_PYRAMIDAL): "pyramidal", int(mujoco.mjtCone.mjCONE_ELLIPTIC): "elliptic"}
+# Options that are settings, that the scene has, and that act on contacts, islands and speed alone.
+_READ = {"integrator", "timestep", "cone", "gravity", "density", "viscosity", "disableflags", "disableactuator"}
+_READ |= {"impratio", "sleep_tolerance", "wind", "magnetic", "enableflags", "jacobian"}
+_READ |= {f"{family}_{what}" for family in ("o", "ccd", "sdf") for what in ("friction", "margin", "solref", "solimp")}
+_READ |= {"ccd_iterations", "ccd_tolerance", "sdf_iterations", "sdf_initpoints"}
+_FLAGS = {"EULERDAMP": "eulerdamp", "REFSAFE": "refsafe"}  # of joints and rows, which no scene has
+
+
+def own_options(path: Path) -> OwnOptions | None:
+    """Options of an MJCF file: integrator, step and cone; what the adapter sets otherwise is named.
+
+    None: the file is a URDF.
+
+    Raises:
+        InputError: MuJoCo cannot read the file, or the adapter has none of its integrator.
+    """
+    if read_xml(path).tag == "robot":
+        return None
+    try:
+        spec, plain = mujoco.MjSpec.from_file(str(path)), mujoco.MjSpec()
+    except ValueError as error:
+        raise InputError("--like", path, f"MuJoCo cannot read it: {error}") from None
+    option = spec.option
+    integrator = _INTEGRATORS.get(int(option.integrator))
+    if integrator is None:
+        known = ", ".join(_INTEGRATORS.values())
+        raise InputError("--like", path, f"its integrator is none that can be compared; choose {known}")
+    keys = [key for key in dir(option) if not key.startswith("_") and key not in _READ]
+    unlike = [key for key in keys if np.any(getattr(option, key) != getattr(plain.option, key))]
+    solver = mujoco.mjtSolver(int(option.solver)).name.removeprefix("mjSOL_")
+    words = {"solver": f"solver {solver}", "iterations": f"{option.iterations} iterations"}
+    others = [words.get(key, f"{key} {getattr(option, key):g}") for key in unlike]
+    bits = mujoco.mjtDisableBit
+    others += [f"flag {word}" for name, word in _FLAGS.items() if option.disableflags & getattr(bits, f"mjDSBL_{name}")]
+    usual = {"joints": plain.worldbody.add_body().add_joint(), "equalities": plain.add_equality()}
+    for kind, element in usual.items():
+        for key in [key for key in dir(element) if key.startswith(("solref", "solimp"))]:
+            count = sum(bool(np.any(getattr(item, key) != getattr(element, key))) for item in getattr(spec, kind))
+            others += [f"{key.replace('_', '')} of {counted(count, kind)}"] if count else []
+    return OwnOptions(
+        engine="mujoco",
+        words=f"{integrator}, dt {number(option.timestep, 3)} s",
+        settings={"integrator": integrator, "dt": f"{option.timestep:.12g}"},
+        of_contacts={"cone": _CONES[int(option.cone)]},
+        others=others,
+    )
