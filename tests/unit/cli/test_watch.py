@@ -87,6 +87,9 @@ def test_kept_runs_are_listed_and_shown_together(
     page = Path("out/runs/a-replay.html").read_text(encoding="utf-8")
     assert "MuJoCo joints" in page
     assert "Exudyn redundant" in page
+    assert proofroll(*run, "--engine", "truth", "--every", "0.02", "--keep", "true")[0] == 0
+    assert proofroll("replay", "true", "a")[0] == 0
+    assert "The curves of mujoco that are" in Path("out/runs/true-replay.html").read_text(encoding="utf-8")
     code, _, err = proofroll("replay", "a", "c")
     assert (code, "several scenes or parameters" in err) == (2, True)
 
