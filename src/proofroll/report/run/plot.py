@@ -30,7 +30,7 @@ def read_run(path: Path) -> xr.Dataset:
         raise InputError(
             "run",
             path,
-            "there is no such file, nor a kept run; proofroll replay lists these",
+            "no such file or kept run; proofroll replay lists these",
         ) from None
     except (OSError, ValueError, TypeError, KeyError):
         raise InputError("run", path, "no run in netCDF or npz; proofroll run … --out writes one") from None

@@ -91,10 +91,9 @@ def _compiled(path: Path, base_joint: str, *, floor: bool) -> Any:
         spec.worldbody.bodies[0].add_freejoint().name = base_joint
     if floor:
         every = 2**31 - 1
-        floors = {geom.name: geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE}
-        for item in [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & floors.keys()]:
-            spec.delete(item)
-        for item in floors.values():
+        floors = [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE]
+        pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & {geom.name for geom in floors}]
+        for item in (*pairs, *floors):
             spec.delete(item)
         spec.worldbody.add_geom(
             name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=every, conaffinity=every
