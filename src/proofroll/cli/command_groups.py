@@ -41,7 +41,6 @@ class GroupedCommands(TyperGroup):
         left = dict.fromkeys(self.list_commands(ctx))
         widest = max(map(len, left), default=0)
         margin = max(map(len, (*GROUPS, _OTHERS)))
-        formatter.write_paragraph()
         for group, names in (*GROUPS.items(), (_OTHERS, tuple(left))):
             title = group
             for name in (name for name in names if name in left):

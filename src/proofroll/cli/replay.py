@@ -27,10 +27,10 @@ def replay(
     control: options.Control = None,
     _root: options.Root = None,
 ) -> None:
-    """Show stored runs in motion beside the truth, as a page; without a name, list the runs that are kept.
+    """Show stored runs beside the truth, as a page; or list them.
 
     Several runs of one scene are shown together, at the instants that all have. Below are the curves of the first, as
-    with `proofroll run --plot`.
+    with `proofroll run --plot`. Without a name, the runs that are kept are listed.
     """
     from proofroll.files.kept_runs import kept_lines, run_file
     from proofroll.report.run.plot import read_run

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -42,18 +43,20 @@ def watch(
     ),
     once: Annotated[bool, typer.Option("--once", help="Run the scene as it is now, and end.")] = False,
 ) -> None:
-    """Run a scene in three engines whenever its files are saved, in motion on a page that reloads. Ctrl-C ends it.
+    """Show a scene in motion whenever its files change. Ctrl-C ends it.
 
-    The page has every engine that is done beside the truth. A file that makes no sense is one line here, and the page
-    stays.
+    The page has the truth and three engines, or those of --engine, and loads itself again. A file that makes no sense
+    is one line here, and the page stays.
     """
+    from proofroll.core.time_grid import time_grid
     from proofroll.running.idle_workers import Workers
 
     options.require_writable(out)
     options.require_pages()
     if out.suffix.lower() != ".html":
         raise InputError("--out", out, "what is watched is a page: end the name of the file in .html")
-    named, seen, workers = options.controlled(scene, control), "", Workers(patience=_LIMIT)
+    time_grid(0.0 if until is None else until, _UNIT)
+    named, seen, workers = options.controlled(scene, control), None, Workers(patience=_LIMIT)
     while True:
         if (now := _written(scene, control)) != seen:
             seen = now
@@ -68,15 +71,17 @@ def watch(
         time.sleep(_LOOK)
 
 
-def _written(scene: str, control: Path | None) -> str:
-    """Names, times and sizes of the files beside those of a scene, which change when one is saved."""
+def _written(scene: str, control: Path | None) -> dict[Path, tuple[int, int]]:
+    """Times [ns] and sizes of the files beside those of a scene but pages and hidden ones, which are not its own."""
     from proofroll.files.scene_sources import resolved
 
     places = [Path(resolved(scene)), *([control.resolve()] if control else [])]
-    folders = {place if place.is_dir() else place.parent for place in places}
-    files = sorted(file for folder in folders for file in folder.iterdir() if file.is_file())
-    stats = [(file, file.stat()) for file in files]
-    return repr([(str(file), stat.st_mtime_ns, stat.st_size) for file, stat in stats])
+    written = {}
+    for file in (file for place in places for file in (place if place.is_dir() else place.parent).glob("[!.]*")):
+        with suppress(OSError):  # it may vanish meanwhile
+            if file.is_file() and file.suffix.lower() not in (".html", ".js"):
+                written[file] = (file.stat().st_mtime_ns, file.stat().st_size)
+    return written
 
 
 def _write(out: Path, scene: str, runs: Sequence[xr.Dataset], begun: float, **others: Any) -> None:

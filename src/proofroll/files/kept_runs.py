@@ -10,13 +10,13 @@ from pathlib import Path
 from proofroll.core.errors import InputError
 
 _FOLDER = Path("out", "runs")
-_NAME = re.compile(r"[\w-][\w.-]*")
+_NAME = re.compile(r"\w[\w.-]*")
 
 
 def kept_path(name: str) -> Path:
-    """File of a run with a name. Raises InputError unless it has letters, digits, ``-``, ``_`` and ``.`` alone."""
+    """File of a run with a name. Raises InputError unless it has letters, digits, ``_``, ``-`` and ``.`` alone."""
     if not _NAME.fullmatch(name):
-        raise InputError("--keep", name, "give a name of letters, digits, - and _")
+        raise InputError("--keep", name, "give a name of letters, digits, _, and behind the first - and .")
     return _FOLDER / f"{name}.nc"
 
 
@@ -30,7 +30,7 @@ def kept_lines() -> Iterator[str]:
     """A line for each kept run, the newest first: name, date, scene, engine, and how it ended."""
     from proofroll.files.trajectory_file import read
 
-    files = sorted(_FOLDER.glob("*.nc"), key=lambda file: file.stat().st_mtime, reverse=True)
+    files = sorted(filter(Path.is_file, _FOLDER.glob("*.nc")), key=lambda file: file.stat().st_mtime, reverse=True)
     if not files:
         yield f"No run is kept in {_FOLDER}; proofroll run … --keep NAME keeps one."
         return

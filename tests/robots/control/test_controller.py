@@ -97,6 +97,11 @@ def test_targets_are_formulas_numbers_or_tables(tmp_path: Path) -> None:
         (("0.32, 1, 0, 0, 0", "0.32, 1, 1, 0, 0"), "a quaternion of length 1, scalar first"),
         (("base_velocity = [0, 0, 0, ", "base_velocity = ["), "start.base_velocity = (0.1, 0.0, 0.0): give six"),
         (("{FOOT = 0.016}", '"cubes"'), """ground.feet = 'cubes': give "file","""),
+        (("{FOOT = 0.016}", "{}"), """ground.feet = {}: give "file","""),
+        (("{FOOT = 0.016}", "{FOOT = -1}"), """ground.feet = {'FOOT': -1.0}: give "file","""),
+        (("{FOOT = 0.016}", "{FOOT = nan}"), "ground.feet.FOOT = nan: give a finite number"),
+        (("{FOOT = 0.016}", '{FOOT = "3 kg"}'), "ground.feet.FOOT = '3 kg': this number is in m"),
+        (("{FOOT = 0.016}", "3"), "ground.feet = 3: give a table"),
         (("friction = 0.8", "friction = -1"), "ground.friction = -1.0: must be at least 0"),
         ((', "R_KNEE"]', "]"), "order = ['L_HIP', 'R_HIP', 'L_KNEE']: it lacks R_KNEE"),
         ((', "R_KNEE"]', ', "L_HIP"]'), "order = ['L_HIP']: a joint is in the order twice"),
@@ -121,3 +126,11 @@ def test_a_wrong_field_is_one_line(tmp_path: Path, change: tuple[str, str], says
     assert says in str(caught.value)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
+
+
+def test_a_radius_has_a_unit(tmp_path: Path) -> None:
+    """The radius of a foot may be a text with a unit."""
+    text = FULL.replace("{FOOT = 0.016}", '{FOOT = "16 mm"}')
+    ground = read_controller(_written(tmp_path, text)).ground
+    assert ground is not None
+    assert ground.feet == {"FOOT": pytest.approx(0.016)}

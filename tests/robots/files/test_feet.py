@@ -129,7 +129,7 @@ def test_balls_may_stand_for_feet(stood: Callable[..., Scene]) -> None:
     control = CONTROL + "feet = {left = 0.03, rear = 0.04}\nfriction = 0.7\n"
     scene = stood(robot(), control)
     assert {name: pair.friction for name, pair in _pairs(scene).items()} == {"left": 0.7, "rear": 0.7}
-    with pytest.raises(InputError, match=r"ground.feet = 'front': the robot has no such link"):
+    with pytest.raises(InputError, match=r"ground.feet = 'front': the robot has no such link; choose from \w"):
         stood(robot(), CONTROL + "feet = {front = 0.03}\n")
 
 
@@ -139,6 +139,15 @@ def test_a_plane_stands_under_a_file_without_a_floor(stood: Callable[..., Scene]
     assert len(_pairs(stood(bare, ground=2))) == 3
     with pytest.raises(InputError, match="take --ground plane"):
         stood(bare, ground=1)
+
+
+@pytest.mark.parametrize("after", ["", '<contact><pair geom1="left_foot" geom2="floor"/></contact>'])
+def test_a_plane_takes_the_place_of_the_floor_of_a_file(stood: Callable[..., Scene], after: str) -> None:
+    """Ground = 2 lets each foot touch the plane z = 0 alone, wherever the file's floor is and whatever its name."""
+    high = robot(after=after).replace('type="plane"', 'type="plane" pos="0 0 1"')
+    scene = stood(high, ground=2)
+    assert len(_pairs(scene)) == 3
+    assert _height(scene) == pytest.approx(_height(stood(robot(), ground=2)))
 
 
 def test_meshes_that_collide_are_told(stood: Callable[..., Scene]) -> None:

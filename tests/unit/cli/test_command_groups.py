@@ -19,6 +19,14 @@ def test_every_command_has_one_group() -> None:
     assert set(_made(app).commands) <= set(named)
 
 
+def test_the_commands_fit_a_screen(proofroll: Proofroll) -> None:
+    """The list of commands leaves a line for the prompt on a screen of 80 columns and 24 lines."""
+    code, out, err = proofroll("--help")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert (max(map(len, lines)) <= 80, len(lines) < 24) == (True, True)
+
+
 @pytest.mark.parametrize("name", NOW)
 def test_an_old_command_is_answered_by_the_new_one(proofroll: Proofroll, name: str) -> None:
     """An old spelling runs nothing: one line names the new one, which is there."""

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from proofroll.cli.watch import _written
+from proofroll.core.errors import InputError
 from proofroll.files.data_folders import data_folder
 from proofroll.files.kept_runs import kept_lines, kept_path, run_file
 
@@ -43,6 +44,25 @@ def test_a_saved_file_is_seen(tmp_path: Path) -> None:
     assert _written(str(tmp_path), None) != seen
 
 
+def test_a_page_beside_its_scene_is_no_change(tmp_path: Path) -> None:
+    """A page that is written beside the scene, a file that is half written and a link to nothing run nothing again."""
+    (tmp_path / "scene.toml").write_text("title = 'a'\n", encoding="utf-8")
+    seen = _written(str(tmp_path), None)
+    for name in ("watch.html", "watch.js", ".watch.html.0123456789ab"):
+        (tmp_path / name).touch()
+    (tmp_path / "gone").symlink_to(tmp_path / "nowhere")
+    assert _written(str(tmp_path), None) == seen
+    shutil.rmtree(tmp_path)
+    assert _written(str(tmp_path), None) != seen
+
+
+@pytest.mark.parametrize("until", ["nan", "-1"])
+def test_a_time_that_is_none_is_refused(proofroll: Proofroll, tmp_path: Path, until: str) -> None:
+    """A time that no run has is one line, before any engine starts."""
+    code, _, err = proofroll("watch", "pendulum", "--out", str(tmp_path / "page.html"), "--until", until, "--once")
+    assert (code, err.count("\n"), "until" in err) == (2, 1, True)
+
+
 def test_a_page_of_another_kind_is_refused(proofroll: Proofroll, tmp_path: Path) -> None:
     """What is watched is a page."""
     code, _, err = proofroll("watch", "pendulum", "--out", str(tmp_path / "page.svg"))
@@ -67,6 +87,9 @@ def test_kept_runs_are_listed_and_shown_together(
     page = Path("out/runs/a-replay.html").read_text(encoding="utf-8")
     assert "MuJoCo joints" in page
     assert "Exudyn redundant" in page
+    assert proofroll(*run, "--engine", "truth", "--every", "0.02", "--keep", "true")[0] == 0
+    assert proofroll("replay", "true", "a")[0] == 0
+    assert "The curves of mujoco that are" in Path("out/runs/true-replay.html").read_text(encoding="utf-8")
     code, _, err = proofroll("replay", "a", "c")
     assert (code, "several scenes or parameters" in err) == (2, True)
 
@@ -79,6 +102,14 @@ def test_a_path_wins_over_a_kept_name(proofroll: Proofroll, tmp_path: Path, monk
     assert run_file("a") == kept_path("a")
     Path("a").touch()
     assert run_file("a") == Path("a")
+    kept_path("gone").symlink_to("nowhere")
     assert [line.split()[-3:] for line in kept_lines()] == [["cannot", "be", "read"]]
     code, _, err = proofroll("run", "pendulum", "--engine", "mujoco", "--keep", "../a")
     assert (code, "letters, digits" in err) == (2, True)
+
+
+@pytest.mark.parametrize("name", ["a b", "-a", ".a", ""])
+def test_a_name_that_a_command_would_misread_is_refused(name: str) -> None:
+    """A name is one word that is no option."""
+    with pytest.raises(InputError, match="letters, digits"):
+        kept_path(name)

@@ -59,7 +59,7 @@ def replay_page(
 ) -> str:
     """HTML page that replays runs: the truth of their scene, solid, and the runs, translucent; without a truth alone.
 
-    Below are the four curves of the first run that are furthest off, with the truth's; without a truth all of them.
+    Below are the four curves of the first engine's run that are furthest off, with the truth's; without a truth all.
 
     In a scene of several elements, each is a case of its own, for no force couples them. Behind the end of a truth
     that ends early neither it nor the run is drawn; the caption says when and why it ends.
@@ -95,6 +95,7 @@ def replay_page(
     elif true is None:
         true = truth(scene, longest["time"].to_numpy())
     run, *beside = until_end(scene, true, dict(enumerate([run, *beside]))).values()
+    judged = next((item for item in (run, *beside) if item.attrs["engine"] != "truth"), run)
     cases: list[ReplayCase] = []
     packed: list[str] = []
     captions: list[str] = []
@@ -118,11 +119,11 @@ def replay_page(
         templates(),
         "run_replay.html",
         title=scene.title,
-        curves=(has_truth and curves_beside_truth(scene, run, true)) or curves_alone(run),
+        curves=(has_truth and curves_beside_truth(scene, judged, true)) or curves_alone(run),
         replay=Replay(three(), 0, cases, packed),
         caption=" ".join(dict.fromkeys(captions)),
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
-        of_curves=str(run.attrs["engine"]) if beside else "",
+        of_curves=str((judged if has_truth else run).attrs["engine"]) if beside else "",
         script=script,
         version=version,
     )

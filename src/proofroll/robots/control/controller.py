@@ -94,7 +94,7 @@ class GroundContact:
         friction: coefficient of the pair of a foot and the ground; None: that of the file, or 1 where it has none.
     """
 
-    feet: str | dict[str, float] = FEET
+    feet: dict[str, float] | str = FEET
     friction: float | None = field(default=None, metadata={"unit": "1"})
 
 
@@ -188,8 +188,8 @@ class Controller:
             yield (
                 "ground.feet",
                 feet,
-                isinstance(feet, str) and feet != FEET,
-                (f'give "{FEET}", or a table of links and radii in m'),
+                feet != FEET if isinstance(feet, str) else not feet or min(feet.values()) < 0,
+                f'give "{FEET}", or a table of links and radii in m, of one at least',
             )
             friction = ground.friction
             yield "ground.friction", friction, friction is not None and friction < 0, "must be at least 0"
@@ -294,6 +294,9 @@ def controller_of(content: Mapping[str, Any], path: Path) -> Controller:
                     if key in table:
                         _require_table(f"start.{key}", table[key])
                         table[key] = _coordinates(f"start.{key}", table[key], str(unit))
+                if not isinstance(feet := table.get("feet", FEET), str):
+                    _require_table("ground.feet", feet)
+                    table["feet"] = _coordinates("ground.feet", feet, "m")
                 tables[name] = _NO_NUMBERS.filled(table, name, units_of(kind))
         return validated(Controller, tables, str(path))
 

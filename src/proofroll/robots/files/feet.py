@@ -257,7 +257,9 @@ def _balls(standing: StandingRobot, feet: Mapping[str, float], friction: float) 
     """Balls at the origins of links, on the plane z = 0."""
     geometries: dict[str, dict[str, Any]] = {}
     for link, radius in feet.items():
-        require_known("ground.feet", link, standing.robot.welded, "the robot has no such link; choose from")
+        require_known(
+            "ground.feet", link, filter(None, standing.robot.welded), "the robot has no such link; choose from"
+        )
         body, p, R = standing.place(link)
         if body == WORLD:
             raise InputError("ground.feet", link, "this link does not move; name one that does")

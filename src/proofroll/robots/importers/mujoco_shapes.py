@@ -39,7 +39,7 @@ def near_shapes(
         start: joint -> coordinates: those of one axis from the file's pose [rad or m], a quaternion, a place and one.
         servos: joint -> gains kp and kd, target from the file's pose, armature.
         base_joint: name of the joint that frees the root of a URDF; empty: nothing does.
-        floor: True to add a floor z = 0, which collides with every shape that collides with any.
+        floor: True for a floor z = 0 in place of the file's planes; each shape that collides with any collides with it.
         drop: height of the lowest shape over the floor [m]; None: as it is, or 1 cm where it overlaps the floor.
 
     Returns:
@@ -91,6 +91,10 @@ def _compiled(path: Path, base_joint: str, *, floor: bool) -> Any:
         spec.worldbody.bodies[0].add_freejoint().name = base_joint
     if floor:
         every = 2**31 - 1
+        floors = [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE]
+        pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & {geom.name for geom in floors}]
+        for item in (*pairs, *floors):
+            spec.delete(item)
         spec.worldbody.add_geom(
             name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=every, conaffinity=every
         )
