@@ -306,16 +306,11 @@ def at_times(
     """
     states = []
     for number, time in zip(stretches, times, strict=True):
-        kind, near = kinds(path.stretches[number].mode), number
-        for step in (-1, 1):
-            while 0 <= near + step < len(path.stretches) and kinds(path.stretches[near + step].mode) == kind:
-                if time > path.stretches[near].start if step < 0 else time < path.stretches[near].end:
-                    break
-                earlier = min(near, near + step)
-                # all but the time, which has its own last digit
-                if not np.array_equal(path.stretches[earlier].last[:-1], path.stretches[earlier + 1].first[:-1]):
-                    break
-                near += step
+        near = number
+        while near > 0 and time <= path.stretches[near].start and _goes_on(path.stretches[near - 1 :], kinds):
+            near -= 1
+        while time >= path.stretches[near].end and _goes_on(path.stretches[near:], kinds):
+            near += 1
         states.append(near)
     return states
 
@@ -326,15 +321,16 @@ def _alike(
     """Numbers of stretches of both routes that are in the same mode in turn, and the stretches from where they part.
 
     Changes at the same instant may come in either order; if that order matters, the margin of a decision is small. A
-    route may divide what the other follows in one stretch.
+    route may divide what the other follows in one stretch; a jump, as at an impact, divides it in both.
     """
     pairs, left = list[tuple[int, int]](), [list(path.stretches) for path in (path_a, path_b)]
     last: Any = None
     while all(left):
         if kinds(left[0][0].mode) == kinds(left[1][0].mode):
-            pairs.append((len(path_a.stretches) - len(left[0]), len(path_b.stretches) - len(left[1])))
-            last = kinds(left[0][0].mode)
-            del left[0][0], left[1][0]
+            last, parts = kinds(left[0][0].mode), [_parts(ones, kinds) for ones in left]
+            number_a, number_b = len(path_a.stretches) - len(left[0]), len(path_b.stretches) - len(left[1])
+            pairs += [(number_a + k, number_b + min(k, parts[1] - 1)) for k in range(parts[0])]
+            del left[0][: parts[0]], left[1][: parts[1]]
         elif passing := next(filter(lambda ones: _instant(ones[0]), left), None):
             del passing[0]
         elif divided := next((ones for ones in left if kinds(ones[0].mode) == last), None):
@@ -348,6 +344,19 @@ def _alike(
     while pairs and apart and kinds(apart[0].mode) == kinds(path_a.stretches[pairs[-1][0]].mode):
         del apart[0]  # one route divides what the other follows in one stretch to the last time
     return pairs, apart
+
+
+def _goes_on(stretches: Sequence[Stretch[Any]], kinds: Callable[[Any], Any]) -> bool:
+    """True if the first of some stretches goes on in the next, in the same kinds of mode and without a jump."""
+    if len(stretches) < 2 or kinds(stretches[0].mode) != kinds(stretches[1].mode):
+        return False
+    last, first = stretches[0].last[:-1], stretches[1].first[:-1]  # each time has its own last digit
+    return bool(np.all(np.abs(first - last) <= CLOSE * np.maximum(1.0, np.abs(last))))
+
+
+def _parts(stretches: Sequence[Stretch[Any]], kinds: Callable[[Any], Any]) -> int:
+    """Number of the first stretches that a route with longer stretches follows in one."""
+    return next(k for k in range(1, len(stretches) + 1) if not _goes_on(stretches[k - 1 : k + 1], kinds))
 
 
 def _parted(path_a: FollowedPath, path_b: FollowedPath, kinds: Callable[[Any], Any]) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.truth.followed_paths import at_times, end_of, followed
+from proofroll.truth.followed_paths import at_times, counterparts, end_of, followed
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, Transition, first_close
 
 
@@ -48,6 +48,25 @@ def test_states_of_a_motion_that_goes_on_are_taken_from_the_stretch_that_has_the
     later = Stretch(1.0, 2.0, "slip", np.array([3.0, 1.0]), np.array([4.0, 2.0]), None)
     path = HybridPath((sooner, later), (), ())
     assert at_times(path, [0, 0], np.array([0.5, 1.5])) == [0, 1]
+
+
+def _flight(times: tuple[float, ...], jump: float) -> HybridPath[Stretch[str]]:
+    """Path in one mode, divided at some times, whose speed turns round at one of them."""
+    spans = list(zip((0.0, *times), (*times, 4.0), strict=True))
+    turned = [np.array([begin, -1.0 if begin < jump else 1.0, begin]) for begin, _ in spans]
+    lasts = [np.array([end, first[1], end]) for first, (_, end) in zip(turned, spans, strict=True)]
+    ends = [*[0] * len(times), None]
+    parts = zip(spans, turned, lasts, ends, strict=True)
+    return HybridPath(tuple(Stretch(*span, "open", first, last, end) for span, first, last, end in parts), (), ())
+
+
+def test_a_motion_behind_a_rebound_has_its_counterpart_behind_it() -> None:
+    """Routes that divide a fall differently agree on the flight behind it, which has the mode of the fall."""
+    paths = _flight((1.0, 2.0), 2.0), _flight((0.5, 1.0, 1.5, 2.0), 2.0)
+    times = np.array([0.2, 1.2, 3.0])
+    numbers = at_times(paths[1], counterparts(paths, [0, 1, 2]), times)
+    assert numbers == [0, 2, 4]
+    assert at_times(paths[0], counterparts(paths[::-1], [0, 2, 4]), times) == [0, 1, 2]
 
 
 def test_no_truth_ends_before_it_begins() -> None:

@@ -386,3 +386,21 @@ def test_solids_that_tumble_collide_without_overlap(other: str, seed: int, swapp
     speeds = found.record.v_WB[:, 0] + np.cross(found.record.w_WB[:, 0], arm)
     momentum = speeds + 2.0 * found.record.v_WB[:, 1]
     assert np.abs(momentum - momentum[0]).max() < 1e-12
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("friction", [0.0, 0.6])
+def test_an_elastic_cube_that_lands_flat_beside_its_centre_rises_as_it_fell(friction: float) -> None:
+    """Four points at one speed return it together: the cube does not turn, and its error bar is round-off."""
+    cube = Geometry("hull", "body", "box", size=(1.0, 1.0, 1.0))
+    block = Geometry("block", "world", "box", turned((0, 0, -0.25)), size=(0.75, 0.75, 0.5), orientation=to_rpy(AXES))
+    motion = free(cube, block, inertia((1, 1, 1)), (0.3, 0, 1.5), friction=friction, restitution=1.0)
+    falls = np.sqrt(2 / GRAVITY)
+    times = np.array([0.0, 0.4, falls + 0.01, 0.6])
+    rises = times - falls
+    height = np.where(rises < 0, 1.5 - GRAVITY * times**2 / 2, 0.5 + GRAVITY * rises * (falls - rises / 2))
+    found = truth_of(motion, times)
+    assert found.ended == ""
+    assert (AXES.T @ found.record.p_WB[:, 0].T)[2] == pytest.approx(height, abs=1e-12)
+    assert found.bars["p_WB"].max() < BARS
+    assert {event.kind for event in found.events} == {"impact"}

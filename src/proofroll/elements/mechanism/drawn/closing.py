@@ -93,7 +93,7 @@ def _gap(tables: Mapping[str, Any], poses: PosesAtStart, pair: Mapping[str, Any]
         axis = base @ np.array(lower["axis"]) / np.linalg.norm(lower["axis"])
         offset = offset - axis * (axis @ offset)
     apart = float(np.linalg.norm(offset))
-    outside = 1.0 if kind in {"shaft", "sphere"} else -1.0
+    outside = 1.0 if kind in {"shaft", "sphere", "capsule"} else -1.0
     normal = outside * offset / apart
     return outside * (apart - lower["radius"]) - extent(upper, R.T @ normal), normal
 

@@ -1,4 +1,4 @@
-"""Random bodies that rest on a floor, slide, roll, or fall on it, in curved walls, and on one another."""
+"""Random bodies, alone or with a link, that rest, slide, roll or fall on a floor, in curved walls, on one another."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ from proofroll.elements.mechanism.scene.rotations import Array, about, to_quater
 _ON_FLOORS = ("sphere", "ellipsoid", "box", "capsule", "cylinder")
 _LONG = frozenset({"capsule", "cylinder"})  # touch at two ends, whose moments the reader refuses
 _WALLS = {"bowl": -1.0, "bore": -1.0, "shaft": 1.0}  # side of a wall's circle on which a ball touches it
-SECOND, SLOPE, FALL, UNEQUAL = "a ball on top", "a slope", "a fall", "unequal moments"
+_TOPS = {"sphere": ("sphere",), "box": ("sphere", "capsule"), "capsule": ("sphere", "capsule")}
+_LINKS = (Capability.REVOLUTE, Capability.PRISMATIC, Capability.SPHERICAL)
+SECOND, SLOPE, FALL, UNEQUAL = "a body on top", "a slope", "a fall", "unequal moments"
 _LAWS = (
     Capability.CONTACT_FRICTION,
     Capability.STATIC_FRICTION,
@@ -28,6 +30,9 @@ _LAWS = (
     Capability.SLIP_REBOUNDS,
     Capability.TURNING_FRICTION,
     Capability.APPLIED_FORCES,
+    Capability.MOTIONS,
+    Capability.SIGNALS,
+    *_LINKS,
 )
 CONTACT_FEATURES: Mapping[str, float] = {
     **dict.fromkeys((*_ON_FLOORS, *_WALLS), 0.0),
@@ -37,7 +42,7 @@ CONTACT_FEATURES: Mapping[str, float] = {
 
 
 def contact(choices: Choices, features: Sequence[str]) -> dict[str, Any]:
-    """A body on a floor, or a ball on a curved wall, perhaps with a ball on top, with the laws among the features."""
+    """A body on a floor, or a ball on a curved wall, with what is among the features: a link, a body on top, laws."""
     sketch = Sketch(choices)
     sketch.speed = min(sketch.speed, 3.0)
     turning = Capability.TURNING_FRICTION in features
@@ -50,20 +55,46 @@ def contact(choices: Choices, features: Sequence[str]) -> dict[str, Any]:
     if shape in _WALLS:
         normal, surface = _wall(sketch, shape, floor, origin)
         _place(sketch, "sphere", features, size, normal, surface, pair)
+        _load(sketch, features, floor)
         return sketch.content()
-    sketch.add(
-        "geometries", name="ground", body=WORLD, kind="plane", position=floats(origin), normal=floats(floor[:, 2])
-    )
-    carries = SECOND in features and shape in {"sphere", "box"}
+    _ground(sketch, features, floor, origin)
+    carries = SECOND in features and shape in _TOPS
     stuck = carries and Capability.UNBOUNDED_FRICTION in features  # to the ball on top, which rests
     top = _place(sketch, shape, features, size, floor, origin, pair, at_rest=stuck)
+    _load(sketch, features, floor)
     if carries:
+        on_top = choices.pick(_TOPS[shape]) if not turning else "sphere"
         laws = [feature for feature in features if feature != FALL]
-        _place(sketch, "sphere", laws, choices.number(0.1, 0.3, sketch.length), floor, top, pair, at_rest=True)
-    if Capability.APPLIED_FORCES in features:
-        push = sketch.mass * sketch.gravity * choices.number(-0.5, 0.5)
-        sketch.add("forces", body=sketch.bodies[0], kind="force", frame=WORLD, value=floats(floor[:, 0] * push))
+        _place(sketch, on_top, laws, choices.number(0.1, 0.3, sketch.length), floor, top, pair, at_rest=True)
     return sketch.content()
+
+
+def _ground(sketch: Sketch, features: Collection[str], floor: Array, origin: Array) -> None:
+    """Adds a plane of the world, or of a table whose prescribed motion starts from rest."""
+    body, place, choices = WORLD, origin, sketch.choices
+    if Capability.MOTIONS in features:
+        body, place = sketch.add_body(name="table")["name"], np.zeros(3)
+        size, rate = choices.number(0.02, 0.1, sketch.length), choices.number(1, 4, 1 / sketch.time)
+        along = floats(floor @ np.array(choices.pick(([1, 0, 0], [0, 0, 1], [0.6, 0, 0.8]))))
+        motion = f"= 0.0 + {size!r}*(1 - cos({rate!r}*t))"
+        slide = {"kind": str(JointKind.PRISMATIC), "parent": WORLD, "child": body, "position": floats(origin)}
+        sketch.hang(sketch.add("joints", **slide, axis=along, motion=motion))
+    normal = floats(floor[:, 2])
+    sketch.add("geometries", name="ground", body=body, kind="plane", position=floats(place), normal=normal)
+
+
+def _load(sketch: Sketch, features: Collection[str], floor: Array) -> None:
+    """Adds to the last body a push along the floor, a moment that changes in time, and links."""
+    choices, body, weight = sketch.choices, sketch.bodies[-1], sketch.mass * sketch.gravity
+    if Capability.APPLIED_FORCES in features:
+        push = floats(floor[:, 0] * weight * choices.number(-0.5, 0.5))
+        sketch.add("forces", body=body, kind="force", frame=WORLD, value=push)
+    if Capability.SIGNALS in features:
+        size = choices.number(-0.1, 0.1, weight * sketch.length)
+        value = [f"= {size!r}*sin({choices.number(1, 4, 1 / sketch.time)!r}*t)", 0, 0]
+        sketch.add("forces", body=body, kind="moment", frame="body", value=value)
+    for kind in (kind for kind in _LINKS if kind in features):
+        sketch.add_joint(JointKind[kind.name], body, sketch.add_body()["name"])
 
 
 def _pair(choices: Choices, features: Collection[str], length: float) -> dict[str, Any]:
@@ -151,7 +182,7 @@ def _place(
     start = [*centre, *to_quaternion(attitude)]
     rates = [*(attitude.T @ velocity), *(attitude.T @ spin)]
     free = {"kind": str(JointKind.FREE), "parent": WORLD, "child": body["name"]}
-    sketch.add("joints", **free, q0=floats(start), v0=floats(rates))
+    sketch.hang(sketch.add("joints", **free, q0=floats(start), v0=floats(rates)))
     previous = sketch.tables["geometries"][-1]["name"]
     geometry = sketch.add("geometries", body=body["name"], **keys)
     if shape == "sphere" and previous == "ground" and "rolling_resistance" in pair:
