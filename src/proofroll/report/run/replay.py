@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.dataset import ended_early, part, until_end
+from proofroll.core.dataset import BY_STEPS, ended_early, part, until_end
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.multi_element import each_alone
@@ -107,12 +107,12 @@ def replay_page(
         solid, ghosts = (true_part, [run_part, *others]) if has_truth else (run_part, others)
         replayed = Replayed(
             scene=alone, true=solid, file="", ghosts=_ghosts(ghosts, solid), group=group, label=shown,
-            solid="truth" if has_truth else str(run.attrs["engine"]),
+            solid=_by_steps(true) or "truth" if has_truth else str(run.attrs["engine"]),
         )  # fmt: skip
         case, numbers = case_content(replayed, drawer)
         cases.append(case)
         packed.append(numbers)
-        captions.append(_caption([run, *beside], has_truth, untold or "no truth tells the whole motion"))
+        captions.append(_caption([run, *beside], _by_steps(true) or "truth" if has_truth else "", untold))
     if has_truth and (end := ended_early(true)) is not None:
         captions.append(f"What lies behind {end[0]:.6g} s is not drawn, for the truth ends there: {end[1]}.")
     return rendered(
@@ -163,20 +163,26 @@ def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Da
     return kind.replay()
 
 
-def _caption(runs: Sequence[xr.Dataset], has_truth: bool, why: str) -> str:
+def _by_steps(true: xr.Dataset) -> str:
+    """Name of a reference that is no truth; empty: it is one."""
+    return "reference by steps" if true.attrs.get(BY_STEPS) else ""
+
+
+def _caption(runs: Sequence[xr.Dataset], solid: str, untold: str) -> str:
+    """Sentence on what is shown; ``solid``: ``truth``, or what is shown for it; empty: the first run."""
     names = [
         f"{run.attrs['engine']} ({settings_text(json.loads(run.attrs['settings']))})"
         for run in runs
         if run.attrs["engine"] != "truth"
     ]
     if not names:
-        return "The truth."
-    if not has_truth:
+        return f"The {solid}."
+    if not solid:
         first, *others = names
         beside = f", solid, and {', '.join(others)}, translucent" if others else " alone"
-        return f"{first}{beside}: {why}."
+        return f"{first}{beside}: {untold or 'no truth tells the whole motion'}."
     agreeing = "where it agrees it is hidden" if len(names) == 1 else "where they agree they are hidden"
-    return f"The truth, solid, and {', '.join(names)}, translucent; {agreeing} in the truth."
+    return f"The {solid}, solid, and {', '.join(names)}, translucent; {agreeing} in it."
 
 
 def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
