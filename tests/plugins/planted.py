@@ -38,8 +38,8 @@ IN_ENGINES = {
     ),
     "rebound": (
         "proofroll.engines.projection.contact.contact_modes",
-        "= -c[place], law.restitution",
-        "= -c[place], 0.97 * law.restitution",
+        "= self.contacts[hit].restitution,",
+        "= 0.97 * self.contacts[hit].restitution,",
         "proofroll.engines.projection.adapter:Projection",
     ),
 }

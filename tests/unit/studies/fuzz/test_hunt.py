@@ -151,7 +151,7 @@ _PLANTED = {
     **{name: (("tree",), 0) for name in FAULTS if name != "sound"},
     "bristle": (("tree",), 96),
     "late": (("tree",), 0),
-    "rebound": (("contact",), 4),
+    "rebound": (("contact",), 0),
 }
 
 
