@@ -334,6 +334,8 @@ def _alike(
         elif passing := next(filter(lambda ones: _instant(ones[0]), left), None):
             del passing[0]
         elif divided := next((ones for ones in left if kinds(ones[0].mode) == last), None):
+            if divided is left[0]:
+                pairs.append((len(path_a.stretches) - len(left[0]), len(path_b.stretches) - len(left[1]) - 1))
             del divided[0]
         else:
             break
