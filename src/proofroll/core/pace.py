@@ -25,10 +25,11 @@ class Pace:
         until: last time of the truth [s].
         text: time that is reached and time that is still needed; empty: no truth is being followed.
         over: True if the last truth was ended by its limit.
+        aloud: True in a worker, whose lines the process that started it reads.
     """
 
     def __init__(self) -> None:
-        self.text, self.over, self.until = "", False, 0.0
+        self.text, self.over, self.until, self.aloud = "", False, 0.0, False
         self._tell: Callable[[str], object] = str
         self._limit, self._began = math.inf, 0.0
         self._route, self._begun, self._end, self._told, self._part = "", 0.0, math.inf, 0.0, 1.0

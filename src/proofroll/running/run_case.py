@@ -48,6 +48,12 @@ def _require_untouched(engine: str) -> None:
         raise ProofrollError(f"{engine} changed {name} in its process, so nothing that was found there is believed")
 
 
+def _tell(text: str) -> None:
+    """Prints how far a truth has come, in a worker, whose lines are read."""
+    if PACE.aloud:
+        print(f"{AT}{text}", flush=True)
+
+
 def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     from proofroll.core.certificate import first_difference
     from proofroll.core.first_steps import certificate
@@ -64,7 +70,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         counting = samples_between(scene, times) if case.turns else times[:0]
         between = np.array(case.between)
         spent.on("loading")
-        with PACE.limited(case.time_limit * FOR_A_TRUTH, lambda text: print(f"{AT}{text}", flush=True)):
+        with PACE.limited(case.time_limit * FOR_A_TRUTH, _tell):
             return _run_truth(scene, times, (counting, between), out, made_with("truth", case.engine.version), spent)
     kind, settings = engine_and_settings(case)
     versions = made_with(plain_name(case.engine.name), kind.version())

@@ -23,6 +23,7 @@ from proofroll.core.errors import (
     raised_at,
     require_known,
 )
+from proofroll.core.pace import PACE
 from proofroll.running.case import Case
 from proofroll.running.handshake import identify_and_settle
 from proofroll.running.identity import describe, resolve
@@ -130,4 +131,5 @@ def one_line(error: BaseException) -> str:
 
 
 if __name__ == "__main__":
+    PACE.aloud = True
     main(*map(int, sys.argv[1:4]))
