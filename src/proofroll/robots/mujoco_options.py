@@ -42,8 +42,8 @@ def own_options(path: Path) -> OwnOptions | None:
     option = spec.option
     integrator = _INTEGRATORS.get(int(option.integrator))
     if integrator is None:
-        known = ", ".join(_INTEGRATORS.values())
-        raise InputError("--like", path, f"its integrator is none that can be compared; choose {known}")
+        names = ", ".join(_INTEGRATORS.values())
+        raise InputError("--like", path, f"its integrator is none that can be compared; choose {names}")
     keys = [key for key in dir(option) if not key.startswith("_") and key not in _READ]
     unlike = [key for key in keys if np.any(getattr(option, key) != getattr(plain.option, key))]
     solver = mujoco.mjtSolver(int(option.solver)).name.removeprefix("mjSOL_")

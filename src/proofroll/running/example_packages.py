@@ -32,8 +32,10 @@ def install(name: str, packages: dict[str, Path]) -> tuple[str, Path]:
         ProofrollError: pip refused it, or the engine does not start.
     """
     if name not in packages:
-        known = f"choose one of {', '.join(packages)}" if packages else "a checkout of the source has packages of more"
-        advice = f"{known} ({_PACKAGES}), or say by --requirement what to install"
+        choices = (
+            f"choose one of {', '.join(packages)}" if packages else "a checkout of the source has packages of more"
+        )
+        advice = f"{choices} ({_PACKAGES}), or say by --requirement what to install"
         raise InputError("engine", name, advice)
     output_of([sys.executable, "-m", "pip", "install", "--quiet", str(packages[name])])
     return describe(f"{name}@{sys.executable}").version, packages[name]

@@ -146,9 +146,9 @@ def _run(
     require_provided(kind, settings.formulation, scene)
     engine = commanded(kind.build(scene.for_an_engine, settings), element, step)
     watch_events(engine)
-    before, part = np.floor(times / step + _ON_STEP), times / step
-    part = np.where(np.abs(part - np.round(part)) <= _ON_STEP, 0.0, part - before)
-    counts = np.union1d(before, before[part > 0] + 1)
+    whole_steps, part = np.floor(times / step + _ON_STEP), times / step
+    part = np.where(np.abs(part - np.round(part)) <= _ON_STEP, 0.0, part - whole_steps)
+    counts = np.union1d(whole_steps, whole_steps[part > 0] + 1)
     PACE.follow("second", float(times[-1]))
     samples = [copied(engine.sample())]
     for count in counts[1:].tolist():
@@ -157,7 +157,7 @@ def _run(
         samples.append(copied(engine.sample()))
     PACE.leave()
     columns = columns_of(scene, counts * step, samples)
-    first, last = np.searchsorted(counts, before), np.searchsorted(counts, before + (part > 0))
+    first, last = np.searchsorted(counts, whole_steps), np.searchsorted(counts, whole_steps + (part > 0))
     variables = {}
     for key, item in columns.variables.items():
         if item.dims[:1] != ("time",):
@@ -166,9 +166,9 @@ def _run(
         weight = part.reshape(-1, *[1] * (item.values.ndim - 1))
         between = item.values[first] + weight * (item.values[last] - item.values[first])
         variables[key] = item._replace(values=times if key == "time" else between)
-    found = events_of_engine(engine, element) or ()
+    events = events_of_engine(engine, element) or ()
     return _SteppedRun(
-        step, Columns(variables, columns.attrs), tuple(event for event in found if event.time <= times[-1])
+        step, Columns(variables, columns.attrs), tuple(event for event in events if event.time <= times[-1])
     )
 
 

@@ -124,14 +124,14 @@ def _truth_ends(outcome: Outcome) -> list[str]:
 def _by_steps_words(reference: Reference, bounds: Mapping[str, Tolerance]) -> str:
     """Sentence on a reference by steps: what it is, its error bar, and what it does not tell to these tolerances."""
     name = next((name for name in bounds if reference.tells(name, math.inf)), "")
-    known = f"; {name} known to {_with_unit(reference, name)}" if name else ""
+    precision = f"; {name} known to {_with_unit(reference, name)}" if name else ""
     untold = [
         key for key, bound in bounds.items() if not reference.tells(key, bound.absolute(reference.sizes.get(key, 1.0)))
     ]
     leaves = f" Not told by it to the tolerance: {', '.join(_shortened(untold))}." if untold else ""
     horizon = str(reference.dataset.attrs.get(HORIZON, ""))
     horizon = f" Horizon: {horizon}." if horizon else ""
-    return f"Judged by a {reference.dataset.attrs['route']}, which is no truth{known}.{horizon}{leaves}"
+    return f"Judged by a {reference.dataset.attrs['route']}, which is no truth{precision}.{horizon}{leaves}"
 
 
 def _with_unit(reference: Reference, name: str) -> str:

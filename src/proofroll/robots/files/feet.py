@@ -123,9 +123,9 @@ def ground_tables(
         "floor": of_urdf or ground == ON_A_PLANE,
         "drop": standing.drop,
     }
-    found = _near(file.path, file.kind, content, dict(plain(asked)))
-    shapes = [_shape(standing, row) for row in found["shapes"]]
-    pairs = [_NearPair(**row | {"shapes": tuple(shapes[k] for k in row["shapes"])}) for row in found["pairs"]]
+    rows = _near(file.path, file.kind, content, dict(plain(asked)))
+    shapes = [_shape(standing, row) for row in rows["shapes"]]
+    pairs = [_NearPair(**row | {"shapes": tuple(shapes[k] for k in row["shapes"])}) for row in rows["pairs"]]
     pairs = [pair for pair in pairs if pair.moves and (pair.on_floor or not of_urdf)]
     return _tables(file, pairs, friction, lost)
 
@@ -333,5 +333,5 @@ def _near(path: Path, kind: str, content: bytes, asked: dict[str, Any]) -> dict[
     file = RobotFile(path, kind, fromstring(content))
     with tempfile.TemporaryDirectory() as folder:
         copy = reading.write(file, Path(folder))
-        found, _ = by_definer("mjcf", path, None, lambda worker: near_shapes(worker, path, copy, asked, TIME_LIMIT))
-    return found
+        answer, _ = by_definer("mjcf", path, None, lambda worker: near_shapes(worker, path, copy, asked, TIME_LIMIT))
+    return answer

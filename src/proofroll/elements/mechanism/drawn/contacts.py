@@ -75,10 +75,10 @@ def _ground(sketch: Sketch, features: Collection[str], floor: Array, origin: Arr
     if Capability.MOTIONS in features:
         body, place = sketch.add_body(name="table")["name"], np.zeros(3)
         size, rate = choices.number(0.02, 0.1, sketch.length), choices.number(1, 4, 1 / sketch.time)
-        along = floats(floor @ np.array(choices.pick(([1, 0, 0], [0, 0, 1], [0.6, 0, 0.8]))))
+        direction = floats(floor @ np.array(choices.pick(([1, 0, 0], [0, 0, 1], [0.6, 0, 0.8]))))
         motion = f"= 0.0 + {size!r}*(1 - cos({rate!r}*t))"
         slide = {"kind": str(JointKind.PRISMATIC), "parent": WORLD, "child": body, "position": floats(origin)}
-        sketch.hang(sketch.add("joints", **slide, axis=along, motion=motion))
+        sketch.hang(sketch.add("joints", **slide, axis=direction, motion=motion))
     normal = floats(floor[:, 2])
     sketch.add("geometries", name="ground", body=body, kind="plane", position=floats(place), normal=normal)
 
