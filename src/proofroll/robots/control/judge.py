@@ -258,7 +258,7 @@ def _best_reading(
         try_rivals([*readings_of_late_efforts([rival for rival, _ in (*judged, *silent)])])
     if _open(best())[0]:
         try_rivals(_beside(plain[0], readings_of_early_rates))
-    if any(_open(best())[::2]):
+    if _unexplained_forces(best()[1]) or _open(best())[2]:
         candidates = sorted((rival for rival, _ in (*judged, *silent)), key=_count)
         by_state = {id(rival) for rival, _ in judged}
         trials = _of_importers(candidates, partial(layers_of, time=time), time)

@@ -26,7 +26,15 @@ from proofroll.robots.control.bookkeeping.mistakes import (
     mistakes,
     offsets_told,
 )
-from proofroll.robots.control.bookkeeping.search import MistakeExplanation, best_size, bounded, explanations, largest
+from proofroll.robots.control.bookkeeping.search import (
+    MistakeExplanation,
+    another_pose,
+    best_size,
+    bounded,
+    explanations,
+    largest,
+)
+from proofroll.robots.control.bookkeeping.together import LayerTrials, mistakes_together
 from proofroll.robots.control.columns import action_mistakes
 from proofroll.robots.control.differences import (
     DIFFERENCES,
@@ -53,6 +61,7 @@ _DAMPED = "damping of joints acts at the velocity after the step, or they have a
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
 _HELPS = 0.1
+_INSTANTS = 4  # least number of rows from which a pose is fitted beside another mistake
 
 
 def record_layers(
@@ -304,9 +313,31 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
     for _, cause in sorted(ranked, key=lambda item: item[0]):
         by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
     causes = [*by_words.values()]
-    if layer.name == "instants" and not causes:
-        causes = [*_missed(evidence)]
+    if layer.name == "instants":
+        causes = causes or [*_missed(evidence)]
+    elif all(cause.after > rounding for cause in causes):
+        trials = _trials(layer.name, evidence, _bars(layer.name, evidence, compared))
+        together = mistakes_together(candidates, evidence.law, trials, time)
+        causes = causes if together is None else [together]
     return {"causes": tuple(causes), "tried": tried, "known": len(candidates)}
+
+
+def _trials(name: str, evidence: _Evidence, bars: Array) -> LayerTrials:
+    """Trials of laws at a layer whose columns have these bars."""
+
+    def parts(law: ControlLaw) -> Array:
+        compared = evidence.difference(name, law)
+        if isinstance(compared, str) or compared.difference.shape[1] != len(bars) or not len(compared.difference):
+            return np.full(len(bars), np.nan)
+        return np.asarray(np.abs(compared.difference).max(axis=0) / bars)
+
+    def fitting(law: ControlLaw) -> Iterator[Mistake]:
+        compared = evidence.difference("target", law)
+        if name == "target" and not isinstance(compared, str) and len(compared.difference) >= _INSTANTS:
+            offsets = compared.difference.mean(axis=0)
+            yield another_pose(offsets_told(law.joints, offsets), law.signs * offsets)
+
+    return LayerTrials(parts, partial(evidence.left, name), fitting)
 
 
 def _shows(mistake: Mistake, layers: Sequence[str]) -> bool:
