@@ -175,16 +175,22 @@ def judge_record(
     law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
     names_of_layers = DIFFERENCES if control else ()
 
+    robots: dict[int, tuple[StateReading, InAir]] = {}  # by the identity of a reading, which they keep
+
     def layers_of(reading: StateReading, time: SearchTime, imported: int = 0) -> list[Layer]:
         state_layers = [] if reading.layer is None else [reading.layer]
-        held = InAir(
-            held=model.held(reading.frame),
-            imported=partial(model.imported, reading.frame, imported),
-            reported=reading.reported,
-            stepped=model.held(None) if reading.frame is not None else None,
-            ranges=model.ranges,
-            assumed=assumed,
-        )
+        if id(reading) not in robots:
+            robots[id(reading)] = (
+                reading,
+                InAir(
+                    held=model.held(reading.frame),
+                    reported=reading.reported,
+                    stepped=model.held(None) if reading.frame is not None else None,
+                    ranges=model.ranges,
+                    assumed=assumed,
+                ),
+            )
+        held = replace(robots[id(reading)][1], imported=partial(model.imported, reading.frame, imported))
         return [
             *state_layers,
             *record_layers(

@@ -52,7 +52,7 @@ from proofroll.robots.control.differences import (
 from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
 from proofroll.robots.control.record import FITTED, OBSERVED, ControlRecord, Layer, LayerCause
-from proofroll.robots.control.standing_joints import standing_fit
+from proofroll.robots.control.standing_joints import StandingFit, standing_fit
 from proofroll.robots.model import Array
 
 # Remark on a scheme that has the damping of joints at the velocity after a step.
@@ -120,6 +120,7 @@ class InAir:
         stepped: the robot with the frame of its file, where a program may step that and report another; else None.
         ranges: joint -> its limits [rad or m].
         assumed: clause on rows that are steps if the program has its usual ones; empty: they are not, or it is known.
+        fits: of records to robots that were compared before, by their identities.
     """
 
     held: HeldRobot
@@ -128,6 +129,15 @@ class InAir:
     stepped: HeldRobot | None = None
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: str = ""
+    fits: dict[tuple[int, int], tuple[ControlRecord, StandingFit]] = field(default_factory=dict)
+
+    def fit(self, record: ControlRecord, law: ControlLaw, robot: HeldRobot, efforts: Array) -> StandingFit:
+        """Fit of a record to one of the robots, computed once: it hangs on no search."""
+        key = id(record), id(robot)
+        if key not in self.fits:
+            fit = standing_fit(record, law, robot, efforts, held_rows(record, law), self.ranges)
+            self.fits[key] = record, fit
+        return self.fits[key][1]
 
 
 @dataclass(frozen=True)
@@ -173,10 +183,9 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     efforts = record.stacked("effort", law.joints)
     if efforts is None:
         return Layer("acceleration", reason="the record has no columns effort.JOINT")
-    steady, ranges = held_rows(record, law), evidence.in_air.ranges
-    fit, off_stops, remark = standing_fit(record, law, evidence.in_air.held, efforts, steady, ranges)
+    fit, off_stops, remark = evidence.in_air.fit(record, law, evidence.in_air.held, efforts)
     if evidence.in_air.stepped is not None and not isinstance(fit, str) and fit.off > fit.bar:
-        rival = standing_fit(evidence.record, law, evidence.in_air.stepped, efforts, steady, ranges)
+        rival = evidence.in_air.fit(evidence.record, law, evidence.in_air.stepped, efforts)
         if not isinstance(rival.fit, str) and rival.fit.off < fit.off:
             fit, off_stops, remark = rival
     if isinstance(fit, str):
