@@ -1,14 +1,17 @@
-"""Random scenes: choices from a seed, what they make, and the ability of a kind of element to draw them."""
+"""Random scenes: choices from a seed, what they make, and families of them, which packages announce."""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, TypeVar
 
+from proofroll.core.entry_points import loaded
+
+GROUP = "proofroll.scene_families"
 T = TypeVar("T")
 # Changes the content of a scene file; raises LookupError where it does not apply.
 Change = Callable[[dict[str, Any]], object]
@@ -132,17 +135,10 @@ def drawn_scene(families: Mapping[str, SceneFamily], seed: int) -> DrawnScene:
     return DrawnScene(name, tuple(features), family.draw(choices, tuple(features)))
 
 
-@runtime_checkable
-class DrawsScenes(Protocol):
-    """Ability of a kind of element to draw random scenes."""
+def all_families() -> dict[str, SceneFamily]:
+    """Name -> family of random scenes, of all installed packages that announce some.
 
-    @staticmethod
-    def scene_families() -> Mapping[str, SceneFamily]:
-        """Name -> family of random scenes, each valid and sampled well within its natural time."""
-
-
-def all_families(kinds: Sequence[object]) -> Iterator[tuple[str, SceneFamily]]:
-    """Names and families of all kinds of elements that draw scenes."""
-    for kind in kinds:
-        if isinstance(kind, DrawsScenes):
-            yield from kind.scene_families().items()
+    Such a package has an entry point of the group ``proofroll.scene_families``, under any name, which names a mapping
+    from names to :class:`SceneFamily`. Each scene must be valid, and sampled well within its natural time.
+    """
+    return {name: family for _, families in loaded(GROUP, of=Mapping) for name, family in families.items()}

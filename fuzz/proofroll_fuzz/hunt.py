@@ -13,9 +13,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.drawing import Relation, SceneFamily, all_families, drawn_scene
-from proofroll.core.errors import InputError, require_known
-from proofroll.core.plugins import load_element_kinds, parse_engine, require_engine
+from proofroll import InputError
+from proofroll.core.errors import require_known
+from proofroll.core.plugins import parse_engine, require_engine
 from proofroll.files.json_data import plain
 from proofroll.running.case import Status
 from proofroll.running.engine_questions import describe
@@ -24,10 +24,11 @@ from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store, write_text
 from proofroll.studies.findings import load_findings
-from proofroll.studies.fuzz.evaluation import EvaluatedScene, evaluate_scene
-from proofroll.studies.fuzz.relations import relations_of, write_scene
-from proofroll.studies.fuzz.shrink import Shrinker, SmallestScene
-from proofroll.studies.fuzz.surprises import REFUSES, TRUTH, Surprise
+from proofroll_fuzz.drawing import Relation, SceneFamily, all_families, drawn_scene
+from proofroll_fuzz.evaluation import EvaluatedScene, evaluate_scene
+from proofroll_fuzz.relations import relations_of, write_scene
+from proofroll_fuzz.shrink import Shrinker, SmallestScene
+from proofroll_fuzz.surprises import REFUSES, TRUTH, Surprise
 
 _KNOWN = "kinds.json"
 _LIMIT = 20.0  # wall time of one run [s]
@@ -110,7 +111,7 @@ def families_for(engine: str, names: tuple[str, ...], workers: Workers) -> dict[
         InputError: there is no family of such a name, or no such engine.
         Missing: the engine is not installed.
     """
-    families = dict(all_families(load_element_kinds()))
+    families = all_families()
     for name in names:
         require_known("--family", name, families)
     chosen = {name: family for name, family in families.items() if name in names or not names}

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from proofroll.core.drawing import SceneFamily
-from proofroll.elements.mechanism.drawn.closing import close
-from proofroll.elements.mechanism.drawn.contacts import CONTACT_FEATURES, contact
-from proofroll.elements.mechanism.drawn.nearest import nearest
-from proofroll.elements.mechanism.drawn.relations import RELATIONS
-from proofroll.elements.mechanism.drawn.smaller import smaller
-from proofroll.elements.mechanism.drawn.trees import BAR_FEATURES, LOOP_FEATURES, TREE_FEATURES, bar, loop, tree
+from proofroll.adapter import MechanismCapability as Capability
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability as Capability
+from proofroll_fuzz.drawing import SceneFamily
+from proofroll_fuzz.mechanisms.closing import close
+from proofroll_fuzz.mechanisms.contacts import CONTACT_FEATURES, contact
+from proofroll_fuzz.mechanisms.nearest import nearest
+from proofroll_fuzz.mechanisms.relations import RELATIONS
+from proofroll_fuzz.mechanisms.smaller import smaller
+from proofroll_fuzz.mechanisms.trees import BAR_FEATURES, LOOP_FEATURES, TREE_FEATURES, bar, loop, tree
 
 _DRAWN = {
     "tree": (TREE_FEATURES, tree, ALL_JOINTS),

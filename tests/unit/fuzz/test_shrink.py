@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
-from proofroll.core.drawing import drawn_scene
 from proofroll.core.errors import ProofrollError
-from proofroll.elements.mechanism.drawn.families import FAMILIES
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.fuzz import shrink as shrinking
-from proofroll.studies.fuzz.evaluation import EvaluatedScene
-from proofroll.studies.fuzz.shrink import Shrinker, SmallestScene
-from proofroll.studies.fuzz.surprises import Surprise, SurpriseKind
+from proofroll_fuzz import shrink as shrinking
+from proofroll_fuzz.drawing import drawn_scene
+from proofroll_fuzz.evaluation import EvaluatedScene
+from proofroll_fuzz.mechanisms.families import FAMILIES
+from proofroll_fuzz.shrink import Shrinker, SmallestScene
+from proofroll_fuzz.surprises import Surprise, SurpriseKind
 
 _STOPS = Surprise(SurpriseKind("tiny chart", "stops", "solver", "start"), 5.0, "the solver gave up")
 _CRASHES = Surprise(SurpriseKind("tiny chart", "crashes"), 9.0, "its process ended")

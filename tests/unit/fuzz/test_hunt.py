@@ -13,10 +13,10 @@ from planted import FAULTS
 
 from proofroll.core.errors import InputError
 from proofroll.running.case import Status
-from proofroll.studies.fuzz import hunt as hunting
-from proofroll.studies.fuzz.evaluation import EvaluatedScene
-from proofroll.studies.fuzz.hunt import hunt
-from proofroll.studies.fuzz.surprises import Surprise, SurpriseKind
+from proofroll_fuzz import hunt as hunting
+from proofroll_fuzz.evaluation import EvaluatedScene
+from proofroll_fuzz.hunt import hunt
+from proofroll_fuzz.surprises import Surprise, SurpriseKind
 
 Install = Callable[[Mapping[str, str]], None]
 _HANGS = Surprise(SurpriseKind("tiny chart", "hangs"), 8.0, "no answer in 20 s")

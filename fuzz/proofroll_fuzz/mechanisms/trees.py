@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.drawing import Choices, three_digits
-from proofroll.elements.mechanism.drawn.laws import WEIGHTS, add_laws, controller
-from proofroll.elements.mechanism.drawn.poses import WORLD, floats
-from proofroll.elements.mechanism.drawn.sketch import GIMBAL, Sketch
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability as Capability
-from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, FACTS, LOOP_FACTS, JointKind
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_rpy, to_rpy
+from proofroll.adapter import WORLD, Array, JointKind, frame_of_axis
+from proofroll.adapter import MechanismCapability as Capability
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, FACTS, LOOP_FACTS
+from proofroll.elements.mechanism.scene.rotations import from_rpy, to_rpy
+from proofroll_fuzz.drawing import Choices, three_digits
+from proofroll_fuzz.mechanisms.laws import WEIGHTS, add_laws, controller
+from proofroll_fuzz.mechanisms.poses import floats
+from proofroll_fuzz.mechanisms.sketch import GIMBAL, Sketch
 
 _KINDS = {Capability[kind.upper()]: str(kind) for kind in JointKind}
 GIMBALS = "ball joints by three angles"

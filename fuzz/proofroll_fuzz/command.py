@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from proofroll import InputError
 from proofroll.cli import options
-from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from proofroll.studies.fuzz.hunt import FoundKind, Hunt
+    from proofroll_fuzz.hunt import FoundKind, Hunt
 
 _LONGEST = 300  # characters of a message in the table
 
@@ -62,7 +62,7 @@ def fuzz(
 
     Exits with 1 if a kind is new in this folder.
     """
-    from proofroll.studies.fuzz.hunt import hunt
+    from proofroll_fuzz.hunt import hunt
 
     first_seed = seed_of(seed)
     with options.progress_bar("scenes") as advance:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
-from proofroll.core.drawing import three_digits
-from proofroll.elements.mechanism.drawn.poses import WORLD, floats
-from proofroll.elements.mechanism.drawn.sketch import SCREW, Sketch
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability as Capability
-from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.adapter import WORLD, JointKind
+from proofroll.adapter import MechanismCapability as Capability
 from proofroll.elements.mechanism.scene.rotations import from_rpy, to_rpy
+from proofroll_fuzz.drawing import three_digits
+from proofroll_fuzz.mechanisms.poses import floats
+from proofroll_fuzz.mechanisms.sketch import SCREW, Sketch
 
 
 def _joint_springs(sketch: Sketch) -> None:

@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from proofroll.core.drawing import Choices, three_digits
-from proofroll.elements.mechanism.drawn.poses import PosesAtStart, floats
-from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, WITH_AXIS, WITH_QUATERNION, JointKind
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_rpy, to_quaternion
+from proofroll.adapter import WITH_AXIS, Array, JointKind, frame_of_axis, to_quaternion
+from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, WITH_QUATERNION
+from proofroll.elements.mechanism.scene.rotations import from_rpy
+from proofroll_fuzz.drawing import Choices, three_digits
+from proofroll_fuzz.mechanisms.poses import PosesAtStart, floats
 
 _STEPS = 250  # of the natural time √(L/g)
 _EVERY = 20  # steps between samples

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.drawing import Change
-from proofroll.elements.mechanism.drawn.smaller import named, rows_of
-from proofroll.elements.mechanism.drawn.turned_world import Turn
-from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, LOOP_FACTS, ONE_COORDINATE, JointKind
+from proofroll.adapter import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, LOOP_FACTS, ONE_COORDINATE
 from proofroll.elements.mechanism.scene.rotations import from_rpy
+from proofroll_fuzz.drawing import Change
+from proofroll_fuzz.mechanisms.smaller import named, rows_of
+from proofroll_fuzz.mechanisms.turned_world import Turn
 
 _QUARTER = math.pi / 2
 # Laws of a joint of one coordinate, which another such joint may have in its place.

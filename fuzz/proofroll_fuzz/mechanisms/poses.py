@@ -8,10 +8,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from proofroll.elements.mechanism.scene.joint_kinds import SLIDING, WITH_QUATERNION, JointKind
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_quaternion, from_rpy
+from proofroll.adapter import WORLD, Array, JointKind, frame_of_axis, from_quaternion
+from proofroll.elements.mechanism.scene.joint_kinds import SLIDING, WITH_QUATERNION
+from proofroll.elements.mechanism.scene.rotations import from_rpy
 
-WORLD = "world"
 _ZERO, _Z = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 

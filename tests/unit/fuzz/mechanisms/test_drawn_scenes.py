@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from proofroll.core.drawing import Choices, drawn_scene
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.drawn.families import FAMILIES
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.fuzz.relations import write_scene
 from proofroll.vocabulary.document import CHAPTERS
+from proofroll_fuzz.drawing import Choices, drawn_scene
+from proofroll_fuzz.mechanisms.families import FAMILIES
+from proofroll_fuzz.relations import write_scene
 
 SEEDS = range(10)
 # Capability that no family has as a feature -> how it is drawn, or why not.

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.drawing import Choices
-from proofroll.elements.mechanism.drawn.closing import extent
-from proofroll.elements.mechanism.drawn.poses import WORLD, floats
-from proofroll.elements.mechanism.drawn.sketch import Sketch
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability as Capability
-from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.elements.mechanism.scene.rotations import Array, about, to_quaternion
+from proofroll.adapter import WORLD, Array, JointKind, to_quaternion
+from proofroll.adapter import MechanismCapability as Capability
+from proofroll.elements.mechanism.scene.rotations import about
+from proofroll_fuzz.drawing import Choices
+from proofroll_fuzz.mechanisms.closing import extent
+from proofroll_fuzz.mechanisms.poses import floats
+from proofroll_fuzz.mechanisms.sketch import Sketch
 
 _ON_FLOORS = ("sphere", "ellipsoid", "box", "capsule", "cylinder")
 _LONG = frozenset({"capsule", "cylinder"})  # touch at two ends, whose moments the reader refuses

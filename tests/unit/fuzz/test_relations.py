@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from proofroll.core.drawing import Relation
-from proofroll.elements.mechanism.drawn.families import FAMILIES
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.fuzz.evaluation import EvaluatedScene, evaluate_scene
-from proofroll.studies.fuzz.relations import relations_of, write_scene
+from proofroll_fuzz.drawing import Relation
+from proofroll_fuzz.evaluation import EvaluatedScene, evaluate_scene
+from proofroll_fuzz.mechanisms.families import FAMILIES
+from proofroll_fuzz.relations import relations_of, write_scene
 
 _RELATIONS = relations_of(FAMILIES["tree"])
 _TABLES: dict[str, Any] = {

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.elements.mechanism.drawn.poses import WORLD, floats
-from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.elements.mechanism.scene.rotations import Array, from_rpy, to_rpy
+from proofroll.adapter import WORLD, Array, JointKind
+from proofroll.elements.mechanism.scene.rotations import from_rpy, to_rpy
+from proofroll_fuzz.mechanisms.poses import floats
 
 _O, _Z = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 # Keys of rows of the world that have a direction, also where a row leaves out its default.

@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.core.drawing import all_families, drawn_scene
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.core.plugins import load_element_kinds
 from proofroll.core.verdict import Judgement, LimitResult, Verdict
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.fuzz import evaluation
-from proofroll.studies.fuzz import surprises as kinds
-from proofroll.studies.fuzz.relations import write_scene
+from proofroll_fuzz import evaluation
+from proofroll_fuzz import surprises as kinds
+from proofroll_fuzz.drawing import all_families, drawn_scene
+from proofroll_fuzz.relations import write_scene
 
 _JUDGEMENT = Judgement("v", "m/s", 0.1, 0.0, 1e-3, 1.0, Verdict.DIFFERS, limit=LimitResult.NOT_SHOWN)
 
@@ -74,7 +73,7 @@ def test_an_error_of_the_comparison_is_a_find_and_ends_no_hunt(tmp_path: Path, m
     def fail(*_: object, **__: object) -> None:
         raise InputError("joints.j.q0", 0.0, "the motion begins with -0.8; leave q0 out")
 
-    write_scene(tmp_path, drawn_scene(dict(all_families(load_element_kinds())), 0).tables)
+    write_scene(tmp_path, drawn_scene(all_families(), 0).tables)
     monkeypatch.setattr(evaluation, "_compared", fail)
     evaluated = evaluation.evaluate_scene(tmp_path, "truth", Runner(Store(tmp_path / "cases")), 1.0)
     assert [str(item.kind).startswith("proofroll; fails; joints") for item in evaluated.surprises] == [True]

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from proofroll.cli.fuzz import seed_of
+from proofroll_fuzz.command import seed_of
 
 # More scenes than a night has.
 _NIGHT = 10_000

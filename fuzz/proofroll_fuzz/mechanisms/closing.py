@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.elements.mechanism.drawn.poses import PosesAtStart, floats
-from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
-from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis, from_rpy, to_rpy
+from proofroll.adapter import Array, JointKind, frame_of_axis
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE
+from proofroll.elements.mechanism.scene.rotations import from_rpy, to_rpy
+from proofroll_fuzz.mechanisms.poses import PosesAtStart, floats
 
 _O, _X, _Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.drawing import Change
-from proofroll.elements.mechanism.drawn.poses import WORLD, floats
-from proofroll.elements.mechanism.drawn.turned_world import Turn
-from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
-from proofroll.elements.mechanism.scene.rotations import frame_of_axis, from_quaternion, from_rpy
+from proofroll.adapter import WORLD, JointKind, frame_of_axis, from_quaternion
+from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
+from proofroll.elements.mechanism.scene.rotations import from_rpy
+from proofroll_fuzz.drawing import Change
+from proofroll_fuzz.mechanisms.poses import floats
+from proofroll_fuzz.mechanisms.turned_world import Turn
 
 _LAWS = ("loops", "springs", "bushings", "forces", "actuators", "couplings", "pairs")
 # Keys that tell which parts a row is about, or of which kind it is.

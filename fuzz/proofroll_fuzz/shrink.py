@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.drawing import Change, Relation, SceneFamily
 from proofroll.core.element_abilities import WritesPrograms
 from proofroll.core.plugins import parse_engine
 from proofroll.core.program_text import FailedRun
@@ -20,9 +19,10 @@ from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
 from proofroll.running.store import write_text
 from proofroll.studies.failure import CRASHED, GAVE_UP, LOST_PHASE, Yardstick, run_outcome
-from proofroll.studies.fuzz.evaluation import EvaluatedScene, evaluate_scene, outcome_of
-from proofroll.studies.fuzz.relations import relations_of, write_scene
-from proofroll.studies.fuzz.surprises import HANGS, OURS, TRUTH, Surprise
+from proofroll_fuzz.drawing import Change, Relation, SceneFamily
+from proofroll_fuzz.evaluation import EvaluatedScene, evaluate_scene, outcome_of
+from proofroll_fuzz.relations import relations_of, write_scene
+from proofroll_fuzz.surprises import HANGS, OURS, TRUTH, Surprise
 
 _DECADE = 1.0  # by which the size of a surprise may change
 _TIMES = 3.0  # limit of a try, relative to the first run of the scene

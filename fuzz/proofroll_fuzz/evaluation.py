@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
+from proofroll import InputError, Refused, load_scene
+from proofroll.adapter import Scene
 from proofroll.core.comparison import Band, Comparison, Row
-from proofroll.core.drawing import Relation
-from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import parse_engine
-from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
-from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
+from proofroll.files.scene_file import SceneFile, read_scene_file
 from proofroll.running.case import EngineFacts, Status
 from proofroll.running.engine_questions import resolve, resolve_with_truth
 from proofroll.running.process import processor_seconds
@@ -23,8 +22,9 @@ from proofroll.studies.comparison.compare import evaluate
 from proofroll.studies.comparison.default_comparison import able, bounds
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import Plan, plan, point_name
-from proofroll.studies.fuzz.relations import breaches
-from proofroll.studies.fuzz.surprises import TRUTH, Surprise, failure_of_ours, surprises
+from proofroll_fuzz.drawing import Relation
+from proofroll_fuzz.relations import breaches
+from proofroll_fuzz.surprises import TRUTH, Surprise, failure_of_ours, surprises
 
 _TIGHT = 1e-4  # part of its scale by which the limit of small steps of an observable may be off
 _OF_STEPS, _OF_TOLERANCES = [2.0, 1.0, 0.5], [4.0, 2.0, 1.0]  # an engine may refuse a tighter tolerance

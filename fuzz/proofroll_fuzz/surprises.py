@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proofroll import ProofrollError
 from proofroll.core.arrays import FloatArray, magnitudes
-from proofroll.core.errors import ProofrollError
 from proofroll.core.observable import Observable, Role
 from proofroll.core.verdict import Judgement, LimitResult, Verdict
 from proofroll.running.case import Result, Status

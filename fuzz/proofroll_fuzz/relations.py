@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.drawing import Relation, SceneFamily
-from proofroll.core.errors import InputError
-from proofroll.files.scene_file import load_scene
+from proofroll import InputError, load_scene
 from proofroll.files.toml_text import toml_text
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import write_text
 from proofroll.studies.cases import case_of
 from proofroll.studies.comparison.outcome import ComparedPoint
-from proofroll.studies.fuzz.surprises import RELATION, TRUTH, Surprise, SurpriseKind
 from proofroll.studies.judging.reference import Reference
+from proofroll_fuzz.drawing import Relation, SceneFamily
+from proofroll_fuzz.surprises import RELATION, TRUTH, Surprise, SurpriseKind
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.core.drawing import Change, drawn_scene
 from proofroll.core.errors import ProofrollError
-from proofroll.elements.mechanism.drawn.families import FAMILIES
-from proofroll.elements.mechanism.drawn.poses import PosesAtStart
-from proofroll.elements.mechanism.drawn.smaller import remove, rounded
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.fuzz.relations import write_scene
+from proofroll_fuzz.drawing import Change, drawn_scene
+from proofroll_fuzz.mechanisms.families import FAMILIES
+from proofroll_fuzz.mechanisms.poses import PosesAtStart
+from proofroll_fuzz.mechanisms.smaller import remove, rounded
+from proofroll_fuzz.relations import write_scene
 
 
 def drawn(family: str, seed: int = 0) -> dict[str, Any]:

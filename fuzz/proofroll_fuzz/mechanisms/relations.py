@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.drawing import Relation
-from proofroll.elements.mechanism.drawn.smaller import STRUCTURE, rows_of
-from proofroll.elements.mechanism.drawn.turned_world import Turn
-from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
+from proofroll.adapter import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE
 from proofroll.elements.mechanism.scene.rotations import from_rpy
+from proofroll_fuzz.drawing import Relation
+from proofroll_fuzz.mechanisms.smaller import STRUCTURE, rows_of
+from proofroll_fuzz.mechanisms.turned_world import Turn
 
 _R, _SHIFT = from_rpy((0.3, -0.7, 1.1)), (0.4, -0.3, 0.2)
 _LOSSES = frozenset({"friction", "damping", "motion", "limits", "torque"})  # keys of laws that are not reversible
