@@ -48,8 +48,9 @@ from proofroll.robots.control.differences import (
     instant_rows,
     servo_rows,
     sources,
+    targets_of,
 )
-from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
+from proofroll.robots.control.fits import ServoRows, observation_causes, ramps, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
 from proofroll.robots.control.record import FITTED, OBSERVED, ControlRecord, Layer, LayerCause
 from proofroll.robots.control.standing_joints import StandingFit, standing_fit
@@ -374,11 +375,27 @@ def _fitted_causes(
         targets, actions = (part.stacked(kind, law.joints) for kind in ("target", "action"))
         if targets is None or actions is None:
             return
+        yield from _ramped(evidence, most)
         source = sources(part, law)
         later = np.flatnonzero(source >= 0)
         places = part.stacked("q", law.joints)
         seen = None if places is None else places[later]
         yield from target_causes(targets[later], actions[source[later]], seen, law, most)
+
+
+def _ramped(evidence: _Evidence, most: float) -> Iterator[tuple[int, LayerCause]]:
+    """Targets of all rows that are reached along a ramp from one instant to the next."""
+    record, law = evidence.record, evidence.law
+    instants, recorded = instant_rows(record, law), record.stacked("target", law.joints)
+    goals = targets_of(at_instants(record, law), law)
+    if recorded is None or isinstance(goals, str):
+        return
+    place = np.searchsorted(instants, np.arange(len(recorded)), side="right") - 1
+    for targets in ramps(goals[np.maximum(place, 0)]):
+        known = np.isfinite(targets).all(axis=1)
+        after = float((np.abs(targets - recorded)[known] / np.abs(recorded).max(axis=0)).max())
+        if after <= most:
+            yield 0, LayerCause("ramped", "targets go along a straight line from one instant to the next", None, after)
 
 
 def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:
