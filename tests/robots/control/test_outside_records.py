@@ -139,6 +139,7 @@ def test_a_right_record_of_another_program_holds(program: str, digits: str, judg
     "mujoco-3-damping",
     "pinocchio--no armature",
     "pinocchio-3-dry friction",
+    "pinocchio--two instants late",
 )
 @pytest.mark.parametrize(("program", "digits", "name"), ALL)
 def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: str, judged: Judged) -> None:
@@ -226,6 +227,7 @@ def test_a_layer_that_stays_open_tells_no_column(judged: Judged) -> None:
     assert not any("the layers behind it tell so" in line for line in judgement.lines())
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("columns_of_actions", "words"),
     [("scaled", "have the scale of the controller already"), ("late", "are one instant")],
@@ -284,7 +286,7 @@ def test_a_mistake_of_an_observation_shows_in_actions(name: str, judged: Judged)
     require_first(judged(columns), "action", MISTAKES[name][0])
 
 
-@pytest.mark.drill_of("payload", "dry friction")
+@pytest.mark.drill
 @pytest.mark.parametrize("name", CLOSED)
 def test_what_no_file_has_is_named_with_what_it_explains(name: str, judged: Judged) -> None:
     """Damping, dry friction and a payload are named at the accelerations with their sizes, and close them."""

@@ -63,7 +63,7 @@ def test_every_scene_is_valid(family: str, tmp_path: Path) -> None:
         assert scene.requires, drawn.features
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("family", FAMILIES)
 def test_hundreds_of_scenes_are_valid(family: str, tmp_path: Path) -> None:
     """As above, of as many seeds as cover each pair of features."""
