@@ -20,6 +20,8 @@ from proofroll.elements.mechanism.scene.rotations import Array
 _SETTLED, _SWEEPS = 1e-12, 2000
 # Sweeps after which it may go round in circles, as contacts of one foot share its load; then each step is a part of it.
 _CIRCLES, _SHORTER = 200, 0.6
+# Sweeps without half the change, after which a change within the tolerance is round-off that no sweep takes away.
+_PATIENCE = 8
 # Sweeps between two solutions of all equations of what sticks and presses at once.
 _TOGETHER = 2
 _ACCEPTED = 1e-5  # change that is taken where no solver reaches the tolerance
@@ -79,7 +81,7 @@ class BlockSolver:
         guess = np.zeros(len(g))
         for number, block in blocks.items():
             guess[block.rows] = self._last.get(number, 0.0)
-        impulses, change = impulses_by_blocks(G, g, list(blocks.values()), guess)
+        impulses, change = impulses_by_blocks(G, g, list(blocks.values()), guess, self._tolerance)
         if not change <= self._tolerance:
             try:
                 impulses, change = otherwise(), 0.0
@@ -91,10 +93,15 @@ class BlockSolver:
         return impulses
 
 
-def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array) -> tuple[Array, float]:
+def impulses_by_blocks(
+    G: Array, g: Array, blocks: Sequence[Block], guess: Array, tolerance: float
+) -> tuple[Array, float]:
     """Impulses, and the change of velocity in the last sweep relative to the largest speed; see :class:`BlockSolver`.
 
-    ``guess``: impulses to begin with.
+    Args:
+        G, g, blocks: as of :meth:`BlockSolver.impulses`.
+        guess: impulses to begin with.
+        tolerance: change of velocity, relative to the largest speed, below which sweeps end as soon as it stalls.
     """
     f, speed = guess.copy(), float(np.abs(g).max()) or 1.0
     u, change = g + G @ f, math.inf
@@ -106,12 +113,13 @@ def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array
     ]
     diagonal = G.diagonal().tolist()
     part = 1.0  # of the way to a block's own solution
+    least, fell = math.inf, 0  # smallest change, and the last sweep that halved it
     for sweep in range(1, _SWEEPS):
         part = part if sweep % _CIRCLES else _SHORTER * part
         change = 0.0
-        for row, least, bound in joints:
+        for row, lowest, bound in joints:
             old, mobility = float(f[row]), diagonal[row]
-            if step := part * (min(max(old - float(u[row]) / mobility, least), bound) - old):
+            if step := part * (min(max(old - float(u[row]) / mobility, lowest), bound) - old):
                 u += step * G[row]
                 f[row] += step
                 change = max(change, abs(step * mobility))
@@ -127,7 +135,10 @@ def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array
                 u += steps @ response
                 f[rows] += steps
                 change = max(change, *(abs(step * mobility[k][k]) for k, step in enumerate(steps)))
-        if not change > _SETTLED * part * speed:
+        if change < least / 2:
+            least, fell = change, sweep
+        stalls = sweep - fell >= _PATIENCE and change <= tolerance * part * speed
+        if stalls or not change > _SETTLED * part * speed:
             break
         if sweep % _TOGETHER == 0 and part == 1.0:
             closer = f + _at_once(G, u, f, blocks)
