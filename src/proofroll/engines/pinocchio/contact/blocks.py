@@ -20,10 +20,10 @@ from proofroll.elements.mechanism.scene.rotations import Array
 _SETTLED, _SWEEPS = 1e-12, 2000
 # Sweeps after which it may go round in circles, as contacts of one foot share its load; then each step is a part of it.
 _CIRCLES, _SHORTER = 200, 0.6
-# Sweeps without half the change, after which a change within the tolerance is round-off that no sweep takes away.
-_PATIENCE = 8
 # Sweeps between two solutions of all equations of what sticks and presses at once.
 _TOGETHER = 2
+# Sweeps without half the change, after which a change within the tolerance is round-off that no sweep takes away.
+_PATIENCE = 2 * _TOGETHER
 _ACCEPTED = 1e-5  # change that is taken where no solver reaches the tolerance
 _TURNS, _LONGEST_TURN = 40, 0.7  # steps of a search for a direction, and the longest of them [rad]
 _ALONG = 1e-10  # slip across a direction, relative to the largest speed, that is found
