@@ -99,7 +99,9 @@ def impulses_by_blocks(
     """Impulses, and the change of velocity in the last sweep relative to the largest speed; see :class:`BlockSolver`.
 
     Args:
-        G, g, blocks: as of :meth:`BlockSolver.impulses`.
+        G: Delassus matrix of the rows.
+        g: their velocities without impulses, with shifts.
+        blocks: all rows.
         guess: impulses to begin with.
         tolerance: change of velocity, relative to the largest speed, below which sweeps end as soon as it stalls.
     """
