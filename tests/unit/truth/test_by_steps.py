@@ -111,7 +111,7 @@ def test_a_limit_keeps_the_runs_that_it_has(
     monkeypatch.setattr(PACE, "reached", reached)
     run = simulate(hopper(held=True), until=UNTIL)
     assert words in run.attrs["route"]
-    assert run.sizes["time"] == (25 if whole else 13)
+    assert run.sizes["time"] == (13 if whole else 8)
     assert (ENDED in run.attrs) is not whole
 
 
