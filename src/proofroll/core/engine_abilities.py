@@ -176,6 +176,8 @@ class OwnOptions:
         settings: setting -> its value, as text.
         of_contacts: further settings, of formulations that have contacts.
         others: clauses on options that the adapter sets otherwise.
+        others_alone: further ones, of formulations without contacts.
+        others_of_contacts: further ones, of formulations with contacts.
     """
 
     engine: str
@@ -183,6 +185,8 @@ class OwnOptions:
     settings: Mapping[str, str]
     of_contacts: Mapping[str, str]
     others: list[str]
+    others_alone: list[str] = field(default_factory=list)
+    others_of_contacts: list[str] = field(default_factory=list)
 
 
 def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:
@@ -307,7 +311,7 @@ class Steps:
     Attributes:
         exact_cone: True if friction keeps Coulomb's cone itself, and not one that is convex or has edges.
         hard_contact: True if what presses does not give way, or by less with each shorter step.
-        settings: that override the preset ``matched``.
+        settings: overrides of the preset ``matched``.
     """
 
     exact_cone: bool

@@ -85,7 +85,7 @@ class TakesSteps(Protocol):
         """Reference of an element, as a truth with an error bar.
 
         Args:
-            element: one of which :meth:`by_steps` is true.
+            element: one for which :meth:`by_steps` is true.
             times: of the samples [s], shape (time,).
             engines: ``name[formulation=…]`` of the reference and of its witness, or fewer.
 

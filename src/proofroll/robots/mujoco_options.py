@@ -22,6 +22,8 @@ _READ = {"integrator", "timestep", "cone", "gravity", "density", "viscosity", "d
 _READ |= {"impratio", "sleep_tolerance", "wind", "magnetic", "enableflags", "jacobian"}
 _READ |= {f"{family}_{what}" for family in ("o", "ccd", "sdf") for what in ("friction", "margin", "solref", "solimp")}
 _READ |= {"ccd_iterations", "ccd_tolerance", "sdf_iterations", "sdf_initpoints"}
+_OF_CONTACTS = ("iterations", "noslip_iterations", "solver")  # settings of formulations with contacts alone
+_SOLVERS = {name.upper(): name for name in ("PGS", "CG", "Newton")}
 _FLAGS = {"EULERDAMP": "eulerdamp", "REFSAFE": "refsafe"}  # of joints and rows, which no scene has
 
 
@@ -48,18 +50,30 @@ def own_options(path: Path) -> OwnOptions | None:
     unlike = [key for key in keys if np.any(getattr(option, key) != getattr(plain.option, key))]
     solver = mujoco.mjtSolver(int(option.solver)).name.removeprefix("mjSOL_")
     words = {"solver": f"solver {solver}", "iterations": f"{option.iterations} iterations"}
-    others = [words.get(key, f"{key} {getattr(option, key):g}") for key in unlike]
+    clauses = {key: words.get(key, f"{key} {getattr(option, key):g}") for key in unlike}
+    alone = [clauses.pop(key) for key in _OF_CONTACTS if key in clauses]
+    others = list(clauses.values())
     bits = mujoco.mjtDisableBit
     others += [f"flag {word}" for name, word in _FLAGS.items() if option.disableflags & getattr(bits, f"mjDSBL_{name}")]
-    usual = {"joints": plain.worldbody.add_body().add_joint(), "equalities": plain.add_equality()}
+    body, of_contacts = plain.worldbody.add_body(), list[str]()
+    usual = {"joints": body.add_joint(), "equalities": plain.add_equality(), "geoms": body.add_geom()}
     for kind, element in usual.items():
+        named = of_contacts if kind == "geoms" else others
         for key in [key for key in dir(element) if key.startswith(("solref", "solimp"))]:
             count = sum(bool(np.any(getattr(item, key) != getattr(element, key))) for item in getattr(spec, kind))
-            others += [f"{key.replace('_', '')} of {counted(count, kind)}"] if count else []
+            named += [f"{key.replace('_', '')} of {counted(count, kind)}"] if count else []
     return OwnOptions(
         engine="mujoco",
         words=f"{integrator}, dt {number(option.timestep, 3)} s",
         settings={"integrator": integrator, "dt": f"{option.timestep:.12g}"},
-        of_contacts={"cone": _CONES[int(option.cone)]},
+        of_contacts={
+            "cone": _CONES[int(option.cone)],
+            "impratio": str(float(option.impratio)),
+            "solver": _SOLVERS[solver.upper()],
+            "iterations": str(option.iterations),
+            "noslip_iterations": str(option.noslip_iterations),
+        },
         others=others,
+        others_alone=alone,
+        others_of_contacts=of_contacts,
     )
