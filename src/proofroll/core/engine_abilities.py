@@ -178,6 +178,7 @@ class OwnOptions:
         others: clauses on options that the adapter sets otherwise.
         others_alone: further ones, of formulations without contacts.
         others_of_contacts: further ones, of formulations with contacts.
+        switches: for a reader, an option of the file and another value -> settings with that value.
     """
 
     engine: str
@@ -187,6 +188,7 @@ class OwnOptions:
     others: list[str]
     others_alone: list[str] = field(default_factory=list)
     others_of_contacts: list[str] = field(default_factory=list)
+    switches: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:

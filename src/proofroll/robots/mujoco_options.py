@@ -23,8 +23,9 @@ _READ |= {"impratio", "sleep_tolerance", "wind", "magnetic", "enableflags", "jac
 _READ |= {f"{family}_{what}" for family in ("o", "ccd", "sdf") for what in ("friction", "margin", "solref", "solimp")}
 _READ |= {"ccd_iterations", "ccd_tolerance", "sdf_iterations", "sdf_initpoints"}
 _OF_CONTACTS = ("iterations", "noslip_iterations", "solver")  # settings of formulations with contacts alone
+_FINER = 4  # part of the file's step that is tried
 _SOLVERS = {name.upper(): name for name in ("PGS", "CG", "Newton")}
-_FLAGS = {"EULERDAMP": "eulerdamp", "REFSAFE": "refsafe"}  # of joints and rows, which no scene has
+_FLAGS = {"REFSAFE": "refsafe"}  # of rows, which no scene has
 
 
 def own_options(path: Path) -> OwnOptions | None:
@@ -62,10 +63,22 @@ def own_options(path: Path) -> OwnOptions | None:
         for key in [key for key in dir(element) if key.startswith(("solref", "solimp"))]:
             count = sum(bool(np.any(getattr(item, key) != getattr(element, key))) for item in getattr(spec, kind))
             named += [f"{key.replace('_', '')} of {counted(count, kind)}"] if count else []
+    switches = {"hard contacts in place of soft ones": {"time_constant": "2", "impedance": "0.9999"}}
+    if _CONES[int(option.cone)] == "pyramidal":
+        switches["elliptic cone in place of the pyramidal"] = {"cone": "elliptic"}
+    explicit = bool(option.disableflags & bits.mjDSBL_EULERDAMP)
+    if integrator == "Euler" and not explicit:
+        switches["damping as armature in place of implicit"] = {"damping_armature": "true"}
+    finer = option.timestep / _FINER
+    switches[f"dt {number(finer, 3)} s in place of {number(option.timestep, 3)} s"] = {"dt": f"{finer:.12g}"}
     return OwnOptions(
         engine="mujoco",
         words=f"{integrator}, dt {number(option.timestep, 3)} s",
-        settings={"integrator": integrator, "dt": f"{option.timestep:.12g}"},
+        settings={
+            "integrator": integrator,
+            "dt": f"{option.timestep:.12g}",
+            **({"eulerdamp": "False"} if explicit else {}),
+        },
         of_contacts={
             "cone": _CONES[int(option.cone)],
             "impratio": str(float(option.impratio)),
@@ -76,4 +89,5 @@ def own_options(path: Path) -> OwnOptions | None:
         others=others,
         others_alone=alone,
         others_of_contacts=of_contacts,
+        switches=switches,
     )

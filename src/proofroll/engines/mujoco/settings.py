@@ -65,6 +65,7 @@ class MujocoSettings:
             convex cone gives to what slips, and the lift by the missing J̇v (``geoms``).
         damping_armature: True if each joint has the armature h (c + kd) of its damper and servos in place of MuJoCo's
             implicit damping: the same step without contact, and contacts see it (``joints``, ``geoms``).
+        eulerdamp: False switches MuJoCo's implicit damping of Euler off.
     """
 
     formulation: str = "joints"
@@ -81,6 +82,7 @@ class MujocoSettings:
     curvature: bool = False
     cone_correction: bool = False
     damping_armature: bool = False
+    eulerdamp: bool = True
 
     @property
     def resolution(self) -> str:
