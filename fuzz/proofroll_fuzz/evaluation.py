@@ -14,7 +14,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, read_scene_file
 from proofroll.running.case import EngineFacts, Status
-from proofroll.running.engine_questions import resolve, resolve_with_truth
+from proofroll.running.engine_questions import on_scene, resolve, resolve_with_truth
 from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
 from proofroll.studies.cases import case_of
@@ -139,7 +139,7 @@ def _truth_alone(comparison: Comparison, scene: Scene, file: SceneFile, runner: 
         comparison.scene,
         scene.fully_asked,
         (),
-        facts,
+        on_scene(facts, scene, runner.workers),
         comparison.until,
         comparison.every,
         time_limit=comparison.time_limit,

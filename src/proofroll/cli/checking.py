@@ -83,7 +83,10 @@ def checked_file(name: str, parameters: Mapping[str, Any]) -> SoundFile:
         InputError: there is no such scene or file, or the first mistake in it; a study has no parameters.
     """
     from proofroll.files.scene_file import scene_folder, scene_names
+    from proofroll.files.scene_sources import source_of
 
+    if source_of(name) is not None:
+        return _scene(name, parameters)
     try:
         scene_folder(name)
     except InputError as error:
@@ -108,13 +111,15 @@ def checked_file(name: str, parameters: Mapping[str, Any]) -> SoundFile:
 def _scene(name: str, parameters: Mapping[str, Any]) -> SoundFile:
     from proofroll.core.element_abilities import DoubtsNumbers, TellsStart
     from proofroll.files.scene_file import load_scene, read_scene_file
+    from proofroll.files.scene_sources import source_of
 
     file, scene = read_scene_file(name), load_scene(name, **parameters)
     tables = {f"[[{key}]]": len(value) for key, value in file.tables.items() if isinstance(value, list)}
     counts = {"parameters": len(file.parameters)} | tables
-    start = [line for element in scene.elements if isinstance(element, TellsStart) for line in element.start_facts]
+    start = [scene.title] if source_of(name) is not None else []
+    start += [line for element in scene.elements if isinstance(element, TellsStart) for line in element.start_facts]
     doubts = [line for element in scene.elements if isinstance(element, DoubtsNumbers) for line in element.implausible]
-    path = str(scene.folder / "scene.toml")
+    path = name if source_of(name) is not None else str(scene.folder / "scene.toml")
     return SoundFile(
         kind="scene",
         name=scene.name,

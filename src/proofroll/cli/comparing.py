@@ -111,6 +111,10 @@ def compare(
     runner, cheapest = options.new_runner(out, fresh, jobs, scheduler, workers), stored_sentences(loaded, out)
     outcomes = outcomes_of([loaded], engine or [], runner, watched=_Watched(show, moves=not as_json))
     show(outcomes[0])
+    if not (engine or as_json):
+        from proofroll.studies.comparison.own_path import own_path
+
+        options.show_lines(own_path(outcomes[0], runner), widest=WIDTH)
     raise typer.Exit(exit_code(outcomes))
 
 

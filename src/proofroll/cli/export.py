@@ -18,6 +18,8 @@ def export(
         Literal["scene"] | None,
         typer.Option("--as", help="Instead of a model, the scene.toml of a robot file (URDF, MJCF), to be added to."),
     ] = None,
+    control: options.Control = None,
+    ground: options.Ground = None,
     settings: options.Set = None,
     _root: options.Root = None,
 ) -> None:
@@ -31,6 +33,7 @@ def export(
     from proofroll.running.store import write_text
     from proofroll.studies.cases import single_case
 
+    settings, scene = options.with_ground(settings, control, ground), options.controlled(scene, control)
     if (engine is None) == (kind is None):
         raise InputError("--engine", engine, "give an engine, whose model is written, or --as scene")
     if engine is None:

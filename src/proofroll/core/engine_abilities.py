@@ -1,7 +1,7 @@
 """Optional protocols of an engine."""
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence, Set
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
@@ -176,6 +176,9 @@ class OwnOptions:
         settings: setting -> its value, as text.
         of_contacts: further settings, of formulations that have contacts.
         others: clauses on options that the adapter sets otherwise.
+        others_alone: further ones, of formulations without contacts.
+        others_of_contacts: further ones, of formulations with contacts.
+        switches: for a reader, an option of the file and another value -> settings with that value.
     """
 
     engine: str
@@ -183,6 +186,9 @@ class OwnOptions:
     settings: Mapping[str, str]
     of_contacts: Mapping[str, str]
     others: list[str]
+    others_alone: list[str] = field(default_factory=list)
+    others_of_contacts: list[str] = field(default_factory=list)
+    switches: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:
@@ -298,6 +304,55 @@ class MadeFor(Protocol):
 def offered(formulation: str, requires: Collection[str], made_for: Mapping[str, Collection[str]]) -> bool:
     """True if a formulation is offered for a scene with these requirements (:class:`MadeFor`)."""
     return formulation not in made_for or not set(requires).isdisjoint(made_for[formulation])
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Claim of a formulation: runs with ever shorter steps lead to the motion that the laws of contact tell.
+
+    Attributes:
+        exact_cone: True if friction keeps Coulomb's cone itself, and not one that is convex or has edges.
+        hard_contact: True if what presses does not give way, or by less with each shorter step.
+        settings: overrides of the preset ``matched``.
+    """
+
+    exact_cone: bool
+    hard_contact: bool
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@runtime_checkable
+class ServesAsReference(Protocol):
+    """Ability of an engine whose runs can stand for a truth where no route of the truth follows a motion.
+
+    Attributes:
+        references: formulation -> its claim.
+    """
+
+    references: ClassVar[Mapping[str, Steps]]
+
+
+def stepped(
+    declared: Mapping[str, tuple[Mapping[str, Steps], Mapping[str, Collection[str]]]], needs: Set[str]
+) -> list[str]:
+    """Engines with formulation, ``name[formulation=…]``, of a reference by steps and of its witness, or fewer.
+
+    The reference is the first with hard contacts and exact cones, its witness the first of another engine. Engines of
+    the witness that are no reference may have softer contacts or other cones.
+
+    Args:
+        declared: engine -> its claims by formulation, and what its formulations provide.
+        needs: capabilities that a scene requires.
+    """
+    able = [
+        (engine, formulation, claim)
+        for engine, (claims, provides) in declared.items()
+        for formulation, claim in claims.items()
+        if needs <= set(provides[formulation])
+    ]
+    exact = [item for item in able if item[2].exact_cone and item[2].hard_contact][:1]
+    witness = [item for item in able if exact and item[0] != exact[0][0]][:1]
+    return [f"{engine}[formulation={formulation}]" for engine, formulation, _ in [*exact, *witness]]
 
 
 def require_provided(engine: Any, formulation: str, scene: Scene) -> None:

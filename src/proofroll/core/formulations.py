@@ -6,13 +6,14 @@ from functools import cache
 from importlib.metadata import EntryPoint
 from typing import Any
 
-from proofroll.core.engine_abilities import Level, Term, require_provided
+from proofroll.core.engine_abilities import Level, Steps, Term, require_provided
 from proofroll.core.entry_points import announced, loaded
 from proofroll.core.scene import Scene
 
 FORMULATIONS = "proofroll.formulations"
 # What an engine says of each formulation, as its attribute -> as one of :class:`Formulation`.
 _SAID = {"provides": "provides", "presets": "presets", "levels": "level", "lacking": "lacking", "inherent": "inherent"}
+_SAID |= {"references": "reference"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,6 +28,8 @@ class Formulation:
             provides.
         lacking: see :class:`proofroll.core.engine_abilities.SaysWhyNot`.
         inherent: see :class:`proofroll.core.engine_abilities.CannotLeaveOut`.
+        reference: claim that its runs lead to the true motion, see
+            :class:`proofroll.core.engine_abilities.ServesAsReference`; None: it makes none.
         terms: parts of its model that a setting switches; of a part that the engine has already, the name alone.
     """
 
@@ -36,6 +39,7 @@ class Formulation:
     build: Callable[[Scene, Any], Any]
     lacking: Mapping[str, str] = dataclasses.field(default_factory=dict)
     inherent: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    reference: Steps | None = None
     terms: Sequence[Term | str] = ()
 
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Set
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, PackageNotFoundError, version
@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from proofroll.core.element import ElementKind
-from proofroll.core.engine_abilities import MadeFor, SupportsFrom, offered
+from proofroll.core.engine_abilities import MadeFor, ServesAsReference, SupportsFrom, offered, stepped
 from proofroll.core.entry_points import announced, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, raised_at, require_known
 from proofroll.core.formulations import extended
@@ -139,6 +139,19 @@ def _installed(requirement: str) -> bool:
 def load_element_kinds() -> tuple[type[ElementKind], ...]:
     """Every kind of element that installed packages announce, by name."""
     return tuple(kind for _, kind in loaded(ELEMENTS, like=ElementKind))
+
+
+def installed_steps(requires: Set[str]) -> list[str]:
+    """Installed engines of a reference by steps and its witness, see :func:`proofroll.core.engine_abilities.stepped`.
+
+    It loads all engines, where :func:`proofroll.running.engine_questions.on_scene` asks their processes.
+    """
+    declared = {}
+    for name in engine_names():
+        with suppress(ProofrollError):
+            kind = load_engine(name)
+            declared[name] = (kind.references if isinstance(kind, ServesAsReference) else {}, kind.provides)
+    return stepped(declared, requires)
 
 
 def require_engine(name: str) -> None:

@@ -15,6 +15,7 @@ from proofroll.core.element import Element
 from proofroll.core.entry_points import loaded
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.pace import PACE
+from proofroll.core.plugins import installed_steps
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -71,6 +72,29 @@ class FindsEdges(Protocol):
         """
 
 
+@runtime_checkable
+class TakesSteps(Protocol):
+    """Ability of a truth that has a reference by steps of engines for elements that its routes do not follow."""
+
+    @staticmethod
+    def by_steps(element: Element) -> bool:
+        """True if no route follows an element, but runs of an engine with ever shorter steps may."""
+
+    @staticmethod
+    def reference(element: Element, times: FloatArray, engines: Sequence[str]) -> xr.Dataset:
+        """Reference of an element, as a truth with an error bar.
+
+        Args:
+            element: one for which :meth:`by_steps` is true.
+            times: of the samples [s], shape (time,).
+            engines: ``name[formulation=…]`` of the reference and of its witness, or fewer.
+
+        Raises:
+            Refused: there is no engine for it; the text says why.
+            Diverged: a run ends early.
+        """
+
+
 @cache
 def load_truths() -> tuple[type[ElementTruth], ...]:
     """All truths that installed packages announce, by name."""
@@ -80,7 +104,18 @@ def load_truths() -> tuple[type[ElementTruth], ...]:
 _NONE = np.zeros(0)
 
 
-def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between: FloatArray = _NONE) -> xr.Dataset:
+def needs_steps(scene: Scene) -> bool:
+    """True if the truth of a scene is a reference by steps of engines."""
+    return any(_stepped(element) for element in scene.elements)
+
+
+def truth(
+    scene: Scene,
+    asked: FloatArray,
+    counting: FloatArray = _NONE,
+    between: FloatArray = _NONE,
+    engines: Sequence[str] = (),
+) -> xr.Dataset:
     """True run of a scene, see :class:`ElementTruth`, with read-only arrays.
 
     No force couples the elements, so each is solved alone.
@@ -90,6 +125,7 @@ def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between
         asked: times of the samples [s].
         counting: further times at which turns are counted [s] (:func:`proofroll.core.whole_turns.samples_between`).
         between: times of samples off the grid [s] (:func:`proofroll.core.dataset.off_grid_apart`).
+        engines: of a reference by steps, see :class:`TakesSteps`; empty: the installed ones that declare it.
 
     Raises:
         Refused: no truth covers an element.
@@ -97,7 +133,7 @@ def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between
     """
     times = np.union1d(asked, np.concatenate([counting, between])) if len(counting) or len(between) else asked
     PACE.until = float(times[-1])
-    parts = {element.name: _of_element(element, times, scene.asks) for element in scene.elements}
+    parts = {element.name: _of_element(element, times, scene, engines) for element in scene.elements}
     columns = joined(scene, _to_common_end({name: Columns.of(part) for name, part in parts.items()}))
     whole = (columns if times is asked else off_grid_apart(scene, columns, asked, between)).dataset()
     for name in ("route", "second_route", "ill_posed", LAWS):
@@ -137,8 +173,16 @@ def edge_between(scene: Scene, parameter: str, low: float, high: float, until: f
     raise InputError(parameter, "edge_between", f"no truth of {scene.name} finds edges; give a number")
 
 
-def _of_element(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
+def _stepped(element: Element) -> bool:
+    """True if the truth of an element is a reference by steps."""
+    plug_in = next((item for item in load_truths() if item.covers(element)), None)
+    return isinstance(plug_in, TakesSteps) and plug_in.by_steps(element)
+
+
+def _of_element(element: Element, times: FloatArray, scene: Scene, engines: Sequence[str]) -> xr.Dataset:
     for plug_in in load_truths():
         if plug_in.covers(element):
-            return plug_in.truth(element, times, asks)
+            if isinstance(plug_in, TakesSteps) and plug_in.by_steps(element):
+                return plug_in.reference(element, times, engines or installed_steps(scene.requires))
+            return plug_in.truth(element, times, scene.asks)
     raise Refused(f"no truth by two routes covers {element.name} ({type(element).__name__})")

@@ -25,7 +25,7 @@ from proofroll.core.validation import strict, units_of, validated
 from proofroll.files.data_folders import data_folder
 from proofroll.files.json_data import plain
 from proofroll.files.scene_parameters import Parameter, check_parameters, units_read, values_of
-from proofroll.files.scene_sources import parts_of, source_of, stem_of
+from proofroll.files.scene_sources import source_of, stem_of
 from proofroll.files.toml import named_file, read_toml
 from proofroll.files.toml_text import toml_text
 
@@ -133,11 +133,13 @@ def scene_text(name: str, asked: Mapping[str, object]) -> str:
         asked: values of its parameters, those that are not its defaults.
 
     Raises:
-        InputError: no such file, a scene's own file, or one under a controller.
+        InputError: no such file, a scene's own file, or one under a controller whose targets are held.
     """
-    if source_of(name) is None or parts_of(name)[1]:
-        raise InputError("--as", "scene", f"{name} is no robot file alone; a scene has its text in its scene.toml")
+    if source_of(name) is None:
+        raise InputError("--as", "scene", f"{name} is no robot file; a scene has its text in its scene.toml")
     file, _, _, omitted = _read(name, asked)
+    if file.tables.get("control") is not None:
+        raise InputError("--as", "scene", "a scene.toml holds no targets between instants; leave rate out of --control")
     head = {key: value for key in ("title", "source", "reason", "duration") if (value := getattr(file, key))}
     tables = {key: rows for key, rows in plain(file.tables).items() if rows}
     names = {str(row["name"]): "" for rows in tables.values() for row in _rows(rows) if "name" in row}

@@ -34,6 +34,8 @@ def check(
         list[str] | None,
         typer.Option(help="Accepted causes of differences: damping_left_out,friction_left_out; or repeat."),
     ] = None,
+    control: options.Control = None,
+    ground: options.Ground = None,
     settings: options.Set = None,
     plot: Annotated[Path | None, typer.Option(help="Draw a scene at its start to this page (.html).")] = None,
     keys: Annotated[
@@ -43,7 +45,8 @@ def check(
 ) -> None:
     """Check a scene, study or robot file before it is run. Robot files are checked in every engine's own importer.
 
-    For a scene it prints the start, with the normal force or the degrees of freedom; --plot draws it.
+    For a scene, or a robot file with --control, it prints the start, with the normal force or the degrees of freedom;
+    --plot draws it.
     For a robot file: exit 1 if an engine (or the file of --against) does not hold the model that the file describes, or
     if the file is physically impossible. The other options are for these.
     """
@@ -55,14 +58,16 @@ def check(
         return
     if file is None:
         raise InputError("FILE", None, "name a scene, a study or a robot file, or give --keys")
-    if is_text_check(file):
+    settings = options.with_ground(settings, control, ground)
+    if control is not None or is_text_check(file):
         options.require_only(
             context,
-            {"file", "plot", "settings", "as_json"},
+            {"file", "plot", "settings", "as_json", "control", "ground", "_root"},
             "this is for robot files; nothing is run to check a scene or a study",
             {"engine": ", and `proofroll compare SCENE --engine NAME` says what an engine makes of one"},
         )
-        check_text(options.own_first(str(file)), as_json, plot, settings)
+        name = options.own_first(str(file)) if control is None else options.controlled(str(file), control)
+        check_text(name, as_json, plot, settings)
         return
     if settings:
         advice = "this is for scenes; `proofroll run FILE --engine truth --set …` runs the scene of a robot file"

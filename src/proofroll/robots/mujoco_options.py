@@ -22,7 +22,10 @@ _READ = {"integrator", "timestep", "cone", "gravity", "density", "viscosity", "d
 _READ |= {"impratio", "sleep_tolerance", "wind", "magnetic", "enableflags", "jacobian"}
 _READ |= {f"{family}_{what}" for family in ("o", "ccd", "sdf") for what in ("friction", "margin", "solref", "solimp")}
 _READ |= {"ccd_iterations", "ccd_tolerance", "sdf_iterations", "sdf_initpoints"}
-_FLAGS = {"EULERDAMP": "eulerdamp", "REFSAFE": "refsafe"}  # of joints and rows, which no scene has
+_OF_CONTACTS = ("iterations", "noslip_iterations", "solver")  # settings of formulations with contacts alone
+_FINER = 4  # part of the file's step that is tried
+_SOLVERS = {name.upper(): name for name in ("PGS", "CG", "Newton")}
+_FLAGS = {"REFSAFE": "refsafe"}  # of rows, which no scene has
 
 
 def own_options(path: Path) -> OwnOptions | None:
@@ -48,18 +51,43 @@ def own_options(path: Path) -> OwnOptions | None:
     unlike = [key for key in keys if np.any(getattr(option, key) != getattr(plain.option, key))]
     solver = mujoco.mjtSolver(int(option.solver)).name.removeprefix("mjSOL_")
     words = {"solver": f"solver {solver}", "iterations": f"{option.iterations} iterations"}
-    others = [words.get(key, f"{key} {getattr(option, key):g}") for key in unlike]
+    clauses = {key: words.get(key, f"{key} {getattr(option, key):g}") for key in unlike}
+    alone = [clauses.pop(key) for key in _OF_CONTACTS if key in clauses]
+    others = list(clauses.values())
     bits = mujoco.mjtDisableBit
     others += [f"flag {word}" for name, word in _FLAGS.items() if option.disableflags & getattr(bits, f"mjDSBL_{name}")]
-    usual = {"joints": plain.worldbody.add_body().add_joint(), "equalities": plain.add_equality()}
+    body, of_contacts = plain.worldbody.add_body(), list[str]()
+    usual = {"joints": body.add_joint(), "equalities": plain.add_equality(), "geoms": body.add_geom()}
     for kind, element in usual.items():
+        named = of_contacts if kind == "geoms" else others
         for key in [key for key in dir(element) if key.startswith(("solref", "solimp"))]:
             count = sum(bool(np.any(getattr(item, key) != getattr(element, key))) for item in getattr(spec, kind))
-            others += [f"{key.replace('_', '')} of {counted(count, kind)}"] if count else []
+            named += [f"{key.replace('_', '')} of {counted(count, kind)}"] if count else []
+    switches = {"hard contacts in place of soft ones": {"time_constant": "2", "impedance": "0.9999"}}
+    if _CONES[int(option.cone)] == "pyramidal":
+        switches["elliptic cone in place of the pyramidal"] = {"cone": "elliptic"}
+    explicit = bool(option.disableflags & bits.mjDSBL_EULERDAMP)
+    if integrator == "Euler" and not explicit:
+        switches["damping as armature in place of implicit"] = {"damping_armature": "true"}
+    finer = option.timestep / _FINER
+    switches[f"dt {number(finer, 3)} s in place of {number(option.timestep, 3)} s"] = {"dt": f"{finer:.12g}"}
     return OwnOptions(
         engine="mujoco",
         words=f"{integrator}, dt {number(option.timestep, 3)} s",
-        settings={"integrator": integrator, "dt": f"{option.timestep:.12g}"},
-        of_contacts={"cone": _CONES[int(option.cone)]},
+        settings={
+            "integrator": integrator,
+            "dt": f"{option.timestep:.12g}",
+            **({"eulerdamp": "False"} if explicit else {}),
+        },
+        of_contacts={
+            "cone": _CONES[int(option.cone)],
+            "impratio": str(float(option.impratio)),
+            "solver": _SOLVERS[solver.upper()],
+            "iterations": str(option.iterations),
+            "noslip_iterations": str(option.noslip_iterations),
+        },
         others=others,
+        others_alone=alone,
+        others_of_contacts=of_contacts,
+        switches=switches,
     )

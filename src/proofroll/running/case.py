@@ -16,7 +16,7 @@ from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.plugins import plain_name
 
 if TYPE_CHECKING:
-    from proofroll.core.engine_abilities import Term
+    from proofroll.core.engine_abilities import Steps, Term
 
 
 class Status(StrEnum):
@@ -56,6 +56,7 @@ class EngineDescription:
         oldest: oldest version that its adapter supports; empty: not declared.
         made_for: formulation -> capabilities, sorted; it is offered only to scenes that require one of them. A
             formulation that is missing here is offered to all.
+        references: formulation -> its claim to be a reference by steps.
     """
 
     name: str
@@ -70,6 +71,7 @@ class EngineDescription:
     defaults: dict[str, Any]
     oldest: str = ""
     made_for: dict[str, list[str]] = field(default_factory=dict)
+    references: dict[str, Steps] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,8 @@ class EngineFacts:
         provides: formulation -> its capabilities, sorted.
         libraries: versions of Python, numpy and scipy, which decide the last digits; in another interpreter also a hash
             of all its packages.
+        steps: of a truth that is a reference by steps, engine and formulation of the reference and of its witness, as
+            ``name[formulation=…]`` -> version and code.
     """
 
     name: str
@@ -121,6 +125,7 @@ class EngineFacts:
     witness: bool = False
     provides: dict[str, list[str]] = field(default_factory=dict)
     libraries: dict[str, str] = field(default_factory=dict)
+    steps: dict[str, str] = field(default_factory=dict)
 
     @property
     def step(self) -> float | None:
@@ -178,6 +183,8 @@ class Case:
         content["engine"]["name"] = plain_name(self.engine.name)
         for words in ("level", "title", "witness", "provides", "brought"):  # for people
             del content["engine"][words]
+        if not self.engine.steps:
+            del content["engine"]["steps"]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
 
     @classmethod

@@ -7,10 +7,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from proofroll.core.engine_abilities import Term
+from proofroll.core.engine_abilities import Steps, Term, stepped
 from proofroll.core.errors import ProofrollError, Refused
 from proofroll.core.limits import HELLO_TIME_LIMIT, PROGRAM_TIME_LIMIT
-from proofroll.core.plugins import parse_engine
+from proofroll.core.plugins import engine_names, parse_engine
+from proofroll.core.scene import Scene
+from proofroll.core.truth import needs_steps
 from proofroll.running.case import Case, EngineDescription, EngineFacts, Status
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
@@ -89,7 +91,9 @@ def describe_each(
         if isinstance(answer, ProofrollError):
             descriptions[name] = answer
         else:
-            descriptions[name] = EngineDescription(**{**answer, "terms": [Term(**term) for term in answer["terms"]]})
+            terms = [Term(**term) for term in answer["terms"]]
+            references = {key: Steps(**claim) for key, claim in answer["references"].items()}
+            descriptions[name] = EngineDescription(**{**answer, "terms": terms, "references": references})
     return descriptions
 
 
@@ -114,6 +118,20 @@ def resolve_with_truth(
     if not isinstance(truth, EngineFacts):
         raise truth
     return facts, truth
+
+
+def on_scene(truth: EngineFacts, scene: Scene, workers: Workers | None = None) -> EngineFacts:
+    """Facts of the truth for a scene: of a reference by steps with the engines that it takes, as they are now."""
+    if not needs_steps(scene):
+        return truth
+    described = describe_each(engine_names(), workers)
+    known = [item for item in described.values() if isinstance(item, EngineDescription)]
+    declared = {item.name: (item.references, item.provides) for item in known}
+    names = stepped(declared, scene.requires)
+    specs = [parse_engine(name) for name in names]
+    facts = resolve([(spec.name, spec.options) for spec in specs], workers)
+    answers = [(name, item) for name, item in zip(names, facts, strict=True) if isinstance(item, EngineFacts)]
+    return dataclasses.replace(truth, steps={name: f"{item.version} {item.code}" for name, item in answers})
 
 
 def prepare(engine: str, workers: Workers) -> None:

@@ -31,7 +31,14 @@ ASIDE = frozenset({"reproducer", "robot_reader", "report", "failure_program", "d
 
 def describe(engine: str) -> dict[str, Any]:
     """Description of an engine (:class:`EngineDescription`), as a dictionary."""
-    from proofroll.core.engine_abilities import CannotLeaveOut, MadeFor, SupportsFrom, TellsDefaults, TellsLevels
+    from proofroll.core.engine_abilities import (
+        CannotLeaveOut,
+        MadeFor,
+        ServesAsReference,
+        SupportsFrom,
+        TellsDefaults,
+        TellsLevels,
+    )
     from proofroll.running.loading import load
 
     kind = load(engine)
@@ -53,6 +60,7 @@ def describe(engine: str) -> dict[str, Any]:
         defaults=plain(dict(kind.defaults())) if isinstance(kind, TellsDefaults) else {},
         oldest=kind.oldest if isinstance(kind, SupportsFrom) else "",
         made_for={key: sorted(names) for key, names in kind.made_for.items()} if isinstance(kind, MadeFor) else {},
+        references=dict(kind.references) if isinstance(kind, ServesAsReference) else {},
     )
     return dataclasses.asdict(description)
 

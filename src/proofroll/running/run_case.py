@@ -68,10 +68,10 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
         counting = samples_between(scene, times) if case.turns else times[:0]
-        between = np.array(case.between)
+        besides = (counting, np.array(case.between), list(case.engine.steps))
         spent.on("loading")
         with PACE.limited(case.time_limit * FOR_A_TRUTH, _tell):
-            return _run_truth(scene, times, (counting, between), out, made_with("truth", case.engine.version), spent)
+            return _run_truth(scene, times, besides, out, made_with("truth", case.engine.version), spent)
     kind, settings = engine_and_settings(case)
     versions = made_with(plain_name(case.engine.name), kind.version())
     spent.on("loading")
@@ -162,7 +162,7 @@ def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
 
 
 def _run_truth(
-    scene: Any, times: Any, besides: tuple[Any, Any], out: Path, versions: dict[str, str], spent: _TimeAccounts
+    scene: Any, times: Any, besides: tuple[Any, Any, Any], out: Path, versions: dict[str, str], spent: _TimeAccounts
 ) -> Result:
     from proofroll.core.dataset import truth_message
     from proofroll.core.truth import truth

@@ -363,6 +363,8 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
     if budget is None:
         return _ask(worker, case, limit, out)
     used_before, ended = worker.used, False
+    if case.engine.steps:  # a reference by steps keeps what it has
+        case = dataclasses.replace(case, time_limit=min(case.time_limit, limit))
     try:
         return _ask(worker, case, limit, out)
     except WorkerDied as error:

@@ -11,7 +11,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import sampling_interval
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.running.case import Case, EngineFacts
-from proofroll.running.engine_questions import resolve
+from proofroll.running.engine_questions import on_scene, resolve
 from proofroll.running.idle_workers import Workers
 
 _USUAL = 2.0  # s
@@ -102,5 +102,6 @@ def single_case(
     facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
     if isinstance(facts, ProofrollError):
         raise facts
+    facts = on_scene(facts, loaded, workers) if facts.name == "truth" else facts
     until, every = length_of(scene, until), sampling_interval(facts.step) if every is None else every
     return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit, turns=True)

@@ -1,7 +1,8 @@
 """Reference by steps: a motion with contacts under held targets, which no route of the truth follows.
 
-Pinocchio's impulses at three steps, each half of the one before: the finest run is the reference, and three times its
-largest change so far is its error bar. It is no truth: one formulation alone leads to it, which it never judges.
+A formulation that declares it (:class:`proofroll.core.engine_abilities.ServesAsReference`) runs with three steps, each
+half of the one before: the finest run is the reference, and three times its largest change so far is its error bar. It
+is no truth: one formulation alone leads to it, which it never judges.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.core.events import Event, with_events
 from proofroll.core.multi_element import copied, events_of_engine, watch_events
 from proofroll.core.number_format import number
-from proofroll.core.pace import PACE
-from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.core.pace import PACE, OutOfTime
+from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
@@ -32,56 +33,101 @@ if TYPE_CHECKING:
     import xarray as xr
 
 NO_ROUTE = "no route of the truth follows contacts under held targets yet"
-# Engine and formulation of the steps, the longest of them [s], and how many there are.
-_ENGINE, _FORMULATION, _LONGEST, _RUNGS = "pinocchio", "impulses", 1e-3, 3
-# Engine and formulation of twins, which cost a tenth of that; how many, how far apart they start [m, rad], and the
-# distances up to which a motion is told [m].
-_OF_TWINS, _TWINS, _NUDGE, _TOLD = ("mujoco", "geoms"), 5, 1e-4, (1e-3, 1e-2)
+# Longest step [s], how many steps there are, and how many of them an error bar needs.
+_LONGEST, _RUNGS, _NEEDED = 1e-3, 3, 2
+# How many twins there are, how far apart they start [m, rad], and the distances up to which a motion is told [m].
+_TWINS, _NUDGE, _TOLD = 5, 1e-4, (1e-3, 1e-2)
+_WITNESSED = 2  # engines of a reference with a witness
 _SAFETY = 3.0  # times the last change of the finest run
 _ON_STEP = 1e-6  # part of a step by which a time may be beside its end
 
 
 @dataclass(frozen=True)
 class _SteppedRun:
-    """Run with one step: its variables at the times that were asked for, and the events."""
+    """Run with one step.
+
+    Attributes:
+        step: its length [s].
+        columns: variables at the times that were asked for, up to where it ended.
+        events: up to the last of these times.
+        whole: False if the limit of processor time ended it.
+    """
 
     step: float
     columns: Columns
     events: Sequence[Event]
+    whole: bool
 
 
-def reference_by_steps(element: MechanismElement, times: FloatArray) -> xr.Dataset:
+def reference_by_steps(element: MechanismElement, times: FloatArray, engines: Sequence[str]) -> xr.Dataset:
     """The finest run as a dataset, each variable with its error bar.
 
+    Where the limit of processor time ends the finest run, the reference is the one before it; with one run before it,
+    it is what the finest has.
+
+    Args:
+        element: the mechanism.
+        times: of the samples [s], shape (time,).
+        engines: ``name[formulation=…]`` of the steps, and of the twins; without the second there are none.
+
     Raises:
-        Refused: the engine of the steps is not installed, or cannot represent the mechanism.
+        Refused: no engine is installed whose steps would be a reference.
         Diverged: a run ends early.
     """
-    try:
-        runs = [_run(element, times, step) for step in _steps(element)]
-    except Missing as error:
-        raise Refused(f"{NO_ROUTE}, and {error}, whose steps would be a reference") from None
+    if not engines:
+        raise Refused(f"{NO_ROUTE}, and no installed engine that represents it declares its steps as a reference")
+    runs: list[_SteppedRun] = []
+    steps = _steps(element)
+    PACE.follow("second", sum(times[-1] / step for step in steps))
+    for step in steps:
+        runs.append(_run(element, times, step, engines[0], before=sum(times[-1] / run.step for run in runs)))
+        if not runs[-1].whole:
+            break
+    PACE.leave()
+    runs = runs[:-1] if len(runs) > _NEEDED and not runs[-1].whole else runs
+    if len(runs) < _NEEDED:
+        raise Diverged(f"{NO_ROUTE}, and the processor time did not suffice for two runs by steps")
+    count = runs[-1].columns.variables["time"].values.size
+    if count < len(times):
+        runs = [replace(run, columns=run.columns.at("time", np.ones(count, dtype=bool))) for run in runs]
     coarse, fine = runs[-2:]
     near = _SAFETY * coarse.step
-    events = [replace(item, time_low=item.time_low - near, time_high=item.time_high + near) for item in fine.events]
+    last = float(times[count - 1])
+    told = [item for item in fine.events if item.time <= last]
+    events = [replace(item, time_low=item.time_low - near, time_high=item.time_high + near) for item in told]
     variables = {}
     for name, item in fine.columns.variables.items():
         bar = _bar(name, coarse.columns.variables[name], item)
         variables[name] = item if bar is None else item._replace(attrs={**item.attrs, "error_bar": bar})
     words = ", ".join(number(run.step, 3) for run in runs)
     attrs = {
-        "route": f"reference by steps of {_ENGINE} {_FORMULATION}, dt {words} s",
+        "route": f"reference by steps of {_words(engines[0])}, dt {words} s",
         "second_route": f"{_SAFETY:g} times their last change",
-        BY_STEPS: f"{_ENGINE}[formulation={_FORMULATION}]",
+        BY_STEPS: engines[0],
+        **({ENDS: float(times[count]), ENDED: "the limit of processor time was reached"} if count < len(times) else {}),
     }
     dataset = Columns(variables, {**fine.columns.attrs, **attrs}).dataset()
     dataset = with_events(dataset, events) if element.mechanism.has_events else dataset
-    apart = _twins_apart(element, times, runs[0].step)
-    return dataset if apart is None else _to_horizon(dataset, apart, _distances(coarse, fine))
+    if len(engines) < _WITNESSED:
+        return dataset
+    twins = _twins(element, times[:count], runs[0].step, engines[1])
+    if not twins:
+        return dataset
+    apart = np.max([_distances(twins[0], run) for run in twins[1:]], axis=0)
+    dataset = _to_horizon(dataset, apart, _distances(coarse, fine))
+    near = float(_distances(twins[0], fine)[dataset.sizes["time"] - 1])
+    witness = f"{_words(engines[1])}, dt {number(twins[0].step, 3)} s, is within {number(near, 2)} m of it"
+    return dataset.assign_attrs(second_route=f"{attrs['second_route']}; {witness}")
 
 
-def _twins_apart(element: MechanismElement, times: FloatArray, step: float) -> FloatArray | None:
-    """Largest distance so far of any body of twins, whose starts are a little apart [m]; None: they cannot be run."""
+def _words(engine: str) -> str:
+    """Engine and formulation for a reader."""
+    spec = parse_engine(engine)
+    return f"{spec.name} {spec.options['formulation']}"
+
+
+def _twins(element: MechanismElement, times: FloatArray, step: float, engine: str) -> list[_SteppedRun]:
+    """Runs of a mechanism and of twins whose starts are a little apart; empty: the engine cannot run them."""
     random, mechanism = np.random.default_rng(0), element.mechanism
     twins = [element]
     for _ in range(_TWINS):
@@ -93,11 +139,9 @@ def _twins_apart(element: MechanismElement, times: FloatArray, step: float) -> F
             joints.append(replace(joint, q0=tuple(moved.tolist())))
         twins.append(replace(element, mechanism=replace(mechanism, joints=tuple(joints))))
     try:
-        runs = [_run(twin, times, step, *_OF_TWINS) for twin in twins]
+        return [_run(twin, times, step, engine) for twin in twins]
     except (Missing, Refused, Diverged):
-        return None
-    apart: FloatArray = np.max([_distances(runs[0], run) for run in runs[1:]], axis=0)
-    return apart
+        return []
 
 
 def _distances(run: _SteppedRun, other_run: _SteppedRun) -> FloatArray:
@@ -137,25 +181,39 @@ def _steps(element: MechanismElement) -> list[float]:
 
 
 def _run(
-    element: MechanismElement, times: FloatArray, step: float, name: str = _ENGINE, formulation: str = _FORMULATION
+    element: MechanismElement, times: FloatArray, step: float, engine_name: str, before: float = 0.0
 ) -> _SteppedRun:
-    """Run of a mechanism in an engine with one step; between two steps its variables are interpolated."""
+    """Run of a mechanism in an engine with one step; between two steps its variables are interpolated.
+
+    Args:
+        element: the mechanism.
+        times: of the samples [s], shape (time,).
+        step: its length [s].
+        engine_name: ``name[formulation=…]``.
+        before: number of steps of the runs before it.
+    """
     scene = Scene(name=element.name, title=element.name, elements=(element,))
-    kind = load_engine(name)
-    settings = resolve_settings(kind, {"formulation": formulation, "preset": "matched", "dt": step})
+    spec = parse_engine(engine_name)
+    kind = load_engine(spec.name)
+    claim = kind.references[spec.options["formulation"]]
+    settings = resolve_settings(kind, {"preset": "matched", **claim.settings, **spec.options, "dt": step})
     require_provided(kind, settings.formulation, scene)
     engine = commanded(kind.build(scene.for_an_engine, settings), element, step)
     watch_events(engine)
     whole_steps, part = np.floor(times / step + _ON_STEP), times / step
     part = np.where(np.abs(part - np.round(part)) <= _ON_STEP, 0.0, part - whole_steps)
     counts = np.union1d(whole_steps, whole_steps[part > 0] + 1)
-    PACE.follow("second", float(times[-1]))
     samples = [copied(engine.sample())]
     for count in counts[1:].tolist():
         engine.advance(count * step)
-        PACE.reached(count * step)
         samples.append(copied(engine.sample()))
-    PACE.leave()
+        try:
+            PACE.reached(before + count)
+        except OutOfTime:
+            break
+    whole, counts = len(samples) == len(counts), counts[: len(samples)]
+    told = whole_steps + (part > 0) <= counts[-1]
+    times, whole_steps, part = times[told], whole_steps[told], part[told]
     columns = columns_of(scene, counts * step, samples)
     first, last = np.searchsorted(counts, whole_steps), np.searchsorted(counts, whole_steps + (part > 0))
     variables = {}
@@ -167,9 +225,8 @@ def _run(
         between = item.values[first] + weight * (item.values[last] - item.values[first])
         variables[key] = item._replace(values=times if key == "time" else between)
     events = events_of_engine(engine, element) or ()
-    return _SteppedRun(
-        step, Columns(variables, columns.attrs), tuple(event for event in events if event.time <= times[-1])
-    )
+    events = tuple(event for event in events if event.time <= times[-1])
+    return _SteppedRun(step=step, columns=Columns(variables, columns.attrs), events=events, whole=whole)
 
 
 def _bar(name: str, coarse: Variable, fine: Variable) -> float | None:

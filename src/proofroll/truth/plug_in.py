@@ -55,10 +55,7 @@ class MechanismTruth:
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
-        """See :func:`proofroll.truth.truth_of_mechanism.truth_of`; of motions that are not unique, laws alone.
-
-        With contacts under held targets it is a reference by steps.
-        """
+        """See :func:`proofroll.truth.truth_of_mechanism.truth_of`; of motions that are not unique, laws alone."""
         # imports of a third of a second, which what has another truth does not need
         from proofroll.truth.check.answer import held_answer
         from proofroll.truth.early_end import cut_motion
@@ -66,10 +63,6 @@ class MechanismTruth:
         from proofroll.truth.truth_of_mechanism import truth_of
 
         assert isinstance(element, MechanismElement)  # by ``covers``
-        if element.mechanism.contacts and has_held(element.mechanism):
-            from proofroll.truth.by_steps import reference_by_steps
-
-            return reference_by_steps(element, times)
         try:
             motion = truth_of(element.mechanism, times)
         except NotUnique as error:
@@ -87,6 +80,20 @@ class MechanismTruth:
             return MechanismTruth._dataset(element, motion, branching(motion.branches))
         dataset.attrs[LAWS] = "; ".join(filter(None, [motion.laws, check.sentence()]))
         return dataset
+
+    @staticmethod
+    def by_steps(element: Element) -> bool:
+        """See :class:`proofroll.core.truth.TakesSteps`: contacts under held targets."""
+        assert isinstance(element, MechanismElement)  # by ``covers``
+        return bool(element.mechanism.contacts) and has_held(element.mechanism)
+
+    @staticmethod
+    def reference(element: Element, times: FloatArray, engines: Sequence[str]) -> xr.Dataset:
+        """See :func:`proofroll.truth.by_steps.reference_by_steps`."""
+        from proofroll.truth.by_steps import reference_by_steps
+
+        assert isinstance(element, MechanismElement)  # by ``covers``
+        return reference_by_steps(element, times, engines)
 
     @staticmethod
     def _dataset(element: MechanismElement, motion: TwoRouteMotion, branches: str) -> xr.Dataset:

@@ -39,7 +39,7 @@ def test_a_mechanism_with_other_numbers(proofroll: Proofroll, tmp_path: Path) ->
         (("pendulum", "{file}", "--engine", "mujoco", "--set", "lenght=1"), 2, "length"),
         (("no_such_scene", "{file}", "--engine", "mujoco"), 2, "no_such_scene"),
         (("pendulum", "{file}/in/a/file", "--engine", "mujoco"), 2, "long.xml"),
-        (("pendulum", "{file}", "--as", "scene"), 2, "pendulum is no robot file alone"),
+        (("pendulum", "{file}", "--as", "scene"), 2, "pendulum is no robot file; a scene"),
         (("pendulum", "{file}"), 2, "give an engine, whose model is written, or --as scene"),
     ],
 )
@@ -99,3 +99,42 @@ def test_robots_of_packages_as_scenes(tmp_path: Path, name: str) -> None:
     (folder / "scene.toml").write_text(scene_text(file, {}))
     written, own = (simulate(load_scene(scene), "mujoco", until=0.1, every=0.1) for scene in (str(folder), file))
     assert np.array_equal(written.p_WB, own.p_WB)
+
+
+STOOL = """<mujoco model="stool"><worldbody><geom name="floor" type="plane" size="0 0 1"/>
+<body name="seat" pos="0 0 0.09"><freejoint name="root"/><geom name="ball" size="0.1" mass="1" friction="0.4"
+priority="1"/><body name="arm"><joint name="h" axis="0 1 0"/><inertial mass="0.1" pos="0 0 0.1"
+diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody>
+<actuator><position joint="h" kp="2" kv="0.1"/></actuator></mujoco>"""
+
+
+@pytest.mark.drill
+def test_a_robot_on_its_floor(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Check and export take a controller and a ground as run does; what cannot be written has one true reason."""
+    robot, stand, held, model = (tmp_path / name for name in ("stool.xml", "stand.toml", "held.toml", "long.xml"))
+    robot.write_text(STOOL)
+    stand.write_text("[ground]\n")
+    held.write_text("rate = 50\n[ground]\n")
+    code, out, _ = proofroll("check", str(robot), "--control", str(held), "--plot", str(tmp_path / "p.html"))
+    assert code == 0
+    assert "1 shape on a floor, friction 0.4" in " ".join(out.split())
+    assert "contact between bodies" in " ".join(out.split())
+    assert (tmp_path / "p.html").is_file()
+    code, out, _ = proofroll("check", str(robot), "--control", str(held), "--ground", "none")
+    assert code == 0
+    assert "contact" not in out
+    assert proofroll("export", str(robot), str(model), "--engine", "mujoco", "--control", str(stand))[0] == 0
+    assert mujoco.MjModel.from_xml_path(str(model)).npair == 1
+    air = ("--control", str(stand), "--ground", "none")
+    assert proofroll("export", str(robot), str(model), "--engine", "mujoco", *air)[0] == 0
+    assert mujoco.MjModel.from_xml_path(str(model)).npair == 0
+    folder = tmp_path / "scene"
+    assert proofroll("export", str(robot), str(folder), "--as", "scene", "--control", str(stand))[0] == 0
+    (pair,) = load_scene(str(folder)).elements[0].mechanism.pairs
+    assert pair.friction == pytest.approx(0.4)
+    code, _, err = proofroll("export", str(robot), str(folder), "--as", "scene", "--control", str(held))
+    assert (code, err.count("\n")) == (2, 1)
+    assert "no targets between instants; leave rate out" in err
+    code, _, err = proofroll("export", str(robot), str(model), "--engine", "mujoco", "--ground", "file")
+    assert code == 2
+    assert "a robot stands under a controller" in err

@@ -39,12 +39,14 @@ def test_options_of_a_model_are_settings(model: Callable[[str], Path]) -> None:
     own = options_of(model("timestep='0.004' integrator='RK4' solver='CG' iterations='7'"))
     assert own is not None
     assert (own.engine, own.settings) == ("mujoco", {"integrator": "RK4", "dt": "0.004"})
-    assert own.of_contacts == {"cone": "pyramidal"}
-    assert (own.words, own.others) == ("RK4, dt 4e-3 s", ["7 iterations", "solver CG"])
+    of_contacts = {"cone": "pyramidal", "impratio": "1.0", "solver": "CG", "iterations": "7", "noslip_iterations": "0"}
+    assert own.of_contacts == of_contacts
+    assert (own.words, own.others, own.others_alone) == ("RK4, dt 4e-3 s", [], ["7 iterations", "solver CG"])
     assert options_of(model("")).settings == {"integrator": "Euler", "dt": "0.002"}
     softened = "<flag refsafe='disable'/></option><default><joint solreffriction='0.03 1'/></default><option"
-    others = options_of(model(f"noslip_iterations='3'>{softened}")).others
-    assert others == ["noslip_iterations 3", "flag refsafe", "solreffriction of 1 joint"]
+    own = options_of(model(f"noslip_iterations='3'>{softened}"))
+    assert own.others_alone == ["noslip_iterations 3"]
+    assert own.others == ["flag refsafe", "solreffriction of 1 joint"]
     with pytest.raises(InputError, match="integrator is none that can be compared; choose Euler, RK4, implicitfast"):
         options_of(model("integrator='implicit'"))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ pytest.importorskip("pinocchio")
 
 from proofroll.core.errors import Diverged
 from proofroll.core.plugins import load_engine
+from proofroll.engines.pinocchio.contact import blocks as blocks_module
 from proofroll.engines.pinocchio.contact.blocks import Block, impulses_by_blocks
 from proofroll.engines.pinocchio.contact.impulses import ImpulseSteps
 from proofroll.files.scene_file import load_scene
@@ -25,7 +27,7 @@ def test_impulses_obey_the_laws(seed: int) -> None:
     blocks = [Block(0, 0.6), Block(3, 0.1), Block(6, 0.0), Block(9, None, 0.02), Block(10, None)]
     rows = random.normal(size=(11, 14))
     G, g = rows @ rows.T, random.normal(size=11)
-    f, change = impulses_by_blocks(G, g, blocks, np.zeros(11))
+    f, change = impulses_by_blocks(G, g, blocks, np.zeros(11), 1e-9)
     u = g + G @ f
     assert change < 1e-11
     for block in blocks[:3]:
@@ -39,6 +41,29 @@ def test_impulses_obey_the_laws(seed: int) -> None:
     assert abs(f[9]) == pytest.approx(0.02) or abs(u[9]) < 1e-9
     assert min(f[10], u[10]) >= -1e-9
     assert abs(f[10] * u[10]) < 1e-9
+
+
+def test_sweeps_end_where_round_off_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A change within the tolerance that no longer falls ends the sweeps; one above it goes on to the last."""
+    random, sweeps = np.random.default_rng(3), [0]
+    rows = random.normal(size=(6, 8))
+    G, g = rows @ rows.T, random.normal(size=6) - np.array([0, 0, 1, 0, 0, 1])
+    exact = blocks_module._contact
+
+    def rough(*arguments: Any) -> list[float]:
+        sweeps[0] += 1
+        return [value * (1 + 1e-10 * (-1) ** (sweeps[0] // 2)) for value in exact(*arguments)]
+
+    monkeypatch.setattr(blocks_module, "_contact", rough)
+    counts = {}
+    for tolerance in (1e-8, 0.0):
+        sweeps[0] = 0
+        f, change = impulses_by_blocks(G, g, [Block(0, 0.5), Block(3, 0.5)], np.zeros(6), tolerance)
+        counts[tolerance] = sweeps[0] / 2
+    assert 0 < change < 1e-8
+    assert f.any()
+    assert counts[1e-8] < 200
+    assert counts[0.0] > 1900
 
 
 @pytest.mark.drill

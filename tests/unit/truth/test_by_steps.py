@@ -10,9 +10,13 @@ import pytest
 import xarray as xr
 
 from proofroll import Refused, simulate
-from proofroll.core.dataset import BY_STEPS, ENDS, HORIZON
+from proofroll.core import plugins
+from proofroll.core.dataset import BY_STEPS, ENDED, ENDS, HORIZON
+from proofroll.core.engine_abilities import Steps, stepped
 from proofroll.core.errors import Missing
+from proofroll.core.pace import PACE, OutOfTime
 from proofroll.core.scene import Scene
+from proofroll.core.truth import needs_steps
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.control import Control
@@ -45,6 +49,7 @@ def test_the_reference_is_within_its_bar_of_the_truth() -> None:
     """Targets that never change are a motion that the truth knows: the reference by steps is near it, and says so."""
     truth, reference = (simulate(hopper(held=held), until=UNTIL) for held in (False, True))
     assert BY_STEPS not in truth.attrs
+    assert "mujoco geoms, dt 1e-3 s, is within" in reference.attrs["second_route"]
     assert reference.attrs[BY_STEPS] == "pinocchio[formulation=impulses]"
     assert reference.attrs["route"].startswith("reference by steps of pinocchio impulses, dt 1e-3, 5e-4, 2.5e-4 s")
     error = float(np.abs(truth["p_WB"].values - reference["p_WB"].values).max())
@@ -69,9 +74,45 @@ def test_without_its_engine_there_is_none(monkeypatch: pytest.MonkeyPatch) -> No
     def missing(name: str) -> Any:
         raise Missing(f"{name} is not installed here")
 
-    monkeypatch.setattr(by_steps, "load_engine", missing)
-    with pytest.raises(Refused, match="contacts under held targets yet, and pinocchio is not installed"):
+    monkeypatch.setattr(plugins, "load_engine", missing)
+    with pytest.raises(Refused, match="held targets yet, and no installed engine that represents it declares"):
         simulate(hopper(held=True), until=0.01)
+
+
+def test_the_first_exact_claim_is_the_reference() -> None:
+    """Of those that represent a scene: an exact cone and a hard contact, with a witness of another engine."""
+    exact, convex, soft = Steps(True, True), Steps(False, True), Steps(True, False)
+    declared = {
+        "soft": ({"springs": soft}, {"springs": {"contact", "motors"}}),
+        "lame": ({"cones": exact}, {"cones": {"contact"}}),
+        "hard": ({"cones": exact, "also": convex}, {"cones": {"contact", "motors"}, "also": {"contact", "motors"}}),
+        "other": ({"cones": exact}, {"cones": {"contact", "motors"}}),
+        "silent": ({}, {"cones": {"contact", "motors"}}),
+    }
+    assert stepped(declared, {"contact", "motors"}) == ["hard[formulation=cones]", "soft[formulation=springs]"]
+    assert stepped({"soft": declared["soft"]}, {"contact"}) == []
+    assert needs_steps(hopper(held=True))
+    assert not needs_steps(hopper(held=False))
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize(("rungs", "words", "whole"), [(2, "dt 1e-3, 5e-4 s", True), (1, "dt 1e-3, 5e-4 s", False)])
+def test_a_limit_keeps_the_runs_that_it_has(
+    rungs: int, words: str, whole: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With two whole runs the reference is the second; with one it ends where the second one was."""
+    counts = [UNTIL / 1e-3, UNTIL / 5e-4, UNTIL / 2.5e-4]
+    limit = sum(counts[:rungs]) + counts[rungs] / 2
+
+    def reached(count: float) -> None:
+        if count > limit:
+            raise OutOfTime("its limit was reached", count)
+
+    monkeypatch.setattr(PACE, "reached", reached)
+    run = simulate(hopper(held=True), until=UNTIL)
+    assert words in run.attrs["route"]
+    assert run.sizes["time"] == (13 if whole else 8)
+    assert (ENDED in run.attrs) is not whole
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
-from proofroll.core.engine_abilities import Level, Term
+from proofroll.core.engine_abilities import Level, Steps, Term
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
@@ -46,6 +46,7 @@ class Mujoco:
         "joints": Level.CONSTRAINT,
         "geoms": Level.CONTACT,
     }
+    references: ClassVar[Mapping[str, Steps]] = {"geoms": Steps(exact_cone=False, hard_contact=True)}
     terms: ClassVar[Sequence[Term]] = ()
 
     @staticmethod

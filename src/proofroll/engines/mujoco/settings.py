@@ -34,7 +34,10 @@ LARGEST_PYRAMIDAL_FRICTION = 1.0
 # Settings that not every formulation has, by formulation.
 _OWN: Mapping[str, tuple[str, ...]] = {
     "joints": ("damping_armature",),
-    "geoms": ("damping_armature", "cone_correction", "cone", "curvature"),
+    "geoms": (
+        *("damping_armature", "cone_correction", "cone", "curvature"),
+        *("impratio", "solver", "iterations", "noslip_iterations"),
+    ),
 }
 _SOME = tuple(dict.fromkeys(name for names in _OWN.values() for name in names))
 
@@ -54,12 +57,15 @@ class MujocoSettings:
             (first number of ``solref``), in steps; None: MuJoCo's default of 0.02 s at every step.
         impedance: constant constraint impedance (``solimp``); 1 would be a rigid contact; None: MuJoCo's default,
             0.9 to 0.95 growing with depth.
+        impratio, solver, iterations, noslip_iterations: options of that name in MuJoCo, its defaults by default
+            (``geoms``).
         curvature: True if the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
             out (``geoms`` on curved walls).
         cone_correction: True if the adapter takes from the contacts' reference accelerations the lift that MuJoCo's
             convex cone gives to what slips, and the lift by the missing J̇v (``geoms``).
         damping_armature: True if each joint has the armature h (c + kd) of its damper and servos in place of MuJoCo's
             implicit damping: the same step without contact, and contacts see it (``joints``, ``geoms``).
+        eulerdamp: False switches MuJoCo's implicit damping of Euler off.
     """
 
     formulation: str = "joints"
@@ -69,9 +75,14 @@ class MujocoSettings:
     cone: Literal["pyramidal", "elliptic"] = "elliptic"
     time_constant: Annotated[float, Ge(SHORTEST_TIME_CONSTANT)] | None = SHORTEST_TIME_CONSTANT
     impedance: Annotated[float, Ge(SMALLEST_IMPEDANCE), Le(LARGEST_IMPEDANCE)] | None = LARGEST_IMPEDANCE
+    impratio: Annotated[float, Gt(0)] = 1.0
+    solver: Literal["PGS", "CG", "Newton"] = "Newton"
+    iterations: Annotated[int, Ge(1)] = 100
+    noslip_iterations: Annotated[int, Ge(0)] = 0
     curvature: bool = False
     cone_correction: bool = False
     damping_armature: bool = False
+    eulerdamp: bool = True
 
     @property
     def resolution(self) -> str:
@@ -143,6 +154,13 @@ class MujocoSettings:
     def solimp(self) -> tuple[float, float, float, float, float]:
         """MuJoCo's ``solimp``; its width, midpoint and power are the defaults."""
         return (*self.impedances, 1e-3, 0.5, 2.0)
+
+    def set_solver(self, option: Any) -> None:
+        """Sets cone and solver of contacts in the options of an MjSpec or a model."""
+        option.cone = getattr(mujoco.mjtCone, f"mjCONE_{self.cone.upper()}")
+        option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{self.solver.upper()}")
+        option.iterations, option.noslip_iterations = self.iterations, self.noslip_iterations
+        option.impratio = self.impratio
 
     def soften(self, item: Any) -> None:
         """Sets ``solref`` and ``solimp`` of an MjSpec's item, each unless it is MuJoCo's default."""

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import pinocchio as pin
 
-from proofroll.core.engine_abilities import Level, Term
+from proofroll.core.engine_abilities import Level, Steps, Term
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
@@ -50,6 +50,7 @@ class Pinocchio:
         "constraint_dynamics": Level.CONSTRAINT,
         "impulses": Level.CONTACT,
     }
+    references: ClassVar[Mapping[str, Steps]] = {"impulses": Steps(exact_cone=True, hard_contact=True)}
     terms: ClassVar[Sequence[Term]] = (
         Term(
             name="projection",

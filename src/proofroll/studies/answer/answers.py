@@ -13,7 +13,7 @@ from typing import TypeVar
 from proofroll.core.plugins import EngineSpec, parse_engine
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status
-from proofroll.running.engine_questions import resolve_with_truth
+from proofroll.running.engine_questions import on_scene, resolve_with_truth
 from proofroll.running.process import processor_seconds
 from proofroll.running.profile import TIMING
 from proofroll.running.runner import Runner
@@ -82,6 +82,7 @@ def answer(
     curves, absent = curves_to_search(question, engines, runner.workers)
     begins(list(dict.fromkeys(curve.facts.name for curve in curves)))
     _, truth = resolve_with_truth([], runner.workers)
+    truth = on_scene(truth, question.loaded, runner.workers)
     question, references = question.well_posed(truth, runner)
     abreast = SearchesAbreast(references, runner, ran)
     answers = []

@@ -9,7 +9,7 @@ from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.multi_element import represents
 from proofroll.core.plugins import EngineSpec, parse_engine
 from proofroll.running.case import EngineFacts
-from proofroll.running.engine_questions import resolve_with_truth
+from proofroll.running.engine_questions import on_scene, resolve_with_truth
 from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
 from proofroll.studies.answer.answers import bounds_of, engine_answer, unanswerable_because
@@ -38,7 +38,7 @@ def engine_facts(engine: str, question: AnswerQuestion, runner: Runner) -> tuple
         raise facts
     if facts.resolution is None:
         raise InputError("engine", engine, "it has no step that could be good enough; leave out --tolerance")
-    return facts.on(requires), truth
+    return facts.on(requires), on_scene(truth, question.loaded, runner.workers)
 
 
 def step_answer(

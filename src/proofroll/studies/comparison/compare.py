@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _OF_TRUTHS = 0.8  # largest part of a budget that truths take, at first and again for a shorter time
 _PARTS = (1, 8, 64)  # parts of the time, the first of which is tried
-_OWN_STEPS = "the reference by steps is the ladder of this formulation, which is no judge of itself"
+_OWN_STEPS = "its steps are the reference, which is no judge of itself"
 _LEAST = 2  # samples of a truth with which a motion is judged: at the first one nothing has moved yet
 
 
@@ -52,6 +52,9 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
         if isinstance(run.facts, ProofrollError):
             judged.append(_run(run, Result(status_of(run.facts), str(run.facts))))
             continue
+        if run.is_reference:
+            judged.append(_run(run, Result(Status.NO_TRUTH, _OWN_STEPS)))
+            continue
         result = results[run.ladder[1.0].key]
         if result.trajectory is None or result.status != Status.DONE:
             judged.append(_without_result(run, point, result))
@@ -59,12 +62,6 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
         reference = point.reference if point.result.status == Status.DONE else None
         if reference is None:
             judged.append(_without_truth(run, point, result))
-            continue
-        if (
-            reference.by_steps
-            and reference.by_steps == f"{run.facts.name}[formulation={run.facts.settings.get('formulation')}]"
-        ):
-            judged.append(_run(run, replace(result, status=Status.NO_TRUTH, message=_OWN_STEPS)))
             continue
         built_scene = reference.another_scene(result.certificate)
         if built_scene is not None:

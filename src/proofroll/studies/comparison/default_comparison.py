@@ -27,6 +27,7 @@ _UNTIL, _FIRST, _SAMPLES = 1.0, 2.0, 50  # default length [s], longest length [s
 _STEP = 4e-3  # s: sampling intervals are multiples of it, so that a ladder of steps down to 1e-3 s divides them
 BUDGET = 60.0  # default processor time of all runs [s]
 _CLOSE = "close"
+OWN_OPTIONS = "the file's own options"  # beginning of the claim of the row that a file's options make
 _BECAUSE = "no file states expectations of this scene"
 
 
@@ -78,7 +79,7 @@ def default_comparison(
         every=every,
         vary={key: [scene.parameters[key]] for key in parameters},
         bands={_CLOSE: Band("one per cent is visible to the eye: a first look", bounds(scene, every))},
-        rows=[*rows, *own_rows],
+        rows=[*own_rows, *rows],
         budget=budget,
         spent=processor_seconds() - begin,
         absent={name: str(answer) for name, answer in described.items() if isinstance(answer, Missing)},
@@ -160,21 +161,25 @@ def own_engine(file: Path, scene: Scene, workers: Workers | None) -> tuple[OwnOp
     taken = choices[1 if isinstance(with_contacts, InputError) else 2]
     defaults = usual.settings if isinstance(usual, EngineFacts) else {}
     unusual = {key: value for key, value in taken.items() if key in preset or str(defaults.get(key, value)) != value}
+    touches = own_options.of_contacts.keys() <= defaults.keys()
+    lacking = own_options.others_of_contacts if touches else own_options.others_alone
+    own_options = replace(own_options, others=[*lacking, *own_options.others])
     return own_options, str(EngineSpec(own_options.engine, unusual))
 
 
 def _own_rows(name: str, scene: Scene, workers: Workers | None) -> tuple[list[Row], dict[str, str]]:
     """Row of the engine's options in the file of a scene, if its format has any; or the reason why there is none."""
-    if source_of(name) is None or parts_of(name)[1]:  # no file of its own, or a controller beside it
+    if source_of(name) is None:
         return [], {}
+    file = Path(parts_of(name)[0])
     try:
-        if options_of(Path(name)) is None:
+        if options_of(file) is None:
             return [], {}
-        own_options, engine = own_engine(Path(name), scene, workers)
+        own_options, engine = own_engine(file, scene, workers)
     except InputError as error:
-        return [], {"the file's own options": error.advice}
+        return [], {OWN_OPTIONS: error.advice}
     but = f", but for {', '.join(own_options.others)}" if own_options.others else ""
-    return [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE, short=f"the file's own options{but}")], {}
+    return [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE, short=f"{OWN_OPTIONS}{but}")], {}
 
 
 def times_of(file: SceneFile) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.running.case import Case, EngineFacts
-from proofroll.running.engine_questions import describe_each, resolve, resolve_with_truth
+from proofroll.running.engine_questions import describe_each, on_scene, resolve, resolve_with_truth
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import processor_seconds
 from proofroll.studies.cases import case_of
@@ -52,13 +52,18 @@ def at_point(parameters: dict[str, float]) -> str:
 class Planned:
     """A row at a point, with factor on the step -> case of its ladder.
 
-    The run's own case has the factor 1.
+    The run's own case has the factor 1. A row of the formulation whose steps are the reference has no cases.
     """
 
     row: Row
     parameters: dict[str, float]
     facts: EngineFacts | ProofrollError
     ladder: dict[float, Case] = field(default_factory=dict)
+
+    @property
+    def is_reference(self) -> bool:
+        """True if the truth is a reference by steps of its formulation."""
+        return isinstance(self.facts, EngineFacts) and not self.ladder
 
     @property
     def witness(self) -> bool:
@@ -208,14 +213,16 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
             if name not in scenes:
                 scenes[name] = scene_at(comparison, point)
                 case = _case(comparison, scenes[name].fully_asked, point, truth_facts)
-                truths[name] = replace(case, between=between)
+                truths[name] = replace(case, between=between, engine=on_scene(truth_facts, scenes[name], workers))
             scene = scenes[name]
             if not isinstance(facts, EngineFacts):
                 runs.append(Planned(row, point, facts))
                 continue
+            reference = next(iter(truths[name].engine.steps), "")
             ladder = {
                 factor: _case(comparison, scene, point, rung, timed=comparison.timed and factor == 1)
                 for factor, rung in ladder_facts.items()
+                if f"{facts.name}[formulation={facts.settings['formulation']}]" != reference
             }
             runs.append(Planned(row, point, facts.on(scene.requires), ladder))
     spent = comparison.spent + processor_seconds() - begin

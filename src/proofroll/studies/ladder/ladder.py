@@ -19,7 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.running.engine_questions import describe_each, resolve, resolve_with_truth
+from proofroll.running.engine_questions import describe_each, on_scene, resolve, resolve_with_truth
 from proofroll.running.process import status_of
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
@@ -143,7 +143,7 @@ class Ladder:
         off_grid = off_grids(time_grid(self.until, _EVERY), [None, _EVERY / 2, _EVERY / 4, _EVERY / 5])
         cases = {
             str(point): dataclasses.replace(
-                self._case(self._truth_facts, LadderModel("truth", {}, point)), between=off_grid
+                self._case(self._truth_of(point), LadderModel("truth", {}, point)), between=off_grid
             )
             for point in points
         }
@@ -157,6 +157,9 @@ class Ladder:
             if self.quantity not in reference.curves:
                 raise Refused(f"the truth of this scene has no {self.quantity}")
             self.truths[str(point)] = reference
+
+    def _truth_of(self, point: Mapping[str, float]) -> EngineFacts:
+        return on_scene(self._truth_facts, self._scene_at(point), self._runner.workers)
 
     def _scene_at(self, point: Mapping[str, float]) -> Scene:
         return load_scene(self._name, **(self._given | dict(point)))

@@ -9,7 +9,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Status
-from proofroll.running.engine_questions import resolve_with_truth
+from proofroll.running.engine_questions import on_scene, resolve_with_truth
 from proofroll.running.runner import Runner
 from proofroll.studies.cases import case_of
 from proofroll.studies.failure import Yardstick
@@ -91,7 +91,7 @@ def measure(name: str, values: Sequence[AxisValue], runner: Runner, tell: Callab
     _, facts = resolve_with_truth([], runner.workers)
     cases = [
         replace(
-            case_at(name, value, facts, STUDY_TIME_LIMIT),
+            case_at(name, value, on_scene(facts, value.scene, runner.workers), STUDY_TIME_LIMIT),
             between=off_grids(time_grid(value.until, value.every), [None, *value.steps]),
         )
         for value in values

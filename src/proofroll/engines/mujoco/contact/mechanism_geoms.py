@@ -258,8 +258,8 @@ class MujocoGeoms(MujocoMechanism):
         The same keys and shapes as :meth:`_accelerations`.
         """
         model = self._model
-        kept = int(model.opt.cone), model.pair_solimp.copy(), model.dof_solimp.copy()
-        model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        kept = model.pair_solimp.copy(), model.dof_solimp.copy()
+        MujocoSettings("geoms").set_solver(model.opt)
         model.pair_solimp[:, :2] = model.dof_solimp[:, :2] = LARGEST_IMPEDANCE
         try:
             self._solve_hard(data)
@@ -268,7 +268,8 @@ class MujocoGeoms(MujocoMechanism):
                 self._solve_hard(data)
             return self._accelerations(data)
         finally:
-            model.opt.cone, model.pair_solimp[:], model.dof_solimp[:] = kept
+            model.pair_solimp[:], model.dof_solimp[:] = kept
+            self._settings.set_solver(model.opt)
 
     def _solve_hard(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, with J̇v and without the cone's lift."""

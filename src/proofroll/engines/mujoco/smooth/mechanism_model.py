@@ -58,7 +58,7 @@ def set_integration(option: Any, settings: MujocoSettings) -> None:
     """Sets step and integrator in the options of an MjSpec."""
     option.timestep = settings.dt
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
-    if settings.damping_armature:
+    if settings.damping_armature or not settings.eulerdamp:
         option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 
 

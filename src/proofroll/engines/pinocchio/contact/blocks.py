@@ -16,12 +16,15 @@ import numpy as np
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.scene.rotations import Array
 
-# Change of velocity in a sweep, relative to the largest speed, at which it ends; and largest number of sweeps.
-_SETTLED, _SWEEPS = 1e-12, 2000
+# Change of velocity in a sweep at which it ends: relative to the largest speed, or part of the tolerance where that is
+# more; and largest number of sweeps.
+_SETTLED, _PART, _SWEEPS = 1e-12, 1e-2, 2000
 # Sweeps after which it may go round in circles, as contacts of one foot share its load; then each step is a part of it.
 _CIRCLES, _SHORTER = 200, 0.6
 # Sweeps between two solutions of all equations of what sticks and presses at once.
 _TOGETHER = 2
+# Sweeps without half the change, after which a change within the tolerance is round-off that no sweep takes away.
+_PATIENCE = 2 * _TOGETHER
 _ACCEPTED = 1e-5  # change that is taken where no solver reaches the tolerance
 _TURNS, _LONGEST_TURN = 40, 0.7  # steps of a search for a direction, and the longest of them [rad]
 _ALONG = 1e-10  # slip across a direction, relative to the largest speed, that is found
@@ -79,7 +82,7 @@ class BlockSolver:
         guess = np.zeros(len(g))
         for number, block in blocks.items():
             guess[block.rows] = self._last.get(number, 0.0)
-        impulses, change = impulses_by_blocks(G, g, list(blocks.values()), guess)
+        impulses, change = impulses_by_blocks(G, g, list(blocks.values()), guess, self._tolerance)
         if not change <= self._tolerance:
             try:
                 impulses, change = otherwise(), 0.0
@@ -91,13 +94,22 @@ class BlockSolver:
         return impulses
 
 
-def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array) -> tuple[Array, float]:
+def impulses_by_blocks(
+    G: Array, g: Array, blocks: Sequence[Block], guess: Array, tolerance: float
+) -> tuple[Array, float]:
     """Impulses, and the change of velocity in the last sweep relative to the largest speed; see :class:`BlockSolver`.
 
-    ``guess``: impulses to begin with.
+    Args:
+        G: Delassus matrix of the rows.
+        g: their velocities without impulses, with shifts.
+        blocks: all rows.
+        guess: impulses to begin with.
+        tolerance: change of velocity, relative to the largest speed, below which sweeps end as soon as it stalls.
     """
     f, speed = guess.copy(), float(np.abs(g).max()) or 1.0
-    u, change = g + G @ f, math.inf
+    u, change, settled = g + G @ f, math.inf, max(_SETTLED, _PART * tolerance)
+    if guess.any():  # mostly what stuck still sticks
+        f, u = _closer(G, g, u, f, blocks)
     joints = [(block.first, block.least, block.bound) for block in blocks if block.friction is None]
     contacts = [
         (block.rows, G[block.rows, block.rows].tolist(), G[block.rows], block.friction)
@@ -106,12 +118,13 @@ def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array
     ]
     diagonal = G.diagonal().tolist()
     part = 1.0  # of the way to a block's own solution
+    least, fell = math.inf, 0  # smallest change, and the last sweep that halved it
     for sweep in range(1, _SWEEPS):
         part = part if sweep % _CIRCLES else _SHORTER * part
         change = 0.0
-        for row, least, bound in joints:
+        for row, lowest, bound in joints:
             old, mobility = float(f[row]), diagonal[row]
-            if step := part * (min(max(old - float(u[row]) / mobility, least), bound) - old):
+            if step := part * (min(max(old - float(u[row]) / mobility, lowest), bound) - old):
                 u += step * G[row]
                 f[row] += step
                 change = max(change, abs(step * mobility))
@@ -127,36 +140,47 @@ def impulses_by_blocks(G: Array, g: Array, blocks: Sequence[Block], guess: Array
                 u += steps @ response
                 f[rows] += steps
                 change = max(change, *(abs(step * mobility[k][k]) for k, step in enumerate(steps)))
-        if not change > _SETTLED * part * speed:
+        if change < least / 2:
+            least, fell = change, sweep
+        stalls = sweep - fell >= _PATIENCE and change <= tolerance * part * speed
+        if stalls or not change > settled * part * speed:
             break
         if sweep % _TOGETHER == 0 and part == 1.0:
-            closer = f + _at_once(G, u, f, blocks)
-            if all(_allowed(closer[block.rows].tolist(), block) for block in blocks):
-                f, u = closer, g + G @ closer
+            f, u = _closer(G, g, u, f, blocks)
     return f, change / (part * speed)
+
+
+def _closer(G: Array, g: Array, u: Array, f: Array, blocks: Sequence[Block]) -> tuple[Array, Array]:
+    """Impulses and velocities with all that sticks and presses solved at once; unchanged if that leaves a cone."""
+    closer = f + _at_once(G, u, f, blocks)
+    sizes = closer.tolist()
+    if all(_allowed(sizes[block.rows], block) for block in blocks):
+        return closer, g + G @ closer
+    return f, u
 
 
 def _at_once(G: Array, u: Array, f: Array, blocks: Sequence[Block]) -> Array:
     """Change of impulses that stops all rows that stick or press, while slips keep their directions."""
-    columns, held = [], []
+    sizes, sticking, slipping = f.tolist(), list[int](), list[int]()
     for block in blocks:
-        impulse = f[block.rows]
+        first, impulse = block.first, sizes[block.rows]
         if block.friction is None:
-            moves = [np.ones(1)] if 0 < abs(impulse[0]) < block.bound else []
+            sticking += [first] if 0 < abs(impulse[0]) < block.bound else []
         elif math.hypot(*impulse[:2]) < block.friction * impulse[2] * (1 - _SETTLED):
-            moves = list(np.eye(3))
-        else:
-            moves = [impulse / impulse[2]] if impulse[2] > 0 else []
-        rows = range(block.rows.stop - len(moves), block.rows.stop)
-        for row, move in zip(rows, moves, strict=True):
-            column = np.zeros(len(f))
-            column[block.rows] = move
-            columns.append(column)
-            held.append(row)
-    if not columns:
-        return np.zeros(len(f))
-    basis = np.array(columns).T
-    return np.asarray(basis @ np.linalg.lstsq(G[held] @ basis, -u[held], rcond=None)[0])
+            sticking += range(first, first + 3)
+        elif impulse[2] > 0:
+            slipping.append(first)
+    change = np.zeros(len(f))
+    if not sticking and not slipping:
+        return change
+    held = [*sticking, *(first + 2 for first in slipping)]
+    rows, moves = G[held], [f[first : first + 3] / f[first + 2] for first in slipping]
+    along = [rows[:, first : first + 3] @ move for first, move in zip(slipping, moves, strict=True)]
+    parts = np.linalg.lstsq(np.column_stack([rows[:, sticking], *along]), -u[held], rcond=None)[0]
+    change[sticking] = parts[: len(sticking)]
+    for first, move, part in zip(slipping, moves, parts[len(sticking) :], strict=True):
+        change[first : first + 3] = part * move
+    return change
 
 
 def _allowed(impulse: Sequence[float], block: Block) -> bool:

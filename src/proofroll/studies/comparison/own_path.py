@@ -1,0 +1,102 @@
+"""Parts of an error by the options of a person's own file, each switched where that takes most of the error away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from proofroll.core.number_format import number, spaced
+from proofroll.core.observable import Role
+from proofroll.core.plugins import parse_engine
+from proofroll.core.verdict import Verdict
+from proofroll.files.scene_sources import options_of, parts_of
+from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.engine_questions import resolve
+from proofroll.running.runner import Runner
+from proofroll.running.time_budget import TimeBudget
+from proofroll.studies.comparison.default_comparison import OWN_OPTIONS
+from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.planning import point_name
+from proofroll.studies.judging import run_values
+from proofroll.studies.judging.reference import Reference
+
+_MOST, _SECONDS = 20, 15.0  # runs, and processor time of them [s]
+_HELPS = 0.8  # part of an error below which a switch counts
+_JUDGED = {Verdict.AGREES, Verdict.DIFFERS, Verdict.CONVERGES, Verdict.UNCONFIRMED}
+
+
+def own_path(outcome: Outcome, runner: Runner) -> list[str]:
+    """Lines on what the options of a scene's own file do to the motion that is furthest off, and on the rest.
+
+    Empty without a judged row of the file's options, and without contacts. Each line has one further option switched,
+    the one that takes most of the error away; an option that takes away less than a fifth has no line.
+    """
+    run = next((run for run in outcome.runs if run.row.short.startswith(OWN_OPTIONS)), None)
+    own_options = options_of(Path(parts_of(outcome.comparison.scene)[0])) if run else None
+    if run is None or own_options is None or run.case is None or run.facts is None or run.verdict not in _JUDGED:
+        return []
+    reference = outcome.points[point_name(run.parameters)].reference
+    if reference is None:
+        return []
+    if not own_options.of_contacts.keys() <= run.facts.settings.keys():
+        return []
+    left = dict(own_options.switches)
+    off = _off(reference, run.case, runner)
+    if off is None:
+        return []
+    quantity, error, bar = off
+    spec, runs, budget = parse_engine(run.row.engine), 0, TimeBudget(_SECONDS)
+    unit, options = spaced(reference.scene.observables[quantity].unit), dict(spec.options)
+    lines = []
+    while left and error > bar and runs + len(left) <= _MOST:
+        runs += len(left)
+        cases = _cases(run, spec.name, {words: {**options, **changes} for words, changes in left.items()}, runner)
+        results = runner.run(cases.values(), budget=budget)
+        errors = {
+            words: _errors(reference, [quantity], case, runner)[quantity][0]
+            for words, case in cases.items()
+            if results[case.key].status is Status.DONE
+        }
+        best = min(errors, key=lambda words: errors[words], default="")
+        if not best or not errors[best] < _HELPS * error:
+            break
+        lines.append(f"  {best}: {number(error, 2)} → {number(errors[best], 2)}{unit}")
+        options, error = {**options, **left.pop(best)}, errors[best]
+    head = f"Options of the file, switched one after the other; worst error of {quantity} ({runs} runs):"
+    rest = f"  rest: {number(error, 2)}{unit}" + (f"; less than a fifth each: {'; '.join(left)}" if left else "")
+    return [head, *lines, rest + ("; within the reference's error bar" if error <= bar else "")]
+
+
+def _cases(run: Run, name: str, trials: dict[str, dict[str, str]], runner: Runner) -> dict[str, Case]:
+    """Cases of a run with other settings, those that exist."""
+    assert run.case is not None  # by the caller
+    facts = resolve([(name, options) for options in trials.values()], runner.workers)
+    return {
+        words: replace(run.case, engine=replace(item, lowered={}, families={}), timed=False)
+        for words, item in zip(trials, facts, strict=True)
+        if isinstance(item, EngineFacts)
+    }
+
+
+def _off(reference: Reference, case: Case, runner: Runner) -> tuple[str, float, float] | None:
+    """Motion that is furthest off by its size, with its error and the reference's bar; None: all are within bars."""
+    moves = [name for name, item in reference.scene.observables.items() if item.role is Role.MOTION and item.headline]
+    errors = _errors(reference, moves, case, runner)
+    beyond = {name: error / (reference.scale(name) or 1.0) for name, (error, bar) in errors.items() if error > bar}
+    if not beyond:
+        return None
+    worst = max(beyond, key=lambda name: beyond[name])
+    return worst, *errors[worst]
+
+
+def _errors(reference: Reference, names: Sequence[str], case: Case, runner: Runner) -> dict[str, tuple[float, float]]:
+    """Largest distance of each quantity of a run from the reference, and the reference's error bar, in its unit."""
+    dataset = runner.store.stored(case).dataset
+    span, runs = reference.common_span({0: dataset})
+    curves = run_values.observables_of(span, runs[0])
+    return {
+        name: (run_values.error(span, name, curves[name], runs[0]), span.true(name, curves[name]).error_bar)
+        for name in names
+        if name in curves and name in span.curves
+    }

@@ -1,0 +1,51 @@
+"""What the options of a robot's own file do to its motion on a floor, switched one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from proofroll.files.scene_sources import with_control
+from proofroll.studies.comparison.default_comparison import default_comparison
+
+pytest.importorskip("mujoco")
+pytest.importorskip("pinocchio")
+pytestmark = pytest.mark.drill
+
+Proofroll = Callable[..., tuple[int, str, str]]
+OPTION = '<option timestep="0.004" iterations="7"><flag eulerdamp="disable"/></option>'
+STOOL = """<mujoco model="stool"><worldbody><geom name="floor" type="plane" size="0 0 1"/>
+<body name="seat" pos="0 0 0.09"><freejoint name="root"/><geom name="ball" size="0.1" mass="1" friction="0.4"
+priority="1"/><body name="arm"><joint name="h" axis="0 1 0"/><inertial mass="0.1" pos="0 0 0.1"
+diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody>
+<actuator><position joint="h" kp="2" kv="0.1"/></actuator></mujoco>"""
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> tuple[Path, Path]:
+    """A ball with an arm over a floor, whose file has options of its own, and its controller."""
+    path, control = tmp_path / "stool.xml", tmp_path / "stand.toml"
+    path.write_text(STOOL.replace("<worldbody>", f"{OPTION}<worldbody>").replace("0.09", "0.101"))
+    control.write_text("rate = 50\n[ground]\n")
+    return path, control
+
+
+def test_the_first_row_is_the_file(robot: tuple[Path, Path]) -> None:
+    """Under a controller, too, the options of the file are the first row: step, solver and explicit damping."""
+    row = default_comparison(with_control(str(robot[0]), robot[1]), {}).rows[0]
+    assert row.engine == "mujoco[formulation=geoms,preset=default,dt=0.004,eulerdamp=False,iterations=7]"
+    assert row.short == "the file's own options"
+
+
+def test_softness_is_what_is_off(proofroll: Proofroll, robot: tuple[Path, Path], tmp_path: Path) -> None:
+    """A ball that only falls on the floor is off by its soft contact, which the first line takes away."""
+    words = ("--control", str(robot[1]), "--until", "0.16", "--out", str(tmp_path / "out"))
+    code, out, _ = proofroll("compare", str(robot[0]), *words)
+    assert code == 0
+    text = " ".join(out.split())
+    assert "its steps are the reference, which is no judge of itself" in text
+    lines = text.partition("Options of the file, switched one after the other; worst error of ")[2]
+    assert "hard contacts in place of soft ones: " in lines.partition("rest: ")[0]
+    assert "implicit" not in lines, "the file has none"
