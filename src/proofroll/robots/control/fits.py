@@ -114,10 +114,10 @@ def ramps(goals: Array) -> Iterator[Array]:
     period = int(np.diff(begins).min())
     place = np.searchsorted(begins, np.arange(len(goals)), side="right") - 1
     since = np.arange(len(goals)) - begins[place]
-    for first in (1, 0):
-        part = np.minimum((since + first) / period, 1.0)[:, None]
-        before = goals[begins[place] - 1]
-        yield np.where((place >= 0)[:, None], before + part * (goals - before), np.nan)
+    for lead in (1, 0):
+        part = np.minimum((since + lead) / period, 1.0)[:, None]
+        starts = goals[begins[place] - 1]
+        yield np.where((place >= 0)[:, None], starts + part * (goals - starts), np.nan)
 
 
 def _other_targets(
@@ -128,15 +128,15 @@ def _other_targets(
     period = int(np.diff(changes).min()) if len(changes) > 1 else 0
     for late in range(1, period):
         efforts = law.effort(rows.target[:-late], rows.q[late:], rows.v[late:])
-        if (after := left(efforts, rows.effort[late:])) <= most:
-            yield 0, LayerCause("late_rows", f"targets act {late} rows late", float(late), after)
+        if (residual := left(efforts, rows.effort[late:])) <= most:
+            yield 0, LayerCause("late_rows", f"targets act {late} rows late", float(late), residual)
             break
     for target in ramps(rows.target):
-        known = np.isfinite(target).all(axis=1)
-        efforts = law.effort(target[known], rows.q[known], rows.v[known])
-        if (after := left(efforts, rows.effort[known])) <= most:
+        rows_told = np.isfinite(target).all(axis=1)
+        efforts = law.effort(target[rows_told], rows.q[rows_told], rows.v[rows_told])
+        if (residual := left(efforts, rows.effort[rows_told])) <= most:
             words = "servos follow targets along a straight line from one instant to the next"
-            yield 0, LayerCause("ramped", words, None, after)
+            yield 0, LayerCause("ramped", words, None, residual)
 
 
 def _falling_limit(
@@ -157,10 +157,10 @@ def _falling_limit(
     if not (slope < 0 < stall):
         return
     most_effort = np.clip(stall + slope * sign * rows.v, 0.0, law.limit)
-    if (after := left(sign * np.minimum(np.abs(plain), most_effort))) <= most:
+    if (residual := left(sign * np.minimum(np.abs(plain), most_effort))) <= most:
         numbers = f"{stall:.4g} at rest, none at {-stall / slope:.4g} per second"
         words = f"the limit of efforts falls with the speed along them: {numbers}"
-        yield 2, LayerCause("falling_limit", words, None, after)
+        yield 2, LayerCause("falling_limit", words, None, residual)
 
 
 @dataclass

@@ -392,10 +392,13 @@ def _ramped(evidence: _Evidence, most: float) -> Iterator[tuple[int, LayerCause]
         return
     place = np.searchsorted(instants, np.arange(len(recorded)), side="right") - 1
     for targets in ramps(goals[np.maximum(place, 0)]):
-        known = np.isfinite(targets).all(axis=1)
-        after = float((np.abs(targets - recorded)[known] / np.abs(recorded).max(axis=0)).max())
-        if after <= most:
-            yield 0, LayerCause("ramped", "targets go along a straight line from one instant to the next", None, after)
+        rows_told = np.isfinite(targets).all(axis=1)
+        residual = float((np.abs(targets - recorded)[rows_told] / np.abs(recorded).max(axis=0)).max())
+        if residual <= most:
+            yield (
+                0,
+                LayerCause("ramped", "targets go along a straight line from one instant to the next", None, residual),
+            )
 
 
 def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:

@@ -59,9 +59,9 @@ def mistakes_together(
     several = _one_by_one(candidates, law, trials, time) or _pair(candidates, law, trials, time)
     if not 1 < len(several) <= _MOST:
         return None
-    after = float(np.abs(trials.left(several[-1].law)).max(initial=0.0))
+    residual = float(np.abs(trials.left(several[-1].law)).max(initial=0.0))
     sentence = "; and ".join(item.mistake.sentence(item.size) for item in several)
-    return LayerCause(" + ".join(item.mistake.id for item in several), sentence, None, after)
+    return LayerCause(" + ".join(item.mistake.id for item in several), sentence, None, residual)
 
 
 def _one_by_one(
