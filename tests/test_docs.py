@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from proofroll.cli.fuzz import fuzz
 from proofroll.cli.report import report
 from proofroll.core.engine import Sample
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring
@@ -23,6 +22,7 @@ from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismS
 from proofroll.files.comparison_file import comparison_names, further_comparison_names
 from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
 from proofroll.running.idle_workers import Workers
+from proofroll_fuzz.command import fuzz
 
 ROOT = Path(__file__).resolve().parents[1]
 # README.md and the pages whose snippets have tests of their own.

@@ -53,9 +53,6 @@ from proofroll.studies.answer.records import (
     StepAnswer,
     StepTried,
 )
-from proofroll.studies.fuzz.hunt import FoundKind, Hunt
-from proofroll.studies.fuzz.shrink import SmallestScene
-from proofroll.studies.fuzz.surprises import Surprise, SurpriseKind
 from proofroll.studies.ladder.models import Ran
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.records import (
@@ -70,6 +67,9 @@ from proofroll.studies.study_store import Measured
 from proofroll.studies.versions.two_runs import TwoRuns
 from proofroll_drill.mutants.drilling import Mutated
 from proofroll_drill.row import Drilled
+from proofroll_fuzz.hunt import FoundKind, Hunt
+from proofroll_fuzz.shrink import SmallestScene
+from proofroll_fuzz.surprises import Surprise, SurpriseKind
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TEXT = (DOCS / "json.md").read_text(encoding="utf-8")

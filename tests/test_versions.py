@@ -90,18 +90,6 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     assert "| change | run |" in comment.read_text(encoding="utf-8")
 
 
-@pytest.mark.drill
-def test_versions_that_do_the_same(
-    versions: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where nothing changed that is said, on a cluster as at home, and is exit code 0."""
-    # Its worker is a thread here: test_cluster.py has processes, which cost seconds.
-    monkeypatch.setattr(distributed, "LocalCluster", partial(distributed.LocalCluster, processes=False))
-    code, out, err = versions("2.0", "2.0.1", "--scheduler", "local:1")
-    assert code == 0, err
-    assert "changed: nothing" in out
-
-
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
@@ -136,15 +124,24 @@ def test_what_versions_are_asked_is_allowed(
 
 
 @pytest.mark.drill
-def test_several_scenes_are_asked_at_once(
-    versions: Callable[..., tuple[int, str, str]], tmp_path: Path, proofroll: Proofroll, pythons: dict[str, Path]
+def test_versions_that_do_the_same(
+    versions: Callable[..., tuple[int, str, str]],
+    tmp_path: Path,
+    proofroll: Proofroll,
+    pythons: dict[str, Path],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Scenes and comparisons may be several; what is named twice is run once."""
+    """Where nothing changed that is said, on a cluster as at home, and is exit code 0.
+
+    Scenes and comparisons may be several; what is named twice is run once.
+    """
     del versions
+    # Its worker is a thread here: test_cluster.py has processes, which cost seconds.
+    monkeypatch.setattr(distributed, "LocalCluster", partial(distributed.LocalCluster, processes=False))
     (tmp_path / "more.toml").write_text(CLAIM.replace("0.002", "0.004"), encoding="utf-8")
     claims = [str(tmp_path / name) for name in ("balls.toml", "more.toml", "balls.toml")]
     sides = [f"aged@{pythons[version]}" for version in ("2.0", "2.0.1")]
-    code, out, err = proofroll("diff", *sides, *claims, "--out", str(tmp_path / "out"))
+    code, out, err = proofroll("diff", *sides, *claims, "--scheduler", "local:1", "--out", str(tmp_path / "out"))
     assert code == 0, err
     assert re.search(r"Of \d+ runs in both reports, changed: nothing", " ".join(out.split()))
 

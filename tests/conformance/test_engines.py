@@ -45,7 +45,8 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
 OF_BUILDING = ("builds_or_refuses", "builds_only_what_is_required")
 # Of what hangs on a formulation's model or adapter, not on its step, and of what is held against truths, one preset is
 # asked on every scene in every run of the tests; in the drills each scene is asked of one other preset, in turns: of
-# how it moves, or of its certificate and its first steps. What is known to fail is asked wherever it is.
+# how it moves, or of its certificate and its first steps; a quarter of them before a change lands, another quarter by
+# each check. What is known to fail is asked wherever it is.
 OF_MODELS = (
     "certificate_holds",
     "first_steps_fit_the_scene",
@@ -80,12 +81,14 @@ def marks(engine: Any, check: Check) -> tuple[pytest.MarkDecorator, ...] | None:
         return None
     if check.known or name in OF_PRESETS:
         return (pytest.mark.drill,)
-    turn = OF_MODELS.index(name)
+    number = turn = OF_MODELS.index(name)
+    mark = pytest.mark.drill
     if scene and scene[0] in TURNS:
         turn, odd = divmod(TURNS.index(scene[0]), 2)
         if odd == (name == "moves_as_the_truth"):
             return None
-    return (pytest.mark.drill,) if preset == others[turn % len(others)] else None
+        mark = pytest.mark.nightly if (turn + number) % 4 else mark
+    return (mark,) if preset == others[turn % len(others)] else None
 
 
 def all_checks() -> list[Any]:

@@ -7,8 +7,8 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from proofroll.cli.fuzz import seed_of
 from proofroll_drill.random_faults import compared, drawn_faults, outcome
+from proofroll_fuzz.command import seed_of
 
 Values = dict[str, tuple[np.ndarray[tuple[int], np.dtype[np.float64]], float]]
 PLACES = np.array([0.0, 1.0, 2.0])

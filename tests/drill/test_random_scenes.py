@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.core.drawing import drawn_scene
-from proofroll.elements.mechanism.drawn.families import FAMILIES
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.fuzz.evaluation import evaluate_scene
-from proofroll.studies.fuzz.relations import relations_of, write_scene
+from proofroll_fuzz.drawing import drawn_scene
+from proofroll_fuzz.evaluation import evaluate_scene
+from proofroll_fuzz.mechanisms.families import FAMILIES
+from proofroll_fuzz.relations import relations_of, write_scene
 
 # Seed -> beginning of the kind that its truth has with reason.
 _ENDS = {12: "truth; ends; the truth ends at t = # s: friction or stops of"}

@@ -59,6 +59,14 @@ def test_the_workflow_of_platforms_asks_for_what_there_is() -> None:
     assert "://" not in text
 
 
+def test_the_package_of_random_scenes_fits_the_suite() -> None:
+    """It has the version and the Pythons of the suite, and asks for that version: it uses more than public names."""
+    package = tomllib.loads((ROOT / "fuzz" / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert (package["version"], package["requires-python"]) == (PROJECT["version"], PROJECT["requires-python"])
+    assert f"proofroll=={PROJECT['version']}" in package["dependencies"]
+    assert {*package["dependencies"]} - {f"proofroll=={PROJECT['version']}"} <= {*PROJECT["dependencies"]}
+
+
 @pytest.mark.parametrize("name", ["release", "every_night"])
 def test_files_that_a_page_names_are_there(name: str) -> None:
     """Each file that the checklist and the page about nights point at exists."""

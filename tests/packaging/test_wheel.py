@@ -86,6 +86,7 @@ def test_contents(wheel: Path) -> None:
     assert any(name.endswith("LICENSE") for name in names)
     assert not any(name.startswith(("tests/", "proofroll/tests/")) for name in names)
     assert not any("__pycache__" in name for name in names)
+    assert {name.partition("/")[0].partition("-")[0] for name in names} == {"proofroll"}
 
 
 @pytest.mark.drill
@@ -135,11 +136,12 @@ def test_run(installed: Path, tmp_path: Path) -> None:
 
 
 def test_entry_points(installed: Path) -> None:
-    """The wheel announces the command and our engines."""
+    """The wheel announces the command and our engines, and none of the commands that other packages have."""
     (metadata,) = installed.glob("proofroll-*.dist-info/entry_points.txt")
     text = metadata.read_text()
     for name in ("proofroll = ", "projection = ", "exudyn = ", "pinocchio = ", "mujoco = "):
         assert name in text
+    assert "fuzz" not in text
 
 
 def test_types_are_announced(wheel: Path) -> None:

@@ -101,6 +101,10 @@ class Loop:
     see_before: bool = False
     seen_gravity: float = 1.0
     seen_signs: np.ndarray = field(default_factory=lambda: np.ones(6))
+    ramp: str = ""
+    no_load_speed: float = np.inf
+    late_steps: int = 0
+    normalised: bool = False
 
     def record(self, program: Callable[[Loop], Simulator]) -> dict[str, np.ndarray]:
         """Columns over time of a run, each named as in the documentation."""
@@ -110,7 +114,7 @@ class Loop:
         sim, act, rows = program(self), make(JOINTS), []
         action, counts, queue = np.zeros(6), np.zeros(6), [POSE.copy() for _ in range(self.late)]
         period = round(self.periods / RATE / self.step) + self.more_steps
-        before, answers = sim.state(), list[np.ndarray]()
+        before, answers, goal = sim.state(), list[np.ndarray](), POSE
         factor = {key: self.factors.get(key, 1.0) for key in ("q", "v", "v_WB_W", "w_WB_B", "last")}
         for k in range(self.steps + 1):
             now = state = sim.state()
@@ -129,7 +133,7 @@ class Loop:
                 places = state["q"] - POSE if self.relative else state["q"]
                 seen = {
                     "q": self.seen_signs * factor["q"] * places[list(self.seen)],
-                    "v": factor["v"] * state["v"][list(self.seen)],
+                    "v": factor["v"] * (state["v"] / 1.7 - 0.2 if self.normalised else state["v"])[list(self.seen)],
                     "v_WB_W": factor["v_WB_W"] * velocity,
                     "w_WB_B": factor["w_WB_B"] * spin,
                     "gravity_B": self.seen_gravity * (R.T @ np.array([0, 0, self.gravity_sign])),
@@ -151,9 +155,19 @@ class Loop:
                 pose = state["q"] if self.meaning == "added" else self.pose
                 queue.append(self.signs * (pose + self.scale * placed))
                 target = queue.pop(0)
-            servo = before if self.lag else state
+            servo, held = before if self.lag else state, target
+            if self.ramp:
+                if k % period == 0:
+                    begin, goal = goal, target
+                held = begin + (goal - begin) * (k % period + 1) / period
+                target = held if self.ramp == "recorded" else goal
+            if self.late_steps:
+                held = rows[-self.late_steps]["target"] if k >= self.late_steps else POSE
             if not self.hold or k % period == 0:
-                answered = np.clip(self.kp * (target - servo["q"]) - self.kd * servo["v"], -self.limit, self.limit)
+                answered = np.clip(self.kp * (held - servo["q"]) - self.kd * servo["v"], -self.limit, self.limit)
+                fallen = EFFORT * (1 - np.sign(answered) * servo["v"] / self.no_load_speed)
+                if np.isfinite(self.no_load_speed):
+                    answered = np.sign(answered) * np.minimum(np.abs(answered), np.maximum(fallen, 0.0))
                 answers.append(answered + self.bias)
                 effort = answers[-2] if self.late_effort and k else answers[-1]
             row = {"time": np.array([k * self.step]), **state, **{f"observed.{key}": seen[key] for key in seen}}
@@ -373,6 +387,16 @@ FITTED: Mapping[str, tuple[str, str, dict[str, Any], str]] = {
     "last, turned back": ("quaternion", "observation", {"shift": -1, "back": True}, "used as the inverse rotation"),
     "gravity in m/s²": ("observed_gravity", "observation", {"seen_gravity": 9.81}, "gravity is observed at 9.81 of"),
     "an observation late": ("observed_before", "observation", {"see_before": True}, "the state of the step before"),
+    "ramped": (
+        "ramped",
+        "target",
+        {"ramp": "recorded"},
+        "targets go along a straight line from one instant to the next",
+    ),
+    "ramped in the servo": ("ramped", "effort", {"ramp": "hidden"}, "servos follow targets along a straight line"),
+    "motor": ("falling_limit", "effort", {"no_load_speed": 8.0}, "along them: 0.8 at rest, none at 8 per second"),
+    "steps late": ("late_rows", "effort", {"late_steps": 3}, "targets act 3 rows late"),
+    "normalised": ("observed_normalised", "observation", {"normalised": True}, "0.58824 of the right one; constants: "),
     "sign of a coordinate": ("observed_size", "observation", {"seen_signs": np.where(ONE, -1.0, 1)}, "q.FL_KFE -1 of"),
 }
 # Mistakes of observations, which show at the action where no observation is recorded.

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from source_code import nodes
 
-SRC = Path(__file__).resolve().parents[2] / "src" / "proofroll"
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = (ROOT / "src" / "proofroll", ROOT / "fuzz" / "proofroll_fuzz")
 # Determiners, adverbs and participles that hide what a name holds.
 BARE = frozenset({
     "after", "along", "at", "before", "changed", "closed", "each", "first", "found", "given", "held", "here", "known",
@@ -43,16 +44,16 @@ def bare_names(function: ast.FunctionDef) -> set[str]:
 
 
 def parts() -> dict[str, float]:
-    """Folder of src -> part of its functions with a local or argument that is a bare determiner or adverb."""
+    """Folder of a package -> part of its functions with a local or argument that is a bare determiner or adverb."""
     functions: dict[str, list[bool]] = {}
-    for path in SRC.rglob("*.py"):
+    for path in (path for package in PACKAGES for path in package.rglob("*.py")):
         bare = [bool(bare_names(item)) for item in _functions(nodes(path))]
-        functions.setdefault(path.parent.relative_to(SRC).as_posix(), []).extend(bare)
+        functions.setdefault(path.parent.relative_to(ROOT).as_posix(), []).extend(bare)
     return {folder: sum(bare) / len(bare) for folder, bare in functions.items() if bare}
 
 
 def test_few_functions_of_a_folder_have_a_local_that_is_no_noun() -> None:
-    """In no folder of src do more than a tenth of the functions have such a name."""
+    """In no folder of a package do more than a tenth of the functions have such a name."""
     assert {folder: part for folder, part in parts().items() if part > WORST} == {}
 
 

@@ -23,7 +23,6 @@ from proofroll.cli.diff import diff
 from proofroll.cli.engines import engines
 from proofroll.cli.export import export
 from proofroll.cli.findings import findings
-from proofroll.cli.fuzz import fuzz
 from proofroll.cli.judge import judge
 from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import scenes
@@ -47,7 +46,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _ALIKE = 0.7  # least likeness, of 1, of an option that a wrong one may mean
-_STUDIES = (compare, report, recommend, ladder, stability, fuzz, diff)
+_STUDIES = (compare, report, recommend, ladder, stability, diff)
 for _command in (scenes, run, judge, replay, watch, export, findings, cite, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")

@@ -15,7 +15,8 @@ GROUPS = {
 }
 _OTHERS = "Others"
 _WIDE = 80  # columns of a screen
-# Command of earlier versions -> command that does the same now. The last two come with a clone, not with the wheel.
+# Command of earlier versions -> command that does the same now. The last two come with a clone, not with the wheel;
+# `fuzz` is looked for here only where its package is not installed.
 NOW = {
     "tradeoff": "proofroll recommend SCENE --plot FILE.svg",
     "plot": "proofroll run SCENE --engine NAME --plot FILE, and of a stored run proofroll replay RUN",
@@ -24,6 +25,7 @@ NOW = {
     "regimes": "proofroll paper regimes",
     "figures": "proofroll paper figures",
     "vocabulary": "proofroll check --keys [WORD]",
+    "fuzz": "in a package of its own: pip install proofroll-fuzz; in a clone of the repository, pip install ./fuzz",
     "bench": "python -m proofroll_benchmarks; in a clone of the repository, pip install ./benchmarks",
     "drill": "python -m proofroll_drill; in a clone of the repository, pip install ./tests/drill",
 }

@@ -6,7 +6,7 @@ Signs of failure of one kind of element (a ball that left its wall) come from th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -39,7 +39,7 @@ MEANINGS = {
     CRASHED: "the engine's process ended",
     TOO_SLOW: "no result within the time that the map allows",
     REFUSED: "the engine said before the run that it cannot represent the scene",
-    WRONG_MODEL: "the engine built a different scene, so it was not run",
+    WRONG_MODEL: "the engine built a different scene",
 }
 # Failures of runs that were not made, so that they tell nothing about the boundaries.
 NOT_RUN = frozenset({REFUSED, WRONG_MODEL})
@@ -110,6 +110,10 @@ class Yardstick:
         assert self.truth is not None  # else nothing asks
         return Reference.of(self.scene, self.truth)
 
+    def another_scene(self, result: Result) -> str | None:
+        """Reason why a run's model is another scene than was asked for; None without one, or without a truth."""
+        return None if self.truth is None else self._reference.another_scene(result.certificate)
+
     def off_grid(self, dataset: xr.Dataset) -> FloatArray:
         """Largest error off the grid in the interval before each sample, as a part of the range; else 0."""
         errors = np.zeros(dataset.sizes["time"])
@@ -131,8 +135,10 @@ def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick
         Status.REFUSED: REFUSED,
         Status.WRONG_MODEL: WRONG_MODEL,
     }
-    if result.status in early or dataset is None:
-        return _failed(early.get(result.status, GAVE_UP), result, None, None)
+    another = yardstick.another_scene(result)
+    if result.status in early or dataset is None or another:
+        sign_before = early.get(result.status, WRONG_MODEL if another else GAVE_UP)
+        return _failed(sign_before, replace(result, message=another or result.message), None, None)
     errors = _errors(dataset, yardstick)
     error = None if errors is None else float(np.max(errors, initial=0.0))
     sign = _first(dataset, yardstick, errors)

@@ -231,16 +231,16 @@ def test_each_command_takes_a_controller(written: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.drill
-def test_engines_agree_under_a_policy(written: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize("rate", [pytest.param(50, marks=pytest.mark.nightly), 60])
+def test_engines_agree_under_a_policy(rate: int, written: Any, tmp_path: Path) -> None:
     """A robot under a policy is compared in all engines, at a rate that no usual step divides, too."""
-    for rate in (50, 60):
-        robot, control = written((CONTROL + POLICY + START).replace("rate = 50", f"rate = {rate}"))
-        command = ["compare", robot, "--control", control, "--out", str(tmp_path / str(rate)), "--json"]
-        result = CliRunner().invoke(app, command)
-        assert result.exit_code == 0, result.output
-        verdicts = [row["verdict"] for row in json.loads(result.stdout)["rows"]]
-        assert len(verdicts) >= 4
-        assert set(verdicts) == {"agrees"}
+    robot, control = written((CONTROL + POLICY + START).replace("rate = 50", f"rate = {rate}"))
+    command = ["compare", robot, "--control", control, "--out", str(tmp_path), "--json"]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    verdicts = [row["verdict"] for row in json.loads(result.stdout)["rows"]]
+    assert len(verdicts) >= 4
+    assert set(verdicts) == {"agrees"}
 
 
 def test_the_probe_needs_every_part_of_an_observation() -> None:

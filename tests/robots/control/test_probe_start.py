@@ -64,9 +64,9 @@ def record(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> Callable[..
     [
         ("mujoco", "arm.urdf", "fixed"),
         ("isaaclab", "legs.urdf", "free"),
-        pytest.param("mujoco", "legs.urdf", "free", marks=pytest.mark.drill),
-        pytest.param("isaaclab", "arm.urdf", "fixed", marks=pytest.mark.drill),
-        pytest.param("isaaclab", "arm.urdf", "free", marks=pytest.mark.drill),
+        pytest.param("mujoco", "legs.urdf", "free", marks=pytest.mark.nightly),
+        pytest.param("isaaclab", "arm.urdf", "fixed", marks=pytest.mark.nightly),
+        pytest.param("isaaclab", "arm.urdf", "free", marks=pytest.mark.nightly),
     ],
 )
 def test_a_probe_decides(
@@ -127,7 +127,7 @@ def test_a_probe_of_an_mjcf(proofroll: Proofroll, record: Callable[..., list[str
 
 
 @pytest.mark.drill
-@pytest.mark.parametrize("masses", [(2.1, 2.121), (2.1, 2.079)])
+@pytest.mark.parametrize("masses", [(2.1, 2.121), pytest.param((2.1, 2.079), marks=pytest.mark.nightly)])
 def test_a_link_on_a_fixed_axis(
     masses: tuple[float, float], proofroll: Proofroll, record: Callable[..., list[str]]
 ) -> None:

@@ -1,7 +1,9 @@
 """Groups of commands in the help, and commands that are called something else now."""
 
 import shlex
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 import typer
@@ -9,6 +11,9 @@ import typer
 from proofroll.cli import _made, _usage_message, app
 from proofroll.cli.command_groups import GROUPS, NOW
 
+ROOT = Path(__file__).parents[3]
+# Commands of packages that may be lacking.
+_PACKAGES = {"fuzz": ROOT / "fuzz"}
 Proofroll = Callable[..., tuple[int, str, str]]
 
 
@@ -27,7 +32,7 @@ def test_the_commands_fit_a_screen(proofroll: Proofroll) -> None:
     assert (max(map(len, lines)) <= 80, len(lines) < 24) == (True, True)
 
 
-@pytest.mark.parametrize("name", NOW)
+@pytest.mark.parametrize("name", [name for name in NOW if name not in _PACKAGES])
 def test_an_old_command_is_answered_by_the_new_one(proofroll: Proofroll, name: str) -> None:
     """An old spelling runs nothing: one line names the new one, which is there."""
     code, out, err = proofroll(name, "--json")
@@ -41,6 +46,20 @@ def test_an_old_command_is_answered_by_the_new_one(proofroll: Proofroll, name: s
         assert words[0] != "paper" or words[1] in known["paper"].commands
     else:
         assert __import__(words[1])
+
+
+@pytest.mark.parametrize("name", _PACKAGES)
+def test_a_command_whose_package_is_lacking_names_it(
+    proofroll: Proofroll, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without the package that announces a command, one line says from where to install it; both places are there."""
+    project = tomllib.loads((_PACKAGES[name] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert name in project["entry-points"]["proofroll.commands"]
+    monkeypatch.delitem(_made(app).commands, name)
+    code, out, err = proofroll(name, "--json")
+    assert (code, out, err) == (2, "", f"proofroll: {name} is now {NOW[name]}\n")
+    assert f"pip install {project['name']};" in err
+    assert ROOT / err.split()[-1] == _PACKAGES[name]
 
 
 def test_another_command_is_unknown() -> None:

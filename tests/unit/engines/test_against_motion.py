@@ -91,7 +91,9 @@ def test_motion_is_that_over_a_plane_that_turns(engine: str, first: bool, rate: 
 
 
 @drill
-@pytest.mark.parametrize("engine", FALLS)
+@pytest.mark.parametrize(
+    "engine", [pytest.param(name, marks=pytest.mark.nightly if "impulses" in name else ()) for name in FALLS]
+)
 def test_the_ball_of_the_article_falls_as_its_law_says(engine: str) -> None:
     """It slips, sticks, slips and falls at the published times, and ends at the published height."""
     scene = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0.35)

@@ -30,7 +30,7 @@ def place(run):
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("options", "tolerance"),
-    [({}, 1e-10), pytest.param({"integrator": "rk4", "dt": 1e-3}, 1e-7, marks=pytest.mark.drill)],
+    [({}, 1e-10), pytest.param({"integrator": "rk4", "dt": 1e-3}, 1e-7, marks=pytest.mark.nightly)],
 )
 def test_a_mass_on_a_spring_rubs_to_rest_off_the_middle(options, tolerance):
     """Half swings lose 2F/k each, and the seventeenth ends where the spring is weaker than friction."""

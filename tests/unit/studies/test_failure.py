@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -130,6 +131,14 @@ def test_runs_that_ended_early(status: Status, message: str, failure: str, silen
     dataset = run(upto=6) if status == Status.DIVERGED else None
     outcome = run_outcome(Result(status, message), dataset, Yardstick.of(SCENE, true()))
     assert (outcome.failure, outcome.silent, outcome.stable, outcome.accurate) == (failure, silent, False, False)
+
+
+def test_a_friction_that_stands_for_an_unbounded_one_accuses_nobody() -> None:
+    """A run whose model has less friction than the true motion needs is one of a different scene, whatever it shows."""
+    lines = [{"quantity": "inverse friction", "found": [100.0]}]
+    found = run_outcome(replace(DONE, certificate=lines), run(p_WB() + LATE), Yardstick.of(SCENE, true()))
+    assert (found.failure, found.silent) == ("wrong model", False)
+    assert "a friction of 0.01" in found.message
 
 
 def test_without_a_truth() -> None:

@@ -175,7 +175,7 @@ def test_servos_with_limits_agree_with_another_solver(seed: int) -> None:
     assert found.bars["q"][-1] < 1e-10
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_drive_that_leads_to_a_dead_centre_before_the_first_sample_ends_there() -> None:
     """A rod between two slides, one driven, is stretched at 0.2 s: the truth ends there, and knows what was before."""
     bodies = tuple(Body(name, 1.0, inertia=ONES) for name in "ab")

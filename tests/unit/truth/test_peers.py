@@ -16,7 +16,7 @@ from proofroll_drill.published import of_motion, of_scene, run_of, tables, true_
 
 QUICK = {"falling_screw"}
 # Those whose truths take longest.
-NIGHTLY = {"spatial_slider_crank", "car_axis"}
+NIGHTLY = {"spatial_slider_crank", "car_axis", "link_bench"}
 MARKS = {True: pytest.mark.nightly, False: pytest.mark.drill}
 BARS = 1e-10  # s, and units of values: 1e-12 is seen
 # Meijaard, Papadopoulos, Ruina, Schwab 2007: the roots at 5 m/s.

@@ -357,10 +357,18 @@ def mujoco_distances(shapes: tuple[Geometry, ...], found: TwoRouteMotion) -> lis
     return apart
 
 
+# Faces and edges, and a round solid, with their order as it is and swapped; the others are for the night.
+TUMBLE_FIRST = {("box", 1), ("capsule", 0)}
+
+
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("other", "seed", "swapped"),
-    [(name, seed, not seed % 2) for name, (_, _, seeds, _) in TUMBLERS.items() for seed in seeds],
+    [
+        pytest.param(name, seed, not seed % 2, marks=() if (name, seed) in TUMBLE_FIRST else pytest.mark.nightly)
+        for name, (_, _, seeds, _) in TUMBLERS.items()
+        for seed in seeds
+    ],
 )
 def test_solids_that_tumble_collide_without_overlap(other: str, seed: int, swapped: bool) -> None:
     """Wherever they meet, corner or edge first, they stay apart by MuJoCo's own distance and keep their momentum."""
@@ -389,7 +397,7 @@ def test_solids_that_tumble_collide_without_overlap(other: str, seed: int, swapp
 
 
 @pytest.mark.drill
-@pytest.mark.parametrize("friction", [0.0, 0.6])
+@pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.nightly), 0.6])
 def test_an_elastic_cube_that_lands_flat_beside_its_centre_rises_as_it_fell(friction: float) -> None:
     """Four points at one speed return it together: the cube does not turn, and its error bar is round-off."""
     cube = Geometry("hull", "body", "box", size=(1.0, 1.0, 1.0))

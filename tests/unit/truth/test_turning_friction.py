@@ -187,6 +187,7 @@ def test_the_projection_solver_follows_friction_against_turning(
     "laws0-velocity0-0.0-pinocchio[formulation=impulses]-errors0",
     "laws1-velocity1-0.2-exudyn[formulation=spheres]-errors2",
     "laws0-velocity0-0.0-exudyn[formulation=spheres]-errors2",
+    "laws3-velocity3-0.0-exudyn[formulation=spheres]-errors2",
 )
 @pytest.mark.parametrize(
     ("setting", "errors"),

@@ -48,7 +48,7 @@ def headline(study: StabilityStudy) -> str:
     if study.refused:
         text += f" Refused before the run: {counted(study.refused, 'points')}."
     if study.wrong_model:
-        text += f" {study.wrong_model} were not run: the engine built a different scene."
+        text += f" At {study.wrong_model} the engine built a different scene."
     if study.never_accurate:
         text += f" At {counted(study.never_accurate, 'points')} no step or tolerance that was affordable holds 1 %."
     return " ".join([text, *host_sentences(study.hosts)])

@@ -6,7 +6,7 @@ link being m v (1 + |v|) at its centre of mass, and I w (1 + |w|).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -217,6 +217,8 @@ class AirTable:
         self.rated = _largest(record, ("v.", "v_WB.", "w_WB."))
         self.placed, self.forced = _largest(record, ("q.", "q_WB.")), _largest(record, ("effort.",))
         self._known: dict[int, tuple[Array, ...]] = {}
+        self._stepped: dict[tuple[int, bool], Array] = {}
+        self._added: dict[tuple[int, tuple[bool, bool]], list[Array]] = {}
 
     def _forces(self, row: int) -> tuple[Array, ...]:
         """Mass matrix with armatures, inertial forces, weight, whitening of free directions, and drag, at a row."""
@@ -229,6 +231,8 @@ class AirTable:
 
     def _by_stages(self, row: int, *, held: bool) -> Array:
         """Change of the velocities by a step of RK4 from a row less the recorded one, in parts of the step."""
+        if (row, held) in self._stepped:
+            return self._stepped[row, held]
         law, robot, (q, v), effort = self.law, self.robot, self.at[row], self.efforts[row]
         at_q, at_v = robot.driven.T
         servos = np.abs(effort) < law.limit * (1 - 1e-6)
@@ -252,7 +256,8 @@ class AirTable:
             return np.concatenate([robot.equations.tree.rate(place, velocity), rate])
 
         new_v = classical_step(rates, np.concatenate([q, v]), self.step)[len(q) :]
-        return np.asarray((self.at[row + 1][1] - new_v) / self.step)
+        self._stepped[row, held] = np.asarray((self.at[row + 1][1] - new_v) / self.step)
+        return self._stepped[row, held]
 
     def _slope(self, row: int, rate: Array, *, of_world: bool) -> Array:
         """Change of the forces of inertia at a row with velocities that change by ``rate``; they are quadratic.
@@ -333,7 +338,7 @@ class AirTable:
             of_joints |= {"stiffness": -q[robot.driven[:, 0]], "armature": -rate[driven]}
             for name, values in of_joints.items():
                 singles[name].append(into[:, driven] * values)
-            for body, forces_of in zip(bodies, self._of_bodies(q, v, rate), strict=True):
+            for body, forces_of in zip(bodies, self._of_bodies(row, rate, (central, moving.axes is None)), strict=True):
                 bodies[body].append(-into @ forces_of)
         return AirRows(
             left=np.concatenate(left),
@@ -358,10 +363,15 @@ class AirTable:
             total += J[:3].T @ force + J[3:].T @ (torque + np.cross(arm, force))
         return total
 
-    def _of_bodies(self, q: Array, v: Array, rate: Array) -> Iterator[Array]:
-        """Forces along the velocities that a mass, a first moment and an inertia of each body need, (nv, 10)."""
-        tree, gravity = self.robot.equations.tree, np.array(self.robot.mechanism.gravity)
-        motion = tree.at(q, v)
+    def _of_bodies(self, row: int, rate: Array, kind: tuple[bool, bool]) -> list[Array]:
+        """Forces along the velocities that a mass, a first moment and an inertia of each body need, (nv, 10).
+
+        ``kind``: of the rates; a row has one rate of each.
+        """
+        if (row, kind) in self._added:
+            return self._added[row, kind]
+        tree, gravity, added = self.robot.equations.tree, np.array(self.robot.mechanism.gravity), []
+        motion = tree.at(*self.at[row])
         for k in range(len(self.robot.mechanism.bodies)):
             R, J = motion.R_WB[k], motion.J[k]
             acceleration = J @ rate + motion.bias[k]
@@ -371,7 +381,9 @@ class AirTable:
             wrench[:3, 0], wrench[:3, 1:4] = pull, moved
             wrench[3:, 1:4] = -skew(pull)
             wrench[3:, 4:] = _inertial(turning) + skew(spin) @ _inertial(spin)
-            yield J[:3].T @ R @ wrench[:3] + J[3:].T @ R @ wrench[3:]
+            added.append(J[:3].T @ R @ wrench[:3] + J[3:].T @ R @ wrench[3:])
+        self._added[row, kind] = added
+        return added
 
 
 def _largest(record: ControlRecord, kinds: tuple[str, ...]) -> float:

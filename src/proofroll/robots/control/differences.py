@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from proofroll.robots.model import Array
 # Least residual that counts, in parts of the largest number of its column: round-off of a sum of some terms.
 ROUND_OFF = 1e-9
 SAME_TIME = 1e-6  # part of the time between instants that is round-off
+_OFTEN = 3  # times as many rows at which targets change as actions do, at which they are no targets of instants
 _NEAR = 0.1  # part of it by which an instant may be off and is the same
 
 
@@ -44,8 +45,16 @@ def _compared(columns: list[str], time: Array, recorded: Array, computed: Array)
 
 
 def _of_instants(record: ControlRecord) -> list[str]:
-    """Columns that change at instants."""
-    return [name for name in record.columns if name.startswith(("action.", "target."))]
+    """Columns that change at instants; actions alone where targets change far more often, along ramps."""
+    names = [name for name in record.columns if name.startswith(("action.", "target."))]
+    actions = [name for name in names if name.startswith("action.")]
+    return actions if 0 < _OFTEN * _changes(record, actions) < _changes(record, names) else names
+
+
+def _changes(record: ControlRecord, names: Sequence[str]) -> int:
+    """Number of rows at which one of some columns changes; 0 without columns."""
+    values = np.stack([record.columns[name] for name in names], axis=1) if names else np.zeros((1, 1))
+    return int(np.any(np.diff(values, axis=0) != 0, axis=1).sum())
 
 
 def instant_rows(record: ControlRecord, law: ControlLaw) -> Any:
@@ -73,7 +82,7 @@ def due_rows(record: ControlRecord, law: ControlLaw) -> Any:
     if not len(rows) or law.extra_steps:
         return rows[:0]
     part = record.part(rows)
-    for kind, computed in (("action", _actions), ("target", _targets)):
+    for kind, computed in (("action", _actions), ("target", targets_of)):
         recorded = record.stacked(kind, law.joints)
         values = None if recorded is None or (kind == "action" and law.policy is None) else computed(part, law)
         if recorded is not None and values is not None and not isinstance(values, str):
@@ -208,7 +217,7 @@ def _action(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
     return _of_joints("action", record, law, recorded, _actions(record, law), counts)
 
 
-def _targets(record: ControlRecord, law: ControlLaw) -> Array | str:
+def targets_of(record: ControlRecord, law: ControlLaw) -> Array | str:
     """Targets at the rows of a record of instants, from recorded actions where there are some."""
     counts: list[Array | None] = [None] * len(record.time)
     if law.policy is not None:
@@ -237,7 +246,7 @@ def _target(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
         return "the record has no columns target.JOINT"
     late = record.time - record.time[0] > (law.delay - 0.5) / law.rate
     counts = np.ones(len(late), bool) if record.time[0] == 0 else late
-    return _of_joints("target", record, law, recorded, _targets(record, law), counts)
+    return _of_joints("target", record, law, recorded, targets_of(record, law), counts)
 
 
 def efforts_of(record: ControlRecord, law: ControlLaw) -> Array | str:
@@ -261,7 +270,7 @@ def servo_rows(record: ControlRecord, law: ControlLaw) -> tuple[Array, Array, Ar
     if target is None:
         if record.time[0] != 0 or (law.policy is None and not _of_instants(record) and not len(instants)):
             return "the record has no columns target.JOINT"
-        computed = _targets(at_instants(record, law), law)
+        computed = targets_of(at_instants(record, law), law)
         if isinstance(computed, str):
             return computed
         target = computed[places]

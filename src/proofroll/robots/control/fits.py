@@ -54,6 +54,9 @@ def observation_causes(
     factors = np.where(squares > 0, (right * recorded).sum(axis=0) / np.where(squares > 0, squares, 1.0), 1.0)
     wrong_columns = np.asarray((np.abs(difference) > most * sizes).any(axis=0), bool)
     added = difference.mean(axis=0)
+    spread = ((right - right.mean(axis=0)) ** 2).sum(axis=0)
+    slopes = ((right - right.mean(axis=0)) * recorded).sum(axis=0) / np.where(spread > 0, spread, np.inf)
+    beside = recorded.mean(axis=0) - slopes * right.mean(axis=0)
     for name, words, explained, numbers, unit in (
         ("observed_size", "parts are observed at another size: ", factors * right, factors, " of the right one"),
         ("observed_offset", "parts are observed with a constant added: ", right + added, added, ""),
@@ -62,6 +65,13 @@ def observation_causes(
         if residual <= most and len(recorded) > _ROWS:  # of a column that hardly varies, what leaves less goes before
             listed = _listed(numbers, wrong_columns, columns, unit)
             yield int(wrong_columns.sum()), LayerCause(name, words + listed, None, residual)
+    explained = np.where(wrong_columns, slopes * right + beside, right)
+    residual = float((np.abs(recorded - explained) / sizes).max())
+    if residual <= most and len(recorded) > 2 * _ROWS and np.all(np.abs(slopes[wrong_columns]) > _SAME):
+        sizes_told = _listed(slopes, wrong_columns, columns, " of the right one")
+        words = f"parts are observed at another size and with a constant added: {sizes_told}; constants: "
+        listed = words + _listed(beside, wrong_columns, columns)
+        yield 2 * int(wrong_columns.sum()), LayerCause("observed_normalised", listed, None, residual)
 
 
 def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tuple[int, LayerCause]]:
@@ -80,6 +90,8 @@ def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tupl
 
     if len(right) > 1 and (late := left(right[:-1], rows.effort[1:])) <= most:
         yield 0, LayerCause("late_effort", "efforts are those of the row before", None, late)
+    yield from _other_targets(rows, law, most, left)
+    yield from _falling_limit(rows, law, most, left)
     for words, order in orders(law.joints):
         if (after := left(right[:, order])) <= most:
             yield 0, LayerCause("effort_order", f"efforts are of joints in another order ({words})", None, after)
@@ -88,6 +100,67 @@ def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tupl
     if fit is not None and clauses and (after := left(fit.efforts(rows))) <= most:
         size = fit.size if len(clauses) == 1 else None
         yield len(clauses), LayerCause("servo", "; ".join(clauses), size, after)
+
+
+def ramps(goals: Array) -> Iterator[Array]:
+    """Targets at all rows that are reached along straight lines from an instant to the next; NaN before the second.
+
+    A line ends at the last row before the next instant, or at that one. ``goals``: targets that hold from each instant
+    on, (times, joints).
+    """
+    begins = np.flatnonzero(np.any(np.diff(goals, axis=0) != 0, axis=1)) + 1
+    if len(begins) < _ROWS:
+        return
+    period = int(np.diff(begins).min())
+    place = np.searchsorted(begins, np.arange(len(goals)), side="right") - 1
+    since = np.arange(len(goals)) - begins[place]
+    for first in (1, 0):
+        part = np.minimum((since + first) / period, 1.0)[:, None]
+        before = goals[begins[place] - 1]
+        yield np.where((place >= 0)[:, None], before + part * (goals - before), np.nan)
+
+
+def _other_targets(
+    rows: ServoRows, law: ControlLaw, most: float, left: Callable[[Array, Array], float]
+) -> Iterator[tuple[int, LayerCause]]:
+    """Efforts by targets that come some rows late within an instant, or along a ramp."""
+    changes = np.flatnonzero(np.any(np.diff(rows.target, axis=0) != 0, axis=1))
+    period = int(np.diff(changes).min()) if len(changes) > 1 else 0
+    for late in range(1, period):
+        efforts = law.effort(rows.target[:-late], rows.q[late:], rows.v[late:])
+        if (after := left(efforts, rows.effort[late:])) <= most:
+            yield 0, LayerCause("late_rows", f"targets act {late} rows late", float(late), after)
+            break
+    for target in ramps(rows.target):
+        known = np.isfinite(target).all(axis=1)
+        efforts = law.effort(target[known], rows.q[known], rows.v[known])
+        if (after := left(efforts, rows.effort[known])) <= most:
+            words = "servos follow targets along a straight line from one instant to the next"
+            yield 0, LayerCause("ramped", words, None, after)
+
+
+def _falling_limit(
+    rows: ServoRows, law: ControlLaw, most: float, left: Callable[[Array], float]
+) -> Iterator[tuple[int, LayerCause]]:
+    """Efforts whose limit falls with the speed, as that of a DC motor: F (1 - v / v0) along the effort, 0 at least.
+
+    The limit of the law holds beside it.
+    """
+    plain = law.kp * (rows.target - rows.q) - law.kd * rows.v
+    sign = np.sign(plain)
+    cut = np.abs(rows.effort - plain) > most * _sizes(rows.effort)
+    falls = cut & (np.abs(np.abs(rows.effort) - law.limit) > most * _sizes(rows.effort)) & (rows.effort != 0)
+    speeds, forces = (sign * rows.v)[falls], (sign * rows.effort)[falls]
+    if len(speeds) < 2 * _ROWS or np.ptp(speeds) <= _SAME * np.abs(speeds).max():
+        return
+    slope, stall = np.polyfit(speeds, forces, 1)
+    if not (slope < 0 < stall):
+        return
+    most_effort = np.clip(stall + slope * sign * rows.v, 0.0, law.limit)
+    if (after := left(sign * np.minimum(np.abs(plain), most_effort))) <= most:
+        numbers = f"{stall:.4g} at rest, none at {-stall / slope:.4g} per second"
+        words = f"the limit of efforts falls with the speed along them: {numbers}"
+        yield 2, LayerCause("falling_limit", words, None, after)
 
 
 @dataclass

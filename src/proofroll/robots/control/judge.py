@@ -175,16 +175,22 @@ def judge_record(
     law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
     names_of_layers = DIFFERENCES if control else ()
 
+    robots: dict[int, tuple[StateReading, InAir]] = {}  # by the identity of a reading, which they keep
+
     def layers_of(reading: StateReading, time: SearchTime, imported: int = 0) -> list[Layer]:
         state_layers = [] if reading.layer is None else [reading.layer]
-        held = InAir(
-            held=model.held(reading.frame),
-            imported=partial(model.imported, reading.frame, imported),
-            reported=reading.reported,
-            stepped=model.held(None) if reading.frame is not None else None,
-            ranges=model.ranges,
-            assumed=assumed,
-        )
+        if id(reading) not in robots:
+            robots[id(reading)] = (
+                reading,
+                InAir(
+                    held=model.held(reading.frame),
+                    reported=reading.reported,
+                    stepped=model.held(None) if reading.frame is not None else None,
+                    ranges=model.ranges,
+                    assumed=assumed,
+                ),
+            )
+        held = replace(robots[id(reading)][1], imported=partial(model.imported, reading.frame, imported))
         return [
             *state_layers,
             *record_layers(
@@ -258,7 +264,7 @@ def _best_reading(
         try_rivals([*readings_of_late_efforts([rival for rival, _ in (*judged, *silent)])])
     if _open(best())[0]:
         try_rivals(_beside(plain[0], readings_of_early_rates))
-    if any(_open(best())[::2]):
+    if _unexplained_forces(best()[1]) or _open(best())[2]:
         candidates = sorted((rival for rival, _ in (*judged, *silent)), key=_count)
         by_state = {id(rival) for rival, _ in judged}
         trials = _of_importers(candidates, partial(layers_of, time=time), time)

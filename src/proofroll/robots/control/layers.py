@@ -26,7 +26,15 @@ from proofroll.robots.control.bookkeeping.mistakes import (
     mistakes,
     offsets_told,
 )
-from proofroll.robots.control.bookkeeping.search import MistakeExplanation, best_size, bounded, explanations, largest
+from proofroll.robots.control.bookkeeping.search import (
+    MistakeExplanation,
+    another_pose,
+    best_size,
+    bounded,
+    explanations,
+    largest,
+)
+from proofroll.robots.control.bookkeeping.together import LayerTrials, mistakes_together
 from proofroll.robots.control.columns import action_mistakes
 from proofroll.robots.control.differences import (
     DIFFERENCES,
@@ -40,11 +48,12 @@ from proofroll.robots.control.differences import (
     instant_rows,
     servo_rows,
     sources,
+    targets_of,
 )
-from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
+from proofroll.robots.control.fits import ServoRows, observation_causes, ramps, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
 from proofroll.robots.control.record import FITTED, OBSERVED, ControlRecord, Layer, LayerCause
-from proofroll.robots.control.standing_joints import standing_fit
+from proofroll.robots.control.standing_joints import StandingFit, standing_fit
 from proofroll.robots.model import Array
 
 # Remark on a scheme that has the damping of joints at the velocity after a step.
@@ -53,6 +62,7 @@ _DAMPED = "damping of joints acts at the velocity after the step, or they have a
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
 _HELPS = 0.1
+_INSTANTS = 4  # least number of rows from which a pose is fitted beside another mistake
 
 
 def record_layers(
@@ -111,6 +121,7 @@ class InAir:
         stepped: the robot with the frame of its file, where a program may step that and report another; else None.
         ranges: joint -> its limits [rad or m].
         assumed: clause on rows that are steps if the program has its usual ones; empty: they are not, or it is known.
+        fits: of records to robots that were compared before, by their identities.
     """
 
     held: HeldRobot
@@ -119,6 +130,15 @@ class InAir:
     stepped: HeldRobot | None = None
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: str = ""
+    fits: dict[tuple[int, int], tuple[ControlRecord, StandingFit]] = field(default_factory=dict)
+
+    def fit(self, record: ControlRecord, law: ControlLaw, robot: HeldRobot, efforts: Array) -> StandingFit:
+        """Fit of a record to one of the robots, computed once: it hangs on no search."""
+        key = id(record), id(robot)
+        if key not in self.fits:
+            fit = standing_fit(record, law, robot, efforts, held_rows(record, law), self.ranges)
+            self.fits[key] = record, fit
+        return self.fits[key][1]
 
 
 @dataclass(frozen=True)
@@ -164,10 +184,9 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     efforts = record.stacked("effort", law.joints)
     if efforts is None:
         return Layer("acceleration", reason="the record has no columns effort.JOINT")
-    steady, ranges = held_rows(record, law), evidence.in_air.ranges
-    fit, off_stops, remark = standing_fit(record, law, evidence.in_air.held, efforts, steady, ranges)
+    fit, off_stops, remark = evidence.in_air.fit(record, law, evidence.in_air.held, efforts)
     if evidence.in_air.stepped is not None and not isinstance(fit, str) and fit.off > fit.bar:
-        rival = standing_fit(evidence.record, law, evidence.in_air.stepped, efforts, steady, ranges)
+        rival = evidence.in_air.fit(evidence.record, law, evidence.in_air.stepped, efforts)
         if not isinstance(rival.fit, str) and rival.fit.off < fit.off:
             fit, off_stops, remark = rival
     if isinstance(fit, str):
@@ -304,9 +323,31 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
     for _, cause in sorted(ranked, key=lambda item: item[0]):
         by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
     causes = [*by_words.values()]
-    if layer.name == "instants" and not causes:
-        causes = [*_missed(evidence)]
+    if layer.name == "instants":
+        causes = causes or [*_missed(evidence)]
+    elif all(cause.after > rounding for cause in causes):
+        trials = _trials(layer.name, evidence, _bars(layer.name, evidence, compared))
+        together = mistakes_together(candidates, evidence.law, trials, time)
+        causes = causes if together is None else [together]
     return {"causes": tuple(causes), "tried": tried, "known": len(candidates)}
+
+
+def _trials(name: str, evidence: _Evidence, bars: Array) -> LayerTrials:
+    """Trials of laws at a layer whose columns have these bars."""
+
+    def parts(law: ControlLaw) -> Array:
+        compared = evidence.difference(name, law)
+        if isinstance(compared, str) or compared.difference.shape[1] != len(bars) or not len(compared.difference):
+            return np.full(len(bars), np.nan)
+        return np.asarray(np.abs(compared.difference).max(axis=0) / bars)
+
+    def fitting(law: ControlLaw) -> Iterator[Mistake]:
+        compared = evidence.difference("target", law)
+        if name == "target" and not isinstance(compared, str) and len(compared.difference) >= _INSTANTS:
+            offsets = compared.difference.mean(axis=0)
+            yield another_pose(offsets_told(law.joints, offsets), law.signs * offsets)
+
+    return LayerTrials(parts, partial(evidence.left, name), fitting)
 
 
 def _shows(mistake: Mistake, layers: Sequence[str]) -> bool:
@@ -334,11 +375,27 @@ def _fitted_causes(
         targets, actions = (part.stacked(kind, law.joints) for kind in ("target", "action"))
         if targets is None or actions is None:
             return
+        yield from _ramped(evidence, most)
         source = sources(part, law)
         later = np.flatnonzero(source >= 0)
         places = part.stacked("q", law.joints)
         seen = None if places is None else places[later]
         yield from target_causes(targets[later], actions[source[later]], seen, law, most)
+
+
+def _ramped(evidence: _Evidence, most: float) -> Iterator[tuple[int, LayerCause]]:
+    """Targets of all rows that are reached along a ramp from one instant to the next."""
+    record, law = evidence.record, evidence.law
+    instants, recorded = instant_rows(record, law), record.stacked("target", law.joints)
+    goals = targets_of(at_instants(record, law), law)
+    if recorded is None or isinstance(goals, str):
+        return
+    place = np.searchsorted(instants, np.arange(len(recorded)), side="right") - 1
+    for targets in ramps(goals[np.maximum(place, 0)]):
+        known = np.isfinite(targets).all(axis=1)
+        after = float((np.abs(targets - recorded)[known] / np.abs(recorded).max(axis=0)).max())
+        if after <= most:
+            yield 0, LayerCause("ramped", "targets go along a straight line from one instant to the next", None, after)
 
 
 def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:

@@ -160,7 +160,7 @@ class StabilityStudy:
         boundaries: number of points with a failure beyond them.
         silent: number of these that the engine did not report.
         refused: number of points that the engine refused before the run.
-        wrong_model: number of points that were not run because the engine's model contradicts the scene.
+        wrong_model: number of points at which the engine built a different scene.
         failures: kind of failure -> number of points.
         never_accurate: number of points at which no affordable step is accurate.
         meanings: kind of failure -> its meaning.

@@ -33,7 +33,7 @@ from proofroll.studies.study_store import conditions_now, keep_study
 # Failures that no program can show -> the reason.
 _NOTHING_TO_SHOW = {
     REFUSED: "the run was refused before it began",
-    WRONG_MODEL: "the engine built a different scene, so it was not run",
+    WRONG_MODEL: "the engine built a different scene",
     TOO_SLOW: "the run was only too slow for the map",
 }
 

@@ -81,7 +81,7 @@ def dropped(kind: str, start: tuple[float, ...], friction: float) -> Mechanism:
     )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_cube_that_falls_on_an_edge_rocks_to_its_rest() -> None:
     """Each impact leaves a quarter of the speed: sums of intervals by the energy of the cube."""
     cube = dropped("free", (0, 0, 0.4, float(np.cos(0.15)), 0, float(np.sin(0.15)), 0), 1.0)

@@ -23,7 +23,6 @@ from proofroll.elements.mechanism.scene.spring_law import IN_LAWS
 
 if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis
-    from proofroll.core.drawing import SceneFamily
 
 
 # A mechanism without laws of joints, and a law of each kind, which changes its motion by far more than a step does
@@ -179,13 +178,6 @@ class MechanismKind:
             ),
             "friction_of_contacts": (sleds[0], sleds[1]),
         }
-
-    @staticmethod
-    def scene_families() -> Mapping[str, SceneFamily]:
-        """See :class:`proofroll.core.drawing.DrawsScenes`."""
-        from proofroll.elements.mechanism.drawn.families import FAMILIES
-
-        return FAMILIES
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:

@@ -165,8 +165,9 @@ class AirRobot:
 
     def forces(self, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         """Mass matrix, forces of inertia, weight (nv), and directions that loops and couplings allow (nv, freedoms)."""
-        M = self.equations.inertial(self.equations.tree.at(q, v))[1]
-        inertial = M @ self._weightless.solve(q, v).acceleration
+        weightless = self._weightless.solve(q, v)
+        M = self.equations.inertial(weightless.motion)[1]
+        inertial = M @ weightless.acceleration
         weight = M @ self.equations.solve(q, v).acceleration - inertial
         free = null_space(self.equations.rows(q).C) if self.equations.rank else np.eye(len(M))
         return M, inertial, weight, free

@@ -271,7 +271,7 @@ class MotionSearch:
                 distance = motions.distance(moved(offsets), scheme, _CLOSES * self.before)
                 if math.isfinite(distance):
                     told = offsets_told(law.joints, offsets, self._clamped(motions, offsets, scheme, distance))
-                    item = Mistake("pose", told, "target", partial(_moved_by, offsets), numbers=len(offsets))
+                    item = another_pose(told, offsets)
                     explanation = MistakeExplanation(item, 1.0, distance)
                     yield explanation
                     if self._settles(explanation):
@@ -321,3 +321,8 @@ def _moved(law: ControlLaw, offsets: Array) -> ControlLaw:
 
 def _moved_by(offsets: Array, law: ControlLaw, size: float) -> ControlLaw:
     return _moved(law, size * offsets)
+
+
+def another_pose(words: str, offsets: Array) -> Mistake:
+    """Mistake of a default pose that is off by these offsets [rad or m]."""
+    return Mistake("pose", words, "target", partial(_moved_by, offsets), numbers=len(offsets))

@@ -1,0 +1,125 @@
+"""Mistakes that explain a layer of a record together, where each alone leaves some of its columns wrong."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.bookkeeping.mistakes import Mistake, SearchTime, fitted
+from proofroll.robots.control.record import LayerCause
+
+Flags = NDArray[np.bool_]
+_MOST = 3  # mistakes of one layer that are told
+
+
+@dataclass(frozen=True)
+class LayerTrials:
+    """Trials of laws at one layer of a record.
+
+    Attributes:
+        parts: largest difference of each column in parts of its bar, under a law; NaN: it cannot be computed.
+        left: all differences in parts of the sizes of their columns, under a law.
+        fitting: further mistakes under a law, whose numbers fit what it leaves.
+    """
+
+    parts: Callable[[ControlLaw], Array]
+    left: Callable[[ControlLaw], Array]
+    fitting: Callable[[ControlLaw], Iterator[Mistake]]
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A mistake with a size, and the law with it."""
+
+    mistake: Mistake
+    size: float
+    law: ControlLaw
+
+    @property
+    def numbers(self) -> int:
+        """Number of fitted numbers."""
+        return self.mistake.numbers + (self.mistake.sized and self.size not in {0.0, -1.0})
+
+
+def mistakes_together(
+    candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, time: SearchTime
+) -> LayerCause | None:
+    """Cause that names two or three mistakes with which every column holds; None where none are found.
+
+    Each closes columns and leaves right ones right; what none closes alone is left to pairs, a mistake whose size is
+    known and another one.
+    """
+    several = _one_by_one(candidates, law, trials, time) or _pair(candidates, law, trials, time)
+    if not 1 < len(several) <= _MOST:
+        return None
+    after = float(np.abs(trials.left(several[-1].law)).max(initial=0.0))
+    sentence = "; and ".join(item.mistake.sentence(item.size) for item in several)
+    return LayerCause(" + ".join(item.mistake.id for item in several), sentence, None, after)
+
+
+def _one_by_one(
+    candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, time: SearchTime
+) -> Sequence[_Told]:
+    """Mistakes with which every column holds, those first that close most; the last two may be a pair."""
+    several: list[_Told] = []
+    while (wrong := trials.parts(law) > 1).any() and len(several) < _MOST and not time.over:
+        rest = [item for item in candidates if item.id not in {before.mistake.id for before in several}]
+        steps = [(closed, item) for item in _sized(rest, law, trials) if (closed := _closed(item, trials, wrong))]
+        more = [max(steps, key=lambda step: (step[0], -step[1].numbers))[1]] if steps else []
+        if not more and several:
+            more = _pair(rest, law, trials, time)
+        if not more:
+            return ()
+        several, law = [*several, *more], more[-1].law
+    return () if wrong.any() else several
+
+
+def _closed(item: _Told, trials: LayerTrials, wrong: Flags) -> int:
+    """Number of wrong columns that a mistake closes; 0 if it leaves a right one wrong, or cannot be computed."""
+    parts = trials.parts(item.law)
+    return int((wrong & (parts <= 1)).sum()) if np.all(parts[~wrong] <= 1) and np.isfinite(parts).all() else 0
+
+
+def _pair(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, time: SearchTime) -> list[_Told]:
+    """Two mistakes that close every column, with the fewest fitted numbers; empty where none are found."""
+    best: list[_Told] = []
+    wrong = trials.parts(law) > 1
+    for first in _known(candidates, law):
+        if not np.all(trials.parts(first.law)[~wrong] <= 1):
+            continue
+        others = [item for item in candidates if item.id != first.mistake.id]
+        for second in itertools.chain(_sized(others, first.law, trials), _fitting(first.law, trials)):
+            if time.over:
+                return best
+            if np.all(trials.parts(second.law) <= 1) and (not best or second.numbers < best[1].numbers):
+                best = [first, second]
+    return best
+
+
+def _known(candidates: Sequence[Mistake], law: ControlLaw) -> Iterator[_Told]:
+    """Mistakes without a size to be fitted: those without one, and a size of 0 or -1 that has words of its own."""
+    for item in candidates:
+        sizes = [1.0] if not item.sized else [0.0] * bool(item.absent) + [-1.0] * bool(item.opposite)
+        yield from (_Told(item, size, item.changed(law, size)) for size in sizes)
+
+
+def _sized(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials) -> Iterator[_Told]:
+    """Mistakes with known sizes, then with sizes that fit best what a law leaves."""
+    yield from _known(candidates, law)
+    for item in candidates:
+        changed = partial(item.changed, law)
+        for start in item.starts if item.sized else ():
+            size = fitted(lambda size, changed=changed: trials.left(changed(size)), start)  # type: ignore[misc]
+            yield _Told(item, size, changed(size))
+
+
+def _fitting(law: ControlLaw, trials: LayerTrials) -> Iterator[_Told]:
+    """Mistakes whose numbers fit what a law leaves."""
+    yield from (_Told(item, 1.0, item.changed(law, 1.0)) for item in trials.fitting(law))

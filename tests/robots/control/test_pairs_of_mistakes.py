@@ -1,0 +1,58 @@
+"""Two mistakes at one layer of another program's record are named together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from outside_records import CONTROL, MISTAKES, PROGRAMS, Loop, columns_of, urdf, written
+
+from proofroll.robots.control.judge import RecordJudgement, judge_record
+
+# Pairs of mistakes: of separate parts of an observation, of one part, and of targets.
+PAIRS = [
+    ("order in the observation", "velocity in the base"),
+    ("sign of gravity", "velocity of the centre"),
+    ("xyzw", "relative coordinates"),
+    ("spin back", "spin at 0.25"),
+    ("legs swapped", "pose off"),
+    ("two instants late", "double scale"),
+    ("low pass", "pose missing"),
+    ("half kd", "held efforts"),
+    ("clipped actions", "no last action"),
+]
+
+
+@pytest.fixture
+def judged(tmp_path: Path) -> Callable[[Loop, str], RecordJudgement]:
+    """Judgement of a loop's record by a program."""
+    robot, control = tmp_path / "legs.urdf", tmp_path / "legs.toml"
+    robot.write_text(urdf())
+    control.write_text(CONTROL)
+
+    def judgement(loop: Loop, program: str) -> RecordJudgement:
+        columns = columns_of(loop.record(PROGRAMS[program]))
+        return judge_record(written(columns, tmp_path / "record.csv", ""), robot, control)
+
+    return judgement
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize(
+    ("pair", "program"),
+    [
+        pytest.param(pair, ("mujoco", "pinocchio")[k % 2], marks=() if k % 3 == 0 else pytest.mark.nightly)
+        for k, pair in enumerate(PAIRS)
+    ],
+)
+def test_two_mistakes_at_one_layer_are_named(
+    pair: tuple[str, str], program: str, judged: Callable[[Loop, str], RecordJudgement]
+) -> None:
+    """The first layer that does not hold names both, and nothing else."""
+    first, second = (MISTAKES[name] for name in pair)
+    judgement = judged(Loop(**(first[2] | second[2])), program)
+    layer = next(item for item in judgement.layers if not item.holds)
+    assert layer.name == first[1] == second[1]
+    assert set(layer.causes[0].id.split(" + ")) == {first[0], second[0]}, "\n".join(judgement.lines())
+    assert layer.causes[0].after < 1e-6
