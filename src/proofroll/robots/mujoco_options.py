@@ -50,7 +50,7 @@ def own_options(path: Path) -> OwnOptions | None:
     keys = [key for key in dir(option) if not key.startswith("_") and key not in _READ]
     unlike = [key for key in keys if np.any(getattr(option, key) != getattr(plain.option, key))]
     solver = mujoco.mjtSolver(int(option.solver)).name.removeprefix("mjSOL_")
-    words = {"solver": f"solver {solver}", "iterations": f"{option.iterations} iterations"}
+    words = {"solver": f"solver {solver}", "iterations": counted(int(option.iterations), "iterations")}
     clauses = {key: words.get(key, f"{key} {getattr(option, key):g}") for key in unlike}
     alone = [clauses.pop(key) for key in _OF_CONTACTS if key in clauses]
     others = list(clauses.values())
@@ -66,6 +66,9 @@ def own_options(path: Path) -> OwnOptions | None:
     switches = {"hard contacts in place of soft ones": {"time_constant": "2", "impedance": "0.9999"}}
     if _CONES[int(option.cone)] == "pyramidal":
         switches["elliptic cone in place of the pyramidal"] = {"cone": "elliptic"}
+    if alone:
+        usual_solver = {"solver": "Newton", "iterations": str(plain.option.iterations), "noslip_iterations": "0"}
+        switches[f"MuJoCo's default solver in place of {', '.join(alone)}"] = usual_solver
     explicit = bool(option.disableflags & bits.mjDSBL_EULERDAMP)
     if integrator == "Euler" and not explicit:
         switches["damping as armature in place of implicit"] = {"damping_armature": "true"}

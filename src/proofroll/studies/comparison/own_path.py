@@ -22,7 +22,6 @@ from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
 _MOST, _SECONDS = 20, 15.0  # runs, and processor time of them [s]
-_HELPS = 0.8  # part of an error below which a switch counts
 _JUDGED = {Verdict.AGREES, Verdict.DIFFERS, Verdict.CONVERGES, Verdict.UNCONFIRMED}
 
 
@@ -30,7 +29,7 @@ def own_path(outcome: Outcome, runner: Runner) -> list[str]:
     """Lines on what the options of a scene's own file do to the motion that is furthest off, and on the rest.
 
     Empty without a judged row of the file's options, and without contacts. Each line has one further option switched,
-    the one that takes most of the error away; an option that takes away less than a fifth has no line.
+    the one that takes most of the error away, or adds least.
     """
     run = next((run for run in outcome.runs if run.row.short.startswith(OWN_OPTIONS)), None)
     own_options = options_of(Path(parts_of(outcome.comparison.scene)[0])) if run else None
@@ -59,12 +58,12 @@ def own_path(outcome: Outcome, runner: Runner) -> list[str]:
             if results[case.key].status is Status.DONE
         }
         best = min(errors, key=lambda words: errors[words], default="")
-        if not best or not errors[best] < _HELPS * error:
+        if not best:
             break
         lines.append(f"  {best}: {number(error, 2)} → {number(errors[best], 2)}{unit}")
         options, error = {**options, **left.pop(best)}, errors[best]
     head = f"Options of the file, switched one after the other; worst error of {quantity} ({runs} runs):"
-    rest = f"  rest: {number(error, 2)}{unit}" + (f"; less than a fifth each: {'; '.join(left)}" if left else "")
+    rest = f"  rest: {number(error, 2)}{unit}" + (f"; not tried: {'; '.join(left)}" if left else "")
     return [head, *lines, rest + ("; within the reference's error bar" if error <= bar else "")]
 
 
