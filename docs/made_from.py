@@ -19,6 +19,8 @@ from proofroll.running.idle_workers import Workers
 ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.
 _NO_NUMBERS = {"report", "robots", "all", "dev", "cluster", "docs", "environments"}
+# Settings that came later count where they are not the engine's own default, as they were on pages made before.
+_LATER = {"impratio": 1.0, "solver": "Newton", "iterations": 100, "noslip_iterations": 0, "eulerdamp": True}
 # Of a comparison these are for a person.
 _WORDS = ("title", "question", "order", "short")
 
@@ -56,7 +58,7 @@ def stamp(name: str, settings: list[EngineFacts], root: Path = ROOT) -> str:
     content["rows"] = [{key: value for key, value in row.items() if key not in _WORDS} for row in content["rows"]]
     folder = data_folder("models") / content["scene"]
     scene = tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8"))
-    chosen = [[item.name, item.settings, item.resolution, item.order] for item in settings]
+    chosen = [[item.name, _counted(item), item.resolution, item.order] for item in settings]
     made = [
         {key: value for key, value in content.items() if key not in _WORDS},
         scene,
@@ -65,6 +67,12 @@ def stamp(name: str, settings: list[EngineFacts], root: Path = ROOT) -> str:
         pinned(root),
     ]
     return hashlib.sha256(json.dumps(made, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _counted(item: EngineFacts) -> dict[str, Any]:
+    """Settings of a row but later ones at their defaults."""
+    later = _LATER if item.name == "mujoco" else {}
+    return {name: value for name, value in item.settings.items() if name not in later or value != later[name]}
 
 
 def stamped(readme: str) -> str:
