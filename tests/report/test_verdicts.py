@@ -168,6 +168,17 @@ def test_nothing_is_cut_on_a_narrow_terminal(outcome: Outcome, width: int) -> No
     assert sorted(line[0] for line in text.splitlines() if " of 1e-3 m" in line) == sorted("✓✗✗◐")
 
 
+def test_a_long_name_has_a_line_of_its_own(outcome: Outcome) -> None:
+    """Numbers of a row whose name leaves no room for them stand below it, in their columns."""
+    content = outcome_content(outcome)
+    long = "options of the file: integrator, cone, solver"
+    rows = [dataclasses.replace(row, setting=long) for row in content.rows]
+    lines = printed(dataclasses.replace(content, rows=rows), 80).splitlines()
+    begin = next(k for k, line in enumerate(lines) if long in line)
+    assert " of 1e-3 m" not in lines[begin]
+    assert re.match(r" {20,}z .* of 1e-3 m", lines[begin + 1])
+
+
 def test_a_wrong_limit_within_tolerance_is_marked(outcome: Outcome) -> None:
     """The row agrees, and below it stands the limit's error; JSON, terminal and page have it."""
     content = outcome_content(outcome)

@@ -225,6 +225,7 @@ def test_a_layer_that_stays_open_tells_no_column(judged: Judged) -> None:
     noise = np.random.default_rng(0).normal(size=record["q"].shape)
     judgement = judged(columns_of({**record, "observed.q": record["observed.q"] + noise}))
     assert not any("the layers behind it tell so" in line for line in judgement.lines())
+    assert not any("none of 0 " in line for line in judgement.lines())
 
 
 @pytest.mark.drill

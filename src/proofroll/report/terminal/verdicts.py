@@ -187,9 +187,12 @@ def row_lines(
         excess = "not run" if left_out else "missing" if away else str(row.verdict)
     room = _SETTING + _ERROR - max(_ERROR, len(excess) + 1)
     title = _cut(row, rows, room - 1)
-    line = Text(f"{sign} {title:{room}}{excess:{_SETTING + _ERROR - room}}{_speed(row):>{_SPEED}}")
+    numbers = f"{excess:{_SETTING + _ERROR - room}}{_speed(row):>{_SPEED}}"
+    line = Text(f"{sign} {title:{room}}{numbers}" if len(title) < room else f"{sign} {title}")
     line.stylize(STYLES[row.verdict], 0, 1)
     yield line
+    if len(title) >= room:
+        yield f"  {'':{room}}{numbers}"
     notes = [_why(row, runs), *(f"{told.sentence}: {told.cause.remedy}" for told in row.diagnosis)]
     if not row.as_expected:
         expected = " or ".join(row.claim.expect)

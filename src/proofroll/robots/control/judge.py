@@ -243,12 +243,12 @@ def _best_reading(
     """
     time = SearchTime(SEARCH_TIME)
     judged = _searched(readings, layers_of, time)
-    plain = min(judged, key=_open)
+    plain = min(judged, key=_rank)
     silent: list[_Judged] = []
 
     def best() -> _Judged:
         """Best of the readings by the state, and of the silent ones that close all layers."""
-        return min([*judged, *(item for item in silent if not _open_layers(item[1]))], key=_open)
+        return min([*judged, *(item for item in silent if not _open_layers(item[1]))], key=_rank)
 
     def try_rivals(rivals: Iterable[StateReading]) -> None:
         """Adds readings that look at every layer that is open without them."""
@@ -361,6 +361,11 @@ def _open(judged: _Judged) -> tuple[int, int, int]:
     failed = [layer for layer in layers if not layer.holds]
     fitted = sum(cause.id == FITTED for layer in failed for cause in layer.causes)
     return len(_open_layers(layers)), len(failed), fitted
+
+
+def _rank(judged: _Judged) -> tuple[int, ...]:
+    """Number by which readings are sorted, the best first; of equal ones that in which most mistakes were tried."""
+    return (*_open(judged), -sum(layer.tried for layer in judged[1]))
 
 
 def _step_bound(mechanism: Mechanism, step: float) -> str:
