@@ -19,7 +19,7 @@ from proofroll.running.idle_workers import Workers
 ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.
 _NO_NUMBERS = {"report", "robots", "all", "dev", "cluster", "docs", "environments"}
-# Settings that came later count where they are not the engine's own default, as they were on pages made before.
+# MuJoCo's options that became settings later count where they are not its defaults, which pages made before had.
 _LATER = {"impratio": 1.0, "solver": "Newton", "iterations": 100, "noslip_iterations": 0, "eulerdamp": True}
 # Of a comparison these are for a person.
 _WORDS = ("title", "question", "order", "short")

@@ -394,7 +394,7 @@ FITTED: Mapping[str, tuple[str, str, dict[str, Any], str]] = {
         "targets go along a straight line from one instant to the next",
     ),
     "ramped in the servo": ("ramped", "effort", {"ramp": "hidden"}, "servos follow targets along a straight line"),
-    "motor": ("falling_limit", "effort", {"no_load_speed": 8.0}, "along them: 0.8 at rest, none at 8 per second"),
+    "motor": ("falling_limit", "effort", {"no_load_speed": 8.0}, "along them: 0.8 at rest, 0 at a speed of 8"),
     "steps late": ("late_rows", "effort", {"late_steps": 3}, "targets act 3 rows late"),
     "normalised": ("observed_normalised", "observation", {"normalised": True}, "0.58824 of the right one; constants: "),
     "sign of a coordinate": ("observed_size", "observation", {"seen_signs": np.where(ONE, -1.0, 1)}, "q.FL_KFE -1 of"),

@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.engine_abilities import OwnOptions
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, number
+from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, SHORTEST_TIME_CONSTANT
 from proofroll.robots.files.robot_file import read_xml
 
 # Integrators that the adapter has, by their number in MuJoCo.
@@ -25,6 +26,7 @@ _READ |= {"ccd_iterations", "ccd_tolerance", "sdf_iterations", "sdf_initpoints"}
 _OF_CONTACTS = ("iterations", "noslip_iterations", "solver")  # settings of formulations with contacts alone
 _FINER = 4  # part of the file's step that is tried
 _SOLVERS = {name.upper(): name for name in ("PGS", "CG", "Newton")}
+_HARD = {"time_constant": str(SHORTEST_TIME_CONSTANT), "impedance": str(LARGEST_IMPEDANCE)}
 _FLAGS = {"REFSAFE": "refsafe"}  # of rows, which no scene has
 
 
@@ -63,14 +65,15 @@ def own_options(path: Path) -> OwnOptions | None:
         for key in [key for key in dir(element) if key.startswith(("solref", "solimp"))]:
             count = sum(bool(np.any(getattr(item, key) != getattr(element, key))) for item in getattr(spec, kind))
             named += [f"{key.replace('_', '')} of {counted(count, kind)}"] if count else []
-    switches = {"hard contacts in place of soft ones": {"time_constant": "2", "impedance": "0.9999"}}
+    switches = {"hard contacts in place of soft ones": _HARD}
     if _CONES[int(option.cone)] == "pyramidal":
         switches["elliptic cone in place of the pyramidal"] = {"cone": "elliptic"}
     if alone:
         usual_solver = {"solver": "Newton", "iterations": str(plain.option.iterations), "noslip_iterations": "0"}
         switches[f"MuJoCo's default solver in place of {', '.join(alone)}"] = usual_solver
-    explicit = bool(option.disableflags & bits.mjDSBL_EULERDAMP)
-    if integrator == "Euler" and not explicit:
+    euler = integrator == "Euler"  # the only one that the flag is for
+    explicit = euler and bool(option.disableflags & bits.mjDSBL_EULERDAMP)
+    if euler and not explicit:
         switches["damping as armature in place of implicit"] = {"damping_armature": "true"}
     finer = option.timestep / _FINER
     switches[f"dt {number(finer, 3)} s in place of {number(option.timestep, 3)} s"] = {"dt": f"{finer:.12g}"}

@@ -125,13 +125,17 @@ def on_scene(truth: EngineFacts, scene: Scene, workers: Workers | None = None) -
     if not needs_steps(scene):
         return truth
     described = describe_each(engine_names(), workers)
-    known = [item for item in described.values() if isinstance(item, EngineDescription)]
-    declared = {item.name: (item.references, item.provides) for item in known}
+    descriptions = [item for item in described.values() if isinstance(item, EngineDescription)]
+    declared = {item.name: (item.references, item.provides) for item in descriptions}
     names = stepped(declared, scene.requires)
     specs = [parse_engine(name) for name in names]
     facts = resolve([(spec.name, spec.options) for spec in specs], workers)
-    answers = [(name, item) for name, item in zip(names, facts, strict=True) if isinstance(item, EngineFacts)]
-    return dataclasses.replace(truth, steps={name: f"{item.version} {item.code}" for name, item in answers})
+    steps: dict[str, str] = {}
+    for name, item in zip(names, facts, strict=True):
+        if not isinstance(item, EngineFacts):
+            break  # a witness is no reference where that cannot be asked
+        steps[name] = f"{item.version} {item.code}"
+    return dataclasses.replace(truth, steps=steps)
 
 
 def prepare(engine: str, workers: Workers) -> None:

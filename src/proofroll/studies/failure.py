@@ -41,7 +41,7 @@ MEANINGS = {
     REFUSED: "the engine said before the run that it cannot represent the scene",
     WRONG_MODEL: "the engine built a different scene",
 }
-# Failures of runs that were not made, so that they tell nothing about the boundaries.
+# Failures of runs that were not made, or of another scene: they tell nothing about the boundaries.
 NOT_RUN = frozenset({REFUSED, WRONG_MODEL})
 
 

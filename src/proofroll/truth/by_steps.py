@@ -115,8 +115,8 @@ def reference_by_steps(element: MechanismElement, times: FloatArray, engines: Se
         return dataset
     apart = np.max([_distances(twins[0], run) for run in twins[1:]], axis=0)
     dataset = _to_horizon(dataset, apart, _distances(coarse, fine))
-    near = float(_distances(twins[0], fine)[dataset.sizes["time"] - 1])
-    witness = f"{_words(engines[1])}, dt {number(twins[0].step, 3)} s, is within {number(near, 2)} m of it"
+    distance = float(_distances(twins[0], fine)[dataset.sizes["time"] - 1])
+    witness = f"{_words(engines[1])}, dt {number(twins[0].step, 3)} s, is within {number(distance, 2)} m of it"
     return dataset.assign_attrs(second_route=f"{attrs['second_route']}; {witness}")
 
 

@@ -44,6 +44,9 @@ def test_options_of_a_model_are_settings(model: Callable[[str], Path]) -> None:
     assert (own.words, own.others, own.others_alone) == ("RK4, dt 4e-3 s", [], ["7 iterations", "solver CG"])
     assert options_of(model("")).settings == {"integrator": "Euler", "dt": "0.002"}
     softened = "<flag refsafe='disable'/></option><default><joint solreffriction='0.03 1'/></default><option"
+    explicit = "><flag eulerdamp='disable'/></option><option"
+    assert options_of(model(explicit)).settings["eulerdamp"] == "False"
+    assert "eulerdamp" not in options_of(model(f"integrator='implicitfast'{explicit}")).settings
     own = options_of(model(f"noslip_iterations='3'>{softened}"))
     assert own.others_alone == ["noslip_iterations 3"]
     assert own.others == ["flag refsafe", "solreffriction of 1 joint"]

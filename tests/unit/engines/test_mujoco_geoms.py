@@ -299,6 +299,7 @@ def test_the_armature_of_damping_needs_euler_and_joints():
     for settings, said in (
         (preset("tuned", integrator="implicitfast", cone_correction=False), "needs integrator=Euler"),
         (replace(MUJOCO.presets["chart"]["matched"], damping_armature=True), "chart does not use it"),
+        (preset("default", integrator="implicitfast", eulerdamp=False), "implicitfast does not use it"),
     ):
         with pytest.raises(InputError, match=said):
             MUJOCO.build(

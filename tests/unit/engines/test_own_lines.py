@@ -41,6 +41,16 @@ def test_lines_of_mjcf_make_the_options_of_the_settings(formulation: str, preset
         assert f'<equality solref="{settings.contact_time:g}"' in lines
 
 
+def test_lines_of_mjcf_have_the_solver() -> None:
+    """Options of the solver that are not MuJoCo's defaults stand in the lines."""
+    asked = {"solver": "PGS", "iterations": 7, "noslip_iterations": 3, "impratio": 10.0, "eulerdamp": False}
+    _, lines = told("mujoco", formulation="geoms", preset="default", integrator="Euler", **asked)
+    option = mujoco.MjModel.from_xml_string(f"<mujoco>{lines}{BALL}</mujoco>").opt
+    assert mujoco.mjtSolver(option.solver) == mujoco.mjtSolver.mjSOL_PGS
+    assert (option.iterations, option.noslip_iterations, option.impratio) == (7, 3, 10.0)
+    assert option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+
+
 def test_lines_for_exudyn_make_the_settings_of_a_run() -> None:
     """Set in new simulation settings, all but files and the length of a run are those of the adapter."""
     adapter = load_engine("exudyn")

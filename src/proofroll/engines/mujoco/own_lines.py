@@ -76,7 +76,7 @@ def own_lines(settings: MujocoSettings) -> list[str]:
     set_integration(spec.option, settings)
     settings.soften(spec.default.equality)
     if settings.formulation == "geoms":
-        spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
+        settings.set_solver(spec.option)
         settings.soften(spec.default.geom)
     spec.compile()
     lines: list[str] = []

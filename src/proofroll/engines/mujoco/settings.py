@@ -117,6 +117,8 @@ class MujocoSettings:
         # The other integrators have the implicit damping of their own, or none.
         explicit = self.damping_armature and self.integrator != "Euler"
         yield explicit, "integrator", "damping_armature=true needs integrator=Euler"
+        implicit = not self.eulerdamp and self.integrator != "Euler"
+        yield implicit, "eulerdamp", f"{self.integrator} does not use it; leave it out"
         if self.cone_correction:
             # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
             yield self.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"

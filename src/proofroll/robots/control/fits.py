@@ -158,7 +158,7 @@ def _falling_limit(
         return
     most_effort = np.clip(stall + slope * sign * rows.v, 0.0, law.limit)
     if (residual := left(sign * np.minimum(np.abs(plain), most_effort))) <= most:
-        numbers = f"{stall:.4g} at rest, none at {-stall / slope:.4g} per second"
+        numbers = f"{stall:.4g} at rest, 0 at a speed of {-stall / slope:.4g}"
         words = f"the limit of efforts falls with the speed along them: {numbers}"
         yield 2, LayerCause("falling_limit", words, None, residual)
 

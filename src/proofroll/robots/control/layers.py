@@ -329,7 +329,15 @@ def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time
         trials = _trials(layer.name, evidence, _bars(layer.name, evidence, compared))
         together = mistakes_together(candidates, evidence.law, trials, time)
         causes = causes if together is None else [together]
+    closing = [cause for cause in causes if cause.after <= rounding]
+    causes = closing or [_with_rest(cause, cause.after / distance) for cause in causes]
     return {"causes": tuple(causes), "tried": tried, "known": len(candidates)}
+
+
+def _with_rest(cause: LayerCause, part: float) -> LayerCause:
+    """A cause that says which part of the difference it leaves."""
+    rest = f"{cause.sentence}; a cause is missing: {part:.2g} of the difference is left"
+    return dataclasses.replace(cause, sentence=rest)
 
 
 def _trials(name: str, evidence: _Evidence, bars: Array) -> LayerTrials:

@@ -13,6 +13,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.files.scene_sources import options_of, parts_of
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.engine_questions import resolve
+from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
 from proofroll.running.time_budget import TimeBudget
 from proofroll.studies.comparison.default_comparison import OWN_OPTIONS
@@ -29,7 +30,7 @@ def own_path(outcome: Outcome, runner: Runner) -> list[str]:
     """Lines on what the options of a scene's own file do to the motion that is furthest off, and on the rest.
 
     Empty without a judged row of the file's options, and without contacts. Each line has one further option switched,
-    the one that takes most of the error away, or adds least.
+    the one that takes most of the error away, or adds least. It takes what the comparison's budget leaves.
     """
     run = next((run for run in outcome.runs if run.row.short.startswith(OWN_OPTIONS)), None)
     own_options = options_of(Path(parts_of(outcome.comparison.scene)[0])) if run else None
@@ -45,13 +46,15 @@ def own_path(outcome: Outcome, runner: Runner) -> list[str]:
     if off is None:
         return []
     quantity, error, bar = off
-    spec, runs, budget = parse_engine(run.row.engine), 0, TimeBudget(_SECONDS)
+    given = outcome.comparison.budget
+    seconds = _SECONDS if given is None else max(0.0, min(_SECONDS, given - processor_seconds()))
+    spec, runs, budget = parse_engine(run.row.engine), 0, TimeBudget(seconds)
     unit, options = spaced(reference.scene.observables[quantity].unit), dict(spec.options)
     lines = []
     while left and error > bar and runs + len(left) <= _MOST:
-        runs += len(left)
         cases = _cases(run, spec.name, {words: {**options, **changes} for words, changes in left.items()}, runner)
         results = runner.run(cases.values(), budget=budget)
+        runs += sum(result.status is not Status.LEFT_OUT for result in results.values())
         errors = {
             words: _errors(reference, [quantity], case, runner)[quantity][0]
             for words, case in cases.items()

@@ -27,6 +27,7 @@ FIRST = mistake("first", lambda law, _: (3.0, law[1], law[2]))
 SECOND = mistake("second", lambda law, _: (law[0], -1.0, law[2]))
 THIRD = mistake("third", lambda law, size: (law[0], law[1], size * law[2]), sized=True)
 SPOILS = mistake("spoils", lambda law, _: (3.0, 7.0, law[2]))
+BOTH = mistake("both", lambda law, _: (3.0, -1.0, law[2]))
 ADDED = mistake("added", lambda law, _: (law[0] + 1.0, law[1], law[2]))
 TIMES = mistake("times", lambda law, size: (size * law[0], law[1], size * law[2]), sized=True, opposite="other signs")
 
@@ -50,6 +51,11 @@ def test_mistakes_of_separate_columns_are_named_one_by_one(order: tuple[Mistake,
     assert "third 2" in sentence
 
 
+def test_what_closes_most_is_named_first() -> None:
+    """A mistake that closes two columns is named in place of one for each of them."""
+    assert (told((1.0, 1.0, 2.5), FIRST, SECOND, BOTH, THIRD) or ("", ""))[0] == "both + third"
+
+
 def test_two_mistakes_of_the_same_columns_are_a_pair() -> None:
     """A mistake without a size and one whose size fits, of which neither closes the column, do together."""
     assert told((0.5, -1.0, 2.5), ADDED, TIMES) == ("added + times", "added; and times 2")
@@ -59,9 +65,10 @@ def test_two_mistakes_of_the_same_columns_are_a_pair() -> None:
 
 def test_nothing_is_named_that_leaves_a_column_wrong() -> None:
     """What spoils a right column, leaves one wrong, or needs more time than there is, is no cause."""
-    assert told((1.0, -1.0, 2.0), SPOILS, THIRD) is None
+    assert told((1.0, -1.0, 2.0), SPOILS, SECOND, THIRD) is None
     assert told((1.0, 1.0, 2.0), FIRST, SECOND) is None
     assert told((1.0, 1.0, 2.5), FIRST, SECOND, THIRD, time=SearchTime(-math.inf)) is None
+    assert told((0.5, -1.0, 2.5), ADDED, TIMES, time=SearchTime(-math.inf)) is None
 
 
 def test_a_single_mistake_is_left_to_others() -> None:

@@ -175,8 +175,8 @@ def _at_once(G: Array, u: Array, f: Array, blocks: Sequence[Block]) -> Array:
         return change
     held = [*sticking, *(first + 2 for first in slipping)]
     rows, moves = G[held], [f[first : first + 3] / f[first + 2] for first in slipping]
-    along = [rows[:, first : first + 3] @ move for first, move in zip(slipping, moves, strict=True)]
-    parts = np.linalg.lstsq(np.column_stack([rows[:, sticking], *along]), -u[held], rcond=None)[0]
+    slip_columns = [rows[:, first : first + 3] @ move for first, move in zip(slipping, moves, strict=True)]
+    parts = np.linalg.lstsq(np.column_stack([rows[:, sticking], *slip_columns]), -u[held], rcond=None)[0]
     change[sticking] = parts[: len(sticking)]
     for first, move, part in zip(slipping, moves, parts[len(sticking) :], strict=True):
         change[first : first + 3] = part * move
