@@ -89,8 +89,10 @@ def compare(
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.report.terminal.verdicts import verdict_parts
     from proofroll.running.idle_workers import Workers
+    from proofroll.running.process import processor_seconds
     from proofroll.studies.comparison.by_name import comparison_named
 
+    begin = processor_seconds()
     settings = options.with_ground(settings, control, ground)
     comparison, workers = options.controlled(comparison, control), Workers()
     assigned, bounds = options.assignments(settings), tolerance or []
@@ -114,7 +116,8 @@ def compare(
     if not (engine or as_json):
         from proofroll.studies.comparison.own_path import own_path
 
-        options.show_lines(own_path(outcomes[0], runner), widest=WIDTH)
+        spent = processor_seconds() - begin
+        options.show_lines(own_path(outcomes[0], runner, spent), widest=WIDTH)
     raise typer.Exit(exit_code(outcomes))
 
 

@@ -13,7 +13,6 @@ from proofroll.core.verdict import Verdict
 from proofroll.files.scene_sources import options_of, parts_of
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.engine_questions import resolve
-from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
 from proofroll.running.time_budget import TimeBudget
 from proofroll.studies.comparison.default_comparison import OWN_OPTIONS
@@ -26,11 +25,16 @@ _MOST, _SECONDS = 20, 15.0  # runs, and processor time of them [s]
 _JUDGED = {Verdict.AGREES, Verdict.DIFFERS, Verdict.CONVERGES, Verdict.UNCONFIRMED}
 
 
-def own_path(outcome: Outcome, runner: Runner) -> list[str]:
+def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
     """Lines on what the options of a scene's own file do to the motion that is furthest off, and on the rest.
 
     Empty without a judged row of the file's options, and without contacts. Each line has one further option switched,
     the one that takes most of the error away, or adds least. It takes what the comparison's budget leaves.
+
+    Args:
+        outcome: of the comparison.
+        runner: of its cases.
+        spent: processor time of the comparison [s].
     """
     run = next((run for run in outcome.runs if run.row.short.startswith(OWN_OPTIONS)), None)
     own_options = options_of(Path(parts_of(outcome.comparison.scene)[0])) if run else None
@@ -47,7 +51,7 @@ def own_path(outcome: Outcome, runner: Runner) -> list[str]:
         return []
     quantity, error, bar = off
     given = outcome.comparison.budget
-    seconds = _SECONDS if given is None else max(0.0, min(_SECONDS, given - processor_seconds()))
+    seconds = _SECONDS if given is None else max(0.0, min(_SECONDS, given - spent))
     spec, runs, budget = parse_engine(run.row.engine), 0, TimeBudget(seconds)
     unit, options = spaced(reference.scene.observables[quantity].unit), dict(spec.options)
     lines = []

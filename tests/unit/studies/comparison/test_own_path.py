@@ -39,9 +39,19 @@ def test_the_first_row_is_the_file(robot: tuple[Path, Path]) -> None:
     assert row.short == "the file's own options"
 
 
-def test_softness_is_what_is_off(proofroll: Proofroll, robot: tuple[Path, Path], tmp_path: Path) -> None:
-    """A ball that only falls on the floor is off by its soft contact, which the first line takes away."""
+def test_softness_is_what_is_off(
+    proofroll: Proofroll, robot: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A ball that only falls on the floor is off by its soft contact, which the first line takes away.
+
+    Without time for it nothing is tried: no run is counted, and what was not tried is named.
+    """
     words = ("--control", str(robot[1]), "--until", "0.16", "--out", str(tmp_path / "out"))
+    with monkeypatch.context() as patch:
+        patch.setattr("proofroll.studies.comparison.own_path._SECONDS", 0.0)
+        out = " ".join(proofroll("compare", str(robot[0]), *words)[1].split())
+    assert "(0 runs): rest: " in out
+    assert "; not tried: hard contacts in place of soft ones; " in out
     code, out, _ = proofroll("compare", str(robot[0]), *words)
     assert code == 0
     text = " ".join(out.split())
