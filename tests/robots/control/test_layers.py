@@ -47,7 +47,7 @@ def test_what_rounding_leaves_hides_no_armature() -> None:
     assert layer.causes[0].size == pytest.approx(0.0, abs=0.1)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_orders_of_a_robot_of_a_package() -> None:
     """Each other order of the joints of solo12 is named where its actions act, and a clean record of it holds."""
     robot = solo12()

@@ -62,7 +62,7 @@ def record(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> Callable[..
 @pytest.mark.parametrize(
     ("program", "name", "base"),
     [
-        ("mujoco", "arm.urdf", "fixed"),
+        pytest.param("mujoco", "arm.urdf", "fixed", marks=pytest.mark.nightly),
         ("isaaclab", "legs.urdf", "free"),
         pytest.param("mujoco", "legs.urdf", "free", marks=pytest.mark.nightly),
         pytest.param("isaaclab", "arm.urdf", "fixed", marks=pytest.mark.nightly),
