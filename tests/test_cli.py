@@ -207,7 +207,7 @@ def test_run_for_a_person(proofroll: Proofroll) -> None:
     assert max(map(len, out.splitlines())) <= 80
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_run_tells_events(proofroll: Proofroll) -> None:
     """Each event stands with its bracket; of a long sequence the first ones do, and how many more there are."""
     slips = ["run", "sphere_in_cylinder", "--engine", "truth", "--set", "mu_static=0.15"]
@@ -736,7 +736,7 @@ def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
         assert ("attitude.w " in out) == bool(asked)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_ladder(proofroll: Proofroll, tmp_path: Path) -> None:
     """The ladder is two tables and sentences within 100 columns, or one JSON document; a missing engine exits 3."""
     arguments = ["ladder", "sphere_in_cylinder", "--engine", "laddered", "--until", "0.1", "--out", str(tmp_path)]

@@ -220,7 +220,7 @@ def test_a_robot_of_the_gallery():
     assert float(np.abs(run.positions - truth(scene, times).positions).max()) < 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_is_advised_is_followed_to_the_end(
     proofroll: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -315,7 +315,7 @@ def test_what_no_file_has_is_named_with_what_it_explains(name: str, judged: Judg
     assert layer.causes[0].after < 1e-6 < layer.residual  # type: ignore[operator]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_payload_shows_in_states_alone(judged: Judged) -> None:
     """A payload is named with its mass and place from states alone."""
     judgement = judged(only(recorded("payload")))

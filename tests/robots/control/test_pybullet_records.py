@@ -62,11 +62,7 @@ def test_columns_are_explained(name: str) -> None:
 @pytest.mark.drill
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=() if name == "air" else pytest.mark.nightly)
-        for name in NAMED
-        if name != "defaults"
-    ],
+    [pytest.param(name, marks=() if name == "air" else pytest.mark.nightly) for name in NAMED if name != "defaults"],
 )
 def test_arrays_of_pybullet_have_its_frame(name: str, tmp_path: Path) -> None:
     """Arrays under PyBullet's names: the frame of its base is no mistake, and the rest is named as before."""

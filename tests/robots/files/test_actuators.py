@@ -66,7 +66,7 @@ def test_efforts_are_those_of_the_file(tmp_path, actuators, flag, keyframe):
     assert load_scene(str(path)).elements[0].mechanism.actuators == ()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_arm_of_a_file_moves_under_its_servos(tmp_path):
     """A robot whose servos act has a truth, which MuJoCo's run of the scene agrees with."""
     path = tmp_path / "arm.xml"

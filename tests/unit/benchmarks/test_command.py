@@ -41,7 +41,7 @@ def proofroll(
     return run
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_adapters_json(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--json`` has a ratio with its interval for the engine that was asked for, and says of each row what it is."""
     kept = tmp_path / "bench.json"

@@ -288,7 +288,7 @@ def test_an_address_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sys.warnoptions[-1:] != ["ignore"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_ctrl_c(tmp_path: Path, room: Path) -> None:
     """Ctrl-C ends the command, its cluster and the process of the case, with one line."""
     (tmp_path / "waits.toml").write_text(

@@ -155,6 +155,7 @@ def test_infinitely_many_impacts_end_when_their_sum_says() -> None:
     assert found.pressed[1, 0, 2] == pytest.approx(0.517 * 9.81, abs=DIGITS)
 
 
+@pytest.mark.nightly_of("0.2")
 @pytest.mark.drill
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_the_error_of_rebounds_cut_short_is_within_the_bars(friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -612,7 +613,7 @@ def test_a_pendulum_rebounds_from_a_wall_by_newtons_law_whatever_the_friction() 
     assert bar["slip.hit"] >= bar["v.hinge"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_capsule_slides_and_rolls_on_both_its_ends() -> None:
     """Its ends share what holds them along its axis in many ways; its motion is the one of a roller all the same."""
     mass, inertia, radius, mu = 0.5, 6e-4, 0.05, 0.3

@@ -157,7 +157,7 @@ def test_the_bar_has_what_round_off_grows_to(scene, monkeypatch):
     assert found.bars["p_WB"][-1] > 1e-2 * NUDGE / BESIDE
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_growth_is_the_same_by_another_arithmetic(scene, monkeypatch):
     """Taylor series and DOP853 tell how motions part to one in ten thousand, so that no horizon flips between them."""
     pytest.importorskip("heyoka")
@@ -414,7 +414,7 @@ def test_routes_that_start_apart_are_an_error_of_ours(scene, monkeypatch):
     assert "singular" not in str(refused.value)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_energy_of_a_wound_spring_needs_no_more_samples_than_asked_for(monkeypatch):
     """A spring on the fast axis of a universal joint holds its energy at four samples over ten turns."""
     monkeypatch.setattr(maximal_taylor, "heyoka", None)

@@ -107,7 +107,7 @@ def test_a_quick_map_does_not_make_runs_that_are_foretold_to_be_long(small: Any)
     assert point.ladder[coarsest] / point.ladder[max(made)] <= 8 < point.ladder[coarsest] / point.ladder[max(made) + 1]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_checks_the_truth_is_mapped_on_request(tmp_path: Path) -> None:
     """Without names its formulations are absent with a sentence; by its name it is on the map."""
     axis = dataclasses.replace(SPEED, values=[2.0])

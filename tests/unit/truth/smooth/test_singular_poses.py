@@ -137,6 +137,7 @@ def test_a_slip_from_rest_that_ends_at_a_singular_pose_starts_at_rest():
     assert found.bars["v_WB"].max() < 1e-11
 
 
+@pytest.mark.nightly_of("contact")
 @pytest.mark.drill
 @pytest.mark.parametrize("mechanism", [parallelogram(0.1), pushed_ball()], ids=["smooth", "contact"])
 def test_a_truth_that_ends_before_all_times_is_refused_for_the_reason_of_its_end(mechanism):

@@ -62,7 +62,7 @@ def test_series_leave_round_off(rolling_resistance: float, asks: tuple[str, ...]
     assert ("attitude" in found) == bool(asks)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 def test_ten_thousand_oscillations() -> None:
     """The height is known to a millionth of a radius after 10,000 oscillations."""
