@@ -14,13 +14,12 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
+import seldom
 
 VARIABLE = "PROOFROLL_NO_DEAR"
 # Processor time [s] above which a test is a drill (CONTRIBUTING.md), on a processor that takes LOOP [s] for the loop.
 LIMIT = 1.0
 LOOP = 0.008
-# Folder of tests -> mark of its drills, which .ci/run leaves out where nothing changed of what they hold.
-_SELDOM = {"conformance": "drill_of_the_judge", "meta": "drill_of_the_judge", "robots": "drill_of_robots"}
 # Largest number of tests named in the line.
 _MOST = 10
 _BEGAN = pytest.StashKey[float]()
@@ -84,11 +83,11 @@ def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
         drills, nightly, daily = (_names(item, mark) for mark in ("drill_of", "nightly_of", "daily"))
         if names := drills | nightly | daily:
             named[function] = names
-        if case in nightly or daily and case not in daily:
+        if case in nightly or (daily and case not in daily):
             item.add_marker("nightly")
         if case in drills or item.get_closest_marker("nightly"):
             item.add_marker("drill")
-        if item.get_closest_marker("drill") and (mark := _SELDOM.get(item.nodeid.split("/")[1])):
+        if item.get_closest_marker("drill") and (mark := seldom.mark_of(item.nodeid)):
             item.add_marker(mark)
     whole = not any("[" in argument for argument in config.args)
     for function, names in named.items() if whole else ():
