@@ -267,7 +267,7 @@ def _honest_scene(name: str) -> tuple[Scene, Any]:
     return scene_of(name) if name in UNTIL else load_scene(name), Jointed
 
 
-@pytest.mark.nightly_of("sled-implicit_euler", "chain-order_1")
+@pytest.mark.nightly_of("sled-implicit_euler", "chain-order_1", "oscillators-implicit_euler")
 @pytest.mark.drill_of("oscillators-order_4")
 @pytest.mark.parametrize(("name", "formulation"), HONEST)
 def test_an_honest_engine(name: str, formulation: str) -> None:

@@ -149,13 +149,9 @@ def test_a_right_record_of_another_program_holds(program: str, digits: str, judg
         assert all(layer.residual is not None and layer.residual < 1e-9 for layer in layers)
 
 
+@pytest.mark.nightly_of("pinocchio-3-dry friction", "pinocchio-single-xyzw", "pinocchio--relative coordinates")
 @pytest.mark.drill_of(
-    "pinocchio-single-xyzw",
-    "mujoco-single-gravity 9.80",
-    "mujoco-3-damping",
-    "pinocchio--no armature",
-    "pinocchio-3-dry friction",
-    "pinocchio--two instants late",
+    "mujoco-single-gravity 9.80", "mujoco-3-damping", "pinocchio--no armature", "pinocchio--two instants late"
 )
 @pytest.mark.parametrize(("program", "digits", "name"), ALL)
 def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: str, judged: Judged) -> None:
@@ -357,7 +353,7 @@ def test_states_alone_tell_a_mistake(
     assert said in " ".join(out.split())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_search_that_ran_out_of_time_decides_nothing(
     proofroll: Proofroll, legs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

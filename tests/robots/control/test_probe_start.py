@@ -126,7 +126,7 @@ def test_a_probe_of_an_mjcf(proofroll: Proofroll, record: Callable[..., list[str
     assert np.abs(hip).max() < np.radians(40)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("masses", [(2.1, 2.121), pytest.param((2.1, 2.079), marks=pytest.mark.nightly)])
 def test_a_link_on_a_fixed_axis(
     masses: tuple[float, float], proofroll: Proofroll, record: Callable[..., list[str]]

@@ -50,8 +50,8 @@ def arrays(name: str, folder: Path) -> Path:
     return folder / f"{name}.npz"
 
 
-@pytest.mark.drill_of("air", "honest", "stop")
-@pytest.mark.nightly_of("defaults", "servos")
+@pytest.mark.drill_of("air", "stop")
+@pytest.mark.nightly_of("defaults", "servos", "honest")
 @pytest.mark.parametrize("name", NAMED)
 def test_columns_are_explained(name: str) -> None:
     """Columns under our names: each setting that PyBullet's user left is named, and nothing besides."""
@@ -101,7 +101,7 @@ def test_searches_of_a_record_share_one_time(monkeypatch: pytest.MonkeyPatch) ->
     assert "the search for robots as importers read it ended after" in layer.reason
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("known", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_steps_that_are_assumed_are_told(known: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where forces differ and the file has no ``sim_dt``, the answer says that PyBullet's usual step was assumed.

@@ -183,6 +183,7 @@ def test_friction_and_stops_beside_a_motion_switch_alike() -> None:
     assert np.abs(run["drive.shaker"].to_numpy() - truth.record.named[:, 0])[1:].max() < 1e-8
 
 
+@pytest.mark.nightly_of("3.0")
 @pytest.mark.drill
 @pytest.mark.parametrize("angle", [0.3, pytest.param(3.0, marks=pytest.mark.drill)])
 def test_a_motion_that_leaves_nothing_free_holds_its_laws(angle: float) -> None:

@@ -361,6 +361,7 @@ def mujoco_distances(shapes: tuple[Geometry, ...], found: TwoRouteMotion) -> lis
 TUMBLE_FIRST = {("box", 1), ("capsule", 0)}
 
 
+@pytest.mark.nightly_of("box-1-False")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("other", "seed", "swapped"),

@@ -411,7 +411,7 @@ def sliding_box(
     return Mechanism((box,), (free,), gravity=gravity, geometries=shapes, pairs=pairs)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_slides_straight_on_four_corners_stops_where_coulomb_says() -> None:
     """Friction brakes it by mu g however its corners share the load; what each of them carries is not told."""
     found = truth_of(sliding_box((0.8, 0.6)), np.array([0.0, 0.1, 0.5]))

@@ -156,6 +156,7 @@ def test_a_coefficient_below_zero_is_refused_by_its_name() -> None:
         law(spinning_friction=-1.0)
 
 
+@pytest.mark.nightly_of("laws3-velocity3-0.06-0.0")
 @pytest.mark.parametrize(
     ("laws", "velocity", "height", "slope"),
     [

@@ -50,7 +50,8 @@ def test_closed_form_of_the_paper(speed: float) -> None:
         assert found[name].to_numpy() == pytest.approx(values, rel=1e-12, abs=1e-12), name
 
 
-@pytest.mark.drill_of("0.0-asks1", "0.0005-asks1")
+@pytest.mark.nightly_of("0.0005-asks1")
+@pytest.mark.drill_of("0.0-asks1")
 @pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 @pytest.mark.parametrize("asks", [(), ("orientation",)])
 @pytest.mark.parametrize("rolling_resistance", [0.0, 5e-4])
