@@ -475,6 +475,7 @@ def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
     assert opened.messages == []
 
 
+@pytest.mark.nightly_of("three.js")
 @pytest.mark.drill
 @pytest.mark.parametrize("lacking", ["WebGL", "three.js"])
 def test_without_a_picture_the_values_follow_the_time(
@@ -495,6 +496,7 @@ def test_without_a_picture_the_values_follow_the_time(
         assert opened.messages == []
 
 
+@pytest.mark.nightly_of("projection-False")
 @pytest.mark.drill
 @pytest.mark.parametrize(("engine", "hidden"), [("truth", True), ("projection", False)])
 def test_a_run_alone_has_no_table_of_ghosts(

@@ -79,7 +79,7 @@ def test_an_engine_that_does_not_exist(proofroll: Proofroll, command: str) -> No
     assert err.count("\n") == 1
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers  # what a first answer costs is measured
 def test_study(proofroll: Proofroll, capfd: pytest.CaptureFixture[str]) -> None:
     """``--json`` has the part outside the engines, shares that add up, all cases, and what a first answer costs.

@@ -87,6 +87,7 @@ TENDON = """<mujoco><worldbody>
 <tendon><spatial stiffness="20"><site site="t"/><site site="s"/></spatial></tendon></mujoco>"""
 
 
+@pytest.mark.nightly_of("asked1")
 @pytest.mark.drill
 @pytest.mark.parametrize("asked", [(), ("--engine", "mujoco")])
 def test_what_no_engine_takes_has_a_row_of_each_with_its_reason(

@@ -65,8 +65,10 @@ def test_each_engine_has_both_laws(engine: str, law: str, true_spins: dict[str, 
 
 
 @drill
-@pytest.mark.parametrize("rate", [4, 0])
-@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize(
+    ("first", "rate"),
+    [(True, 4), (False, 0), *(pytest.param(*case, marks=pytest.mark.nightly) for case in ((True, 0), (False, 4)))],
+)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_motion_is_that_over_a_plane_that_turns(engine: str, first: bool, rate: float) -> None:
     """On a turntable each engine resists the motion relative to it, whichever of the two the pair names first."""
