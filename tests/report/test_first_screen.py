@@ -103,7 +103,7 @@ def test_nothing_moves_while_the_page_loads(report_page: Path, visit: Visiting, 
         assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_lines_for_a_model_are_copied(report_page: Path, visit: Visiting) -> None:
     """A card's fold has a command and a test of the engine to take, each with a button that copies it."""
     copied = "window.copied = []; navigator.clipboard.writeText = async (text) => { copied.push(text); };"

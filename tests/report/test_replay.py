@@ -385,7 +385,7 @@ def test_the_replay_plays(written: Any, replayed: Visit) -> None:
     assert opened.requested == [(written[1] / "report.html").as_uri()]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_errors_of_ghosts_stand_below_the_picture(
     made: Any, content: ReportContent, tmp_path: Path, visit: Visiting
 ) -> None:
@@ -419,7 +419,7 @@ def test_errors_of_ghosts_stand_below_the_picture(
         assert opened.messages == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_case_opens_at_the_largest_error_in_sight(
     made: Any, content: ReportContent, tmp_path: Path, visit: Visiting
 ) -> None:

@@ -85,6 +85,7 @@ def test_a_robot_moves_as_its_file_says(robot, name):
         assert found[at] == pytest.approx(want, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.nightly_of("arm.urdf")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", FILES)
 def test_engines_follow_the_truth_of_a_robot(robot, name, monkeypatch):

@@ -83,7 +83,7 @@ def test_search_leaves_out_what_an_engine_can_do_without() -> None:
     assert list(searching._without(terms, "b", settings | {"exact": False, "damping": 0.0})) == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @needs_heyoka
 def test_bulk_is_checked_against_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """The error of the first slips in bulk is round-off, and a single wrong one shows."""

@@ -25,7 +25,7 @@ def test_shares_add_up() -> None:
     assert found["within_goal"] is False
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_case_says_where_its_time_went(
     tmp_path: Path, make_case: Callable[..., Case], install_engines: Callable[[Mapping[str, str]], None]
 ) -> None:

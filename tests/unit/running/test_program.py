@@ -55,7 +55,7 @@ def built(name: str, scene: str = "pendulum", **options: Any) -> Any:
     return kind.build(load_scene(scene), resolve_settings(kind, options))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_program_in_perl_is_judged(proofroll: Callable[..., Any], tmp_path: Path) -> None:
     """The example agrees with the truth, at the order that it declares."""
     claim = tmp_path / "rod.toml"

@@ -132,7 +132,7 @@ def test_a_run_that_met_the_limit_of_time_contradicts_nothing() -> None:
     assert "limit of time" in claim.untested(late)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
     """What has neither step nor tolerance is named with the reason, and its neighbour is mapped by its tolerance."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
