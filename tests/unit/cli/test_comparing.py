@@ -16,7 +16,7 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.running.time_budget import TimeBudget
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_each_engine_is_started_once(
     tmp_path: Path,
