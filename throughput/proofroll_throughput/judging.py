@@ -127,7 +127,6 @@ def twins_apart(judged: Sequence[JudgedCopies]) -> float | None:
         groups = [item for item in judged if item.index == index and item.curve is not None]
         if sum(len(item.copies) for item in groups) < 2:
             continue
-        base = groups[0].curve
-        differences = [largest_difference(base, item.curve) for item in groups if base is not None and item.curve is not None]
-        apart = max(apart or 0.0, *differences)
+        curves = [item.curve for item in groups if item.curve is not None]
+        apart = max(apart or 0.0, *(largest_difference(curves[0], curve) for curve in curves))
     return apart

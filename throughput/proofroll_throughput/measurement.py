@@ -23,7 +23,7 @@ from proofroll.running.case import Case
 from proofroll.running.loading import engine_and_settings, scene_of
 
 CPU = "cpu"
-# Processor time of the clean runs of a row [s], and the most of them; the least counts, as other processes empty caches.
+# Processor time of the clean runs of a row [s], and the most of them; the least counts: others empty the caches.
 _ENOUGH, _MOST_RUNS = 0.3, 5
 
 Arrays = dict[str, npt.NDArray[np.float64]]

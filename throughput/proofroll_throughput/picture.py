@@ -82,7 +82,8 @@ def drawn(result: Throughput) -> Figure:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("copies × steps in a second of processor time")
-    axes.set_ylabel(f"error of the worst copy in {result.quantity}" + ("" if result.unit == "1" else f" [{result.unit}]"))
+    unit = "" if result.unit == "1" else f" [{result.unit}]"
+    axes.set_ylabel(f"error of the worst copy in {result.quantity}{unit}")
     axes.grid(alpha=0.25)
     axes.set_title(title(result), fontsize=9)
     if shown:

@@ -197,7 +197,7 @@ def make_throughput(
         unit=scenes[0].observables[quantity].unit,
         error_bar=max(bars),
         rows=tuple(rows),
-        date=date.today().isoformat(),  # noqa: DTZ011 -- the day of the person who measures
+        date=date.today().isoformat(),
         machine=machine(),
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -63,4 +64,4 @@ def test_values_have_equally_many_copies(copies: int) -> None:
     assert len(pattern) == copies
     assert numbers.max() - numbers.min() <= 1
     assert pattern_of(1, 8) == [4]
-    assert all(value != following for value, following in zip(pattern, pattern[1:], strict=False))
+    assert all(value != following for value, following in pairwise(pattern))
