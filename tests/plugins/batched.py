@@ -51,7 +51,7 @@ class Batched(Mujoco):
 
 
 class MixedCopies(Copies):
-    """Copies of which each has a thousandth of its neighbour's angular velocity."""
+    """Copies that each add a thousandth of their neighbour's angular velocity."""
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine_abilities.Batch`."""

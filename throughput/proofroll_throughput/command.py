@@ -19,22 +19,24 @@ if TYPE_CHECKING:
 
 def throughput(
     scene: options.SceneName,
-    vary: Annotated[str, typer.Option(help="Parameter in which copies differ, e.g. angle=0.5:2.5, or …:16 values.")],
+    vary: Annotated[str, typer.Option(help="Range of a parameter, e.g. angle=0.5:2.5")],
     copies: Annotated[str, typer.Option(help="Numbers of copies.")] = "1,16,256",
     engine: Annotated[
         list[str] | None,
         typer.Option(help="Engine, e.g. mjx[integrator=RK4]; repeat.", autocompletion=options.engines_like),
     ] = None,
     step: Annotated[list[float] | None, typer.Option(help="Fixed step [s]; repeat.")] = None,
-    settings: options.Set = None,
-    until: options.Until = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="Another parameter, parameter=value; repeat.")
+    ] = None,
+    until: Annotated[float | None, typer.Option(help="Last time [s]; by default as of proofroll run.")] = None,
     every: Annotated[float | None, typer.Option(help="Interval between judged samples [s].")] = None,
     quantity: Annotated[str | None, typer.Option(help="Observable of the errors, e.g. q.elbow.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw error against speed to this file: svg, png, pdf.")] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the truths; stored ones are reused.")] = Path("out"),
+    out: Annotated[Path, typer.Option(help="Folder of the stored truths.")] = Path("out"),
     as_json: options.Json = False,
 ) -> None:
-    """Move many copies of a scene in engines: error of the worst copy, and cost of each. In processor time."""
+    """Move many copies of a scene; show worst error and cost. Each copy has its own truth; costs are processor time."""
     from proofroll_throughput.picture import draw, require_picture
     from proofroll_throughput.study import Question, make_throughput
     from proofroll_throughput.variation import counts_of, variation_of

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from proofroll import InputError, Refused
-from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import columns_of, off_grid_apart
 from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
@@ -28,15 +28,15 @@ class JudgedCopies:
     Attributes:
         index: of the scene.
         copies: their numbers.
-        error: largest distance from the truth; infinite where a state is not finite.
-        curve: values of the judged observable; None: a state is not finite.
+        states: arrays of their states, with the times as first axis.
+        error: largest distance from the truth; None: a state is not finite.
         failure: sentence with which a run ended early; empty: none did.
     """
 
     index: int
     copies: list[int]
-    error: float
-    curve: FloatArray | None
+    states: Mapping[str, FloatArray]
+    error: float | None
     failure: str = ""
 
 
@@ -97,36 +97,50 @@ def judged_copies(
     for number, group in enumerate(groups):
         with np.load(folder / f"{number}.npz", allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-        index, copies, failure = int(group["case"]), list(group["copies"]), str(group["failure"])
-        if not all(np.all(np.isfinite(arrays[name])) for name in Sample.widths if name in arrays):
-            judged.append(JudgedCopies(index, copies, np.inf, None, failure))
-            continue
-        error, curve = _error(arrays, references[index], times, quantity)
-        judged.append(JudgedCopies(index, copies, error, curve, failure))
+        index = int(group["case"])
+        states = {name: arrays[name] for name in Sample.widths if name in arrays}
+        finite = all(np.all(np.isfinite(values)) for values in states.values())
+        judged.append(
+            JudgedCopies(
+                index=index,
+                copies=list(group["copies"]),
+                states=states,
+                error=_error(arrays, references[index], times, quantity) if finite else None,
+                failure=str(group["failure"]),
+            )
+        )
     return judged
 
 
 def _error(
     arrays: Mapping[str, FloatArray], reference: Reference, times: tuple[FloatArray, FloatArray], quantity: str
-) -> tuple[float, FloatArray]:
-    """Error of one copy and the values of the judged observable."""
+) -> float:
+    """Error of one copy in the judged observable."""
     scene, (sampled, asked) = reference.scene, times
     kind = scene.elements[0].sample_type
     samples = [kind(**{name: values[index] for name, values in arrays.items()}) for index in range(len(sampled))]
     columns = off_grid_apart(scene, columns_of(scene, sampled, samples), asked, sampled[:0])
-    errors, _, curves, _ = errors_of(columns.dataset(), reference, whole=True)
+    errors = errors_of(columns.dataset(), reference, whole=True)[0]
     if quantity not in errors:
         raise Refused(f"it does not give {quantity}")
-    return errors[quantity], curves[quantity]
+    return errors[quantity]
 
 
 def twins_apart(judged: Sequence[JudgedCopies]) -> float | None:
-    """Largest difference of finite copies of one scene in the judged observable; None: no scene has two copies."""
+    """Largest difference of finite copies of one scene, of the largest number in an array of their states.
+
+    None: no scene has two such copies.
+    """
     apart: float | None = None
     for index in {item.index for item in judged}:
-        groups = [item for item in judged if item.index == index and item.curve is not None]
+        groups = [item for item in judged if item.index == index and item.error is not None]
         if sum(len(item.copies) for item in groups) < 2:
             continue
-        curves = [item.curve for item in groups if item.curve is not None]
-        apart = max(apart or 0.0, *(largest_difference(curves[0], curve) for curve in curves))
+        base = groups[0].states
+        differences = [
+            float(np.max(np.abs(item.states[name] - values)) / (np.max(np.abs(values)) or 1.0))
+            for item in groups[1:]
+            for name, values in base.items()
+        ]
+        apart = max(apart or 0.0, *differences, 0.0)
     return apart

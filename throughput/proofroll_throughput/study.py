@@ -54,7 +54,8 @@ class ThroughputRow:
         worst_copy: its number.
         worst_value: its value of the parameter.
         median: error that half of these copies do not exceed.
-        twins_apart: largest difference of copies of one scene in the judged quantity; None: no scene has two.
+        twins_apart: largest difference of copies of one scene, of the largest number in an array of their states [1];
+            None: no scene has two.
         not_finite: number of copies whose states are not finite to the end.
         microseconds: processor time of a copy and step [µs]; None: no fixed step, or no processor.
         seconds_per_second: processor time of a copy and simulated second [s/s]; None: no processor.
@@ -176,7 +177,9 @@ def make_throughput(
     if any(quantity not in reference.curves for reference in references):
         raise InputError("--quantity", quantity, "the truth does not determine it; choose another one")
     bars = [reference.true(quantity, reference.curves[quantity]).error_bar for reference in references]
-    measuring = _Measuring(references, values, times, quantity, asked.time_limit)
+    measuring = _Measuring(
+        references=references, values=values, times=times, quantity=quantity, time_limit=asked.time_limit
+    )
     rows: list[ThroughputRow] = []
     for row, facts in settings:
         if facts is None:
@@ -315,8 +318,8 @@ class _Measuring:
     def _judged(self, row: ThroughputRow, answer: Mapping[str, Any], judged: Sequence[JudgedCopies]) -> ThroughputRow:
         """Row with the errors of its copies and their cost."""
         count = sum(len(item.copies) for item in judged)
-        finite = sorted((item for item in judged if item.curve is not None), key=lambda item: item.error)
-        errors = [item.error for item in finite for _ in item.copies]
+        finite = sorted((item.error, item.index, item.copies) for item in judged if item.error is not None)
+        errors = [error for error, _, copies in finite for _ in copies]
         row = replace(
             row,
             device=answer["device"],
@@ -328,13 +331,9 @@ class _Measuring:
             seconds_before=answer["seconds_before"],
         )
         if finite:
-            row = replace(
-                row,
-                worst=finite[-1].error,
-                worst_copy=finite[-1].copies[0],
-                worst_value=self.values[finite[-1].index],
-                median=float(np.median(errors)),
-            )
+            worst, index, copies = finite[-1]
+            value, median = self.values[index], float(np.median(errors))
+            row = replace(row, worst=worst, worst_copy=copies[0], worst_value=value, median=median)
         if row.device != CPU:
             return replace(row, message=f"processor time does not measure {row.device}")
         seconds, steps = answer["seconds"] / count, answer["steps"]

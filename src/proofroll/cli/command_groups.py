@@ -39,6 +39,10 @@ class GroupedCommands(TyperGroup):
         """Words behind the program's name; the options are among them, as they have no list."""
         return ["[--version]", "COMMAND", "[ARGS]...", "[--help]"]
 
+    def format_help_text(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 -- of the base
+        """Writes what the commands answer below the usage, without an empty line, which a screen lacks."""
+        formatter.write(f"{self.help}\n")
+
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Writes a line for each command, with the title of its group beside the first."""
         left = dict.fromkeys(self.list_commands(ctx))

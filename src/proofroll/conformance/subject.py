@@ -47,7 +47,7 @@ def contrasts() -> dict[str, tuple[Scene, Scene]]:
 
 
 def alike_scenes() -> dict[str, Sequence[Scene]]:
-    """Scenes of one structure with other numbers, the last of which overflows, of kinds that have such, by name."""
+    """Scenes of one structure, the last one with velocities that overflow, of kinds that have such, by name."""
     kinds = [kind for kind in load_element_kinds() if hasattr(kind, "alike_scenes")]
     return {name: scenes for kind in kinds for name, scenes in _made(kind.alike_scenes).items()}
 

@@ -54,7 +54,7 @@ class RunsBatches(Protocol):
 
     @classmethod
     def build_batch(cls, scenes: Sequence[Scene], pattern: Sequence[int], settings: Any) -> Batch:
-        """Copies at time 0: of one structure are the ``scenes``, of which ``pattern`` has one's index for each copy.
+        """Copies at time 0: the ``scenes`` have one structure, and ``pattern`` is the index of one for each copy.
 
         Raises:
             Refused: the engine cannot move such scenes together; the text says why.

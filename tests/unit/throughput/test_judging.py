@@ -43,15 +43,16 @@ RESULT = Throughput(
 
 
 def copies(index: int, numbers: list[int], *values: float) -> JudgedCopies:
-    """Copies with the same bits, whose judged observable has these values."""
-    return JudgedCopies(index, numbers, 0.0, np.array(values))
+    """Copies with the same bits, which have these places."""
+    states = {"p_WB": np.array(values), "v_WB": np.zeros(len(values))}
+    return JudgedCopies(index=index, copies=numbers, states=states, error=0.0)
 
 
 def test_twins_are_copies_of_one_scene() -> None:
     """Copies of one scene are compared in all samples; one copy of each has no twin, and equal bits are 0 apart."""
     assert twins_apart([copies(0, [0], 1.0), copies(1, [1], 2.0)]) is None
     assert twins_apart([copies(0, [0, 2], 1.0), copies(1, [1], 2.0)]) == 0.0
-    assert twins_apart([copies(0, [0, 2], 1.0, 3.0), copies(0, [4], 1.5, 3.0), copies(1, [1], 9.0, 9.0)]) == 0.5
+    assert twins_apart([copies(0, [0, 2], 1.0, 4.0), copies(0, [4], 1.5, 4.0), copies(1, [1], 9.0, 9.0)]) == 0.125
 
 
 def test_copies_with_the_same_bits_are_written_once(tmp_path: Path) -> None:
@@ -78,6 +79,7 @@ def test_what_failed_has_a_line_of_its_own() -> None:
     assert "1e-12 rad" in heading(result)
 
 
+@pytest.mark.drill
 def test_the_picture_names_scene_device_and_date() -> None:
     """Title and axes tell what was measured on what; a row without an error is no point."""
     pytest.importorskip("matplotlib")

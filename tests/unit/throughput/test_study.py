@@ -50,9 +50,9 @@ def test_copies_cost_and_err_as_single_runs(rows: Callable[..., list[dict[str, A
 
 @pytest.mark.drill
 def test_a_copy_that_reads_its_neighbour_shows(rows: Callable[..., list[dict[str, Any]]]) -> None:
-    """Twins with other neighbours end apart, by as much as the error of the worst of them at least."""
+    """Twins with other neighbours end apart, though places, which are judged, are right."""
     (row,) = rows("7", "mixing")
-    assert row["twins_apart"] > 0
+    assert 1e-5 < row["twins_apart"] < 1e-2
 
 
 @pytest.mark.drill

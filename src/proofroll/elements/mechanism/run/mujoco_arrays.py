@@ -36,8 +36,8 @@ class MujocoArrays:
         """State of the bodies.
 
         Args:
-            read: array of MjData by its name: ``xpos``, ``xquat``, ``cvel`` and ``subtree_com``, of one state, or with the
-                copies of a batch in front.
+            read: array of MjData by its name: ``xpos``, ``xquat``, ``cvel`` and ``subtree_com``, of one state or, with
+                the copies in front, of a batch.
         """
         names = ("xpos", "xquat", "cvel", "subtree_com")
         origins, turned, twists, centres = (np.array(read(name), float) for name in names)
