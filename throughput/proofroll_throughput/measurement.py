@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -121,7 +121,7 @@ def measured(cases: list[dict[str, Any]], pattern: list[int], times: list[float]
     kind, settings = engine_and_settings(asked[0])
     scenes, step, clock = [scene_of(case) for case in asked], fixed_step(settings), time.process_time
     copies, why = pattern, _why_in_turn(kind, scenes[0], settings)
-    make: partial[_Copies] = partial(_Together, kind, scenes, pattern, settings)
+    make: Callable[[], _Copies] = partial(_Together, kind, scenes, pattern, settings)
     begin = clock()
     if not why:
         try:
@@ -183,7 +183,7 @@ def _written(
     for number, index in enumerate(pattern):
         bits = b"".join(np.ascontiguousarray(values[number]).tobytes() for values in whole.values())
         groups.setdefault((index, bits), []).append(number)
-    answers = []
+    answers: list[dict[str, Any]] = []
     for (index, _), numbers in groups.items():
         chosen: dict[str, Any] = {name: values[numbers[0]] for name, values in whole.items()}
         np.savez(folder / f"{len(answers)}.npz", **chosen)

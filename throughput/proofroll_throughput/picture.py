@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -66,19 +67,17 @@ def drawn(result: Throughput) -> Figure:
         rows = list(group)
         engine = rows[0].engine.partition("[")[0]
         number = lines[engine] = lines.get(engine, -1) + 1
+        places = [(row.rate or math.nan, row.worst or math.nan) for row in rows]
         axes.plot(
-            [row.rate for row in rows],
-            [row.worst for row in rows],
+            *zip(*places, strict=True),
             color=_COLOURS[colours[engine] % len(_COLOURS)],
             linestyle=_LINES[number % len(_LINES)],
             marker=_SIGNS[number % len(_SIGNS)],
             markersize=5,
             label=_label(name, rows),
         )
-        for row in rows:
-            axes.annotate(
-                str(row.copies), (row.rate, row.worst), xytext=(0, 5), textcoords="offset points", ha="center"
-            )
+        for row, place in zip(rows, places, strict=True):
+            axes.annotate(str(row.copies), place, xytext=(0, 5), textcoords="offset points", ha="center")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("copies × steps in a second of processor time")

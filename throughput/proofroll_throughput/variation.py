@@ -51,7 +51,7 @@ def variation_of(text: str, scene: str, settings: Mapping[str, object]) -> Varia
     ends = [scene_of_run(scene, {**settings, parameter: end}).parameters[parameter] for end in (low, others[0])]
     if not ends[0] < ends[1]:
         raise InputError("--vary", text, "the range is empty; write the lower end before the higher one")
-    return Variation(parameter, tuple(np.linspace(*ends, count).tolist()))
+    return Variation(parameter, tuple(np.linspace(ends[0], ends[1], count).tolist()))
 
 
 def counts_of(text: str) -> list[int]:

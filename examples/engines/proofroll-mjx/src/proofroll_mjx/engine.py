@@ -33,6 +33,7 @@ class Mjx:
 
     name: ClassVar[str] = "mjx"
     title: ClassVar[str] = "MJX"
+    witness: ClassVar[bool] = False
     provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, PROVIDES)
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = dict.fromkeys(PRESETS, LACKING)
     settings: ClassVar[type[MjxSettings]] = MjxSettings

@@ -34,6 +34,7 @@ class MujocoWarp:
 
     name: ClassVar[str] = "mujoco_warp"
     title: ClassVar[str] = "MuJoCo Warp"
+    witness: ClassVar[bool] = False
     provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, PROVIDES)
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = dict.fromkeys(PRESETS, LACKING)
     settings: ClassVar[type[MujocoWarpSettings]] = MujocoWarpSettings
