@@ -9,11 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from proofroll.core import multi_element
+from proofroll.core.engine import Sample
+from proofroll.core.errors import Diverged
 from proofroll.running.case import Status
 from proofroll_throughput.judging import JudgedCopies, twins_apart
-from proofroll_throughput.measurement import _written
+from proofroll_throughput.measurement import _InTurn, _written
 from proofroll_throughput.picture import drawn, title
-from proofroll_throughput.study import Throughput, ThroughputRow
+from proofroll_throughput.study import Throughput, ThroughputRow, _Measuring
 from proofroll_throughput.table import closing_lines, heading, table_of
 
 ROW = ThroughputRow(
@@ -90,3 +93,55 @@ def test_the_picture_names_scene_device_and_date() -> None:
     assert axes.get_title() == title(RESULT)
     assert title(RESULT).endswith("cpu: a processor, 2026-11-30")
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+
+
+def measured(device: str, *judged: JudgedCopies) -> ThroughputRow:
+    """Row of copies that take 2 ms for 1000 steps of 1 ms each."""
+    measuring = _Measuring(
+        references=[], values=(0.5, 2.5), times=np.array([0.0, 1.0]), quantity="q.elbow", time_limit=1.0
+    )
+    answer = {"device": device, "why": "", "seconds_before": 3.0, "seconds": 2e-3, "steps": 1000}
+    return measuring._judged(ThroughputRow(engine="x", name="X"), answer, judged)
+
+
+def test_copies_that_are_not_finite_are_counted_and_the_others_judged() -> None:
+    """The worst copy is one with finite states; its number and value are told, and all copies share the cost."""
+    low, high = replace(copies(0, [0, 2], 1.0), error=1e-3), replace(copies(1, [1], 1.0), error=2e-2)
+    failed = replace(copies(1, [3], np.nan), error=None, failure="it gave up at 0.3 s")
+    row = measured("cpu", low, failed, high)
+    assert (row.copies, row.not_finite, row.message) == (4, 1, "it gave up at 0.3 s")
+    assert (row.worst, row.worst_copy, row.worst_value, row.median) == (2e-2, 1, 2.5, 1e-3)
+    assert (row.microseconds, row.seconds_per_second) == (pytest.approx(0.5), pytest.approx(5e-4))
+    assert measured("cpu", failed).worst is None
+
+
+def test_processor_time_tells_no_cost_of_another_device() -> None:
+    """Copies on a GPU are judged, and have no cost in processor time."""
+    row = measured("cuda:0", copies(0, [0], 1.0))
+    assert (row.worst, row.microseconds, row.seconds_per_second) == (0.0, None, None)
+    assert row.message == "processor time does not measure cuda:0"
+
+
+def test_a_run_that_gives_up_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of runs one after the other one that diverges has no states from then on, and keeps its sentence."""
+
+    class Run:
+        def __init__(self, end: float) -> None:
+            self.end = end
+
+        def advance(self, t: float) -> None:
+            if t > self.end:
+                raise Diverged(f"it gave up before {t:g} s")
+
+        def sample(self) -> Sample:
+            return Sample(*np.ones((3, 1, 3)))
+
+    monkeypatch.setattr(multi_element, "build", lambda _, scene, __: Run(scene))
+    copies_in_turn = _InTurn(None, [0.5, 2.0], [0, 1], None)  # type: ignore[list-item]  # ends of runs in place of scenes
+    first = copies_in_turn.arrays()["p_WB"]
+    copies_in_turn.advance(1.0)
+    copies_in_turn.advance(1.5)
+    last = copies_in_turn.arrays()["p_WB"]
+    assert np.all(first == 1.0)
+    assert (np.isnan(last[0]).all(), np.all(last[1] == 1.0)) == (True, True)
+    assert copies_in_turn.failures == {0: "it gave up before 1 s"}

@@ -14,6 +14,8 @@ from proofroll.adapter import Mechanism, MujocoArrays, Scene, mechanism_of
 from proofroll.engines.mujoco import mjspec
 from proofroll_mjx.settings import MjxSettings
 
+_step = jax.jit(mjx.step)  # traced once for all starts of one structure
+
 
 class Start(NamedTuple):
     """A mechanism, the rows of its bodies in arrays, and model and data at time 0."""
@@ -48,4 +50,4 @@ def start_of(scene: Scene, settings: MjxSettings) -> Start:
 
 def kinds_of_step(start: Start) -> Any:
     """Types of the data after a step, which makes of integers others than ``put_data``."""
-    return jax.eval_shape(mjx.step, start.model, start.data)
+    return jax.eval_shape(_step, start.model, start.data)
