@@ -64,6 +64,7 @@ SHORTER = {
     "ladder": ["--rounds", "2"],
     "findings": ["--list"],
     "fuzz": ["--minutes", "1e-3"],  # one scene
+    "throughput": ["--until", "0.05"],
 }
 
 
