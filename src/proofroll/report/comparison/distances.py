@@ -74,7 +74,7 @@ def distances_of(point: str, reference: Reference | None, runs: Mapping[int, Run
     sampled = reference.dataset["time"].to_numpy()
     told = [time for time in _TOLD if time <= sampled[-1]]
     told += [float(sampled[-1])] if len(told) < len(_TOLD) and sampled[-1] not in told else []
-    ends = np.searchsorted(sampled, told, side="right") - 1
+    ends = (np.searchsorted(sampled, told, side="right") - 1).tolist()
     times = sampled[ends].tolist()
     lines = []
     for row, run in runs.items():
@@ -93,7 +93,7 @@ def distances_of(point: str, reference: Reference | None, runs: Mapping[int, Run
     )
 
 
-def _at(growth: FloatArray, ends: Sequence[int], name: str) -> list[float | None]:
+def _at(growth: FloatArray, ends: list[int], name: str) -> list[float | None]:
     """Growth of a distance at some samples; of quaternions the angle."""
     found = [float(growth[end]) if end < len(growth) else None for end in ends]
     return found if name == _PLACES else [None if value is None else _angle(value) for value in found]

@@ -137,8 +137,23 @@ def run_plan(
     budget = TimeBudget(seconds, planned.comparison.spent)
     results: dict[str, Result] = {}
     for cases in planned.stages:
-        results |= runner.run(cases, progress, budget)
+        lost = _without_ladder(planned, results)
+        for case in cases:
+            if progress and case.key in lost:
+                progress(case, lost[case.key])
+        results |= lost | runner.run([case for case in cases if case.key not in lost], progress, budget)
     return results
+
+
+def _without_ladder(planned: Plan, results: Mapping[str, Result]) -> dict[str, Result]:
+    """Results of the further steps of rows whose own step has no result, which nobody asks for then: as that one."""
+    lost: dict[str, Result] = {}
+    for run in planned.runs:
+        result = results.get(run.ladder[1.0].key) if run.ladder else None
+        if result is not None and result.status not in {Status.DONE, Status.LEFT_OUT}:
+            steps = {case.key for case in run.ladder.values()} - results.keys()
+            lost |= dict.fromkeys(steps, Result(result.status, f"not run, as its own step was not: {result.message}"))
+    return lost
 
 
 def affordable(planned: Plan, runner: Runner) -> Plan:
