@@ -59,19 +59,21 @@ def test_distances_are_the_largest_up_to_each_time() -> None:
     item = told(reference(1.0, **{BY_STEPS: "other", HORIZON: "10 mm to the end"}), motion(1.0, (3e-3, 0, 4e-3), TURN))
     assert item is not None
     assert item.times == pytest.approx([0.1, 0.3, 1.0])
-    assert item.places == [1e-3, 2e-3, 2e-3]
-    assert item.turns == pytest.approx([2e-3] * 3, rel=1e-6)
     assert item.horizon == "10 mm to the end"
-    assert item.lines[0].places == pytest.approx([0, 5e-3, 5e-3])
-    assert item.lines[0].turns == pytest.approx([0, 0, TURN])
+    bars, line = item.lines
+    assert (bars.row, line.row) == (None, 0)
+    assert bars.places == [1e-3, 2e-3, 2e-3]
+    assert bars.turns == pytest.approx([2e-3] * 3, rel=1e-6)
+    assert line.places == pytest.approx([0, 5e-3, 5e-3])
+    assert line.turns == pytest.approx([0, 0, TURN])
 
 
 def test_a_run_that_ends_early_is_told_as_far_as_it_goes() -> None:
     """Behind the last sample of a run that diverged it has no distance."""
     item = told(reference(1.0, **{BY_STEPS: "other"}), motion(0.4, (1e-3, 0, 0)))
     assert item is not None
-    assert item.lines[0].places == [0, pytest.approx(1e-3), None]
-    assert item.lines[0].turns == [0, 0, None]
+    assert item.lines[1].places == [0, pytest.approx(1e-3), None]
+    assert item.lines[1].turns == [0, 0, None]
     row, run = SimpleNamespace(engine="other"), SimpleNamespace(row=0, rough_cost=0.5, seconds_per_second=None)
     name = "proofroll.report.comparison.distances.names"
     with pytest.MonkeyPatch.context() as patch:
@@ -86,7 +88,7 @@ def test_nothing_is_told_behind_the_horizon() -> None:
     item = told(reference(0.44, **{BY_STEPS: "other"}), motion(1.0, (1e-3, 0, 0), TURN))
     assert item is not None
     assert item.times == pytest.approx([0.1, 0.3, 0.44])
-    assert item.lines[0].turns == [0, 0, 0]
+    assert item.lines[1].turns == [0, 0, 0]
 
 
 def test_a_truth_has_no_such_table() -> None:

@@ -232,10 +232,9 @@ def _run(
 
 
 def _bars(name: str, coarse: Variable, fine: Variable, times: FloatArray) -> dict[str, Any]:
-    """Attributes with the error bar of a variable: three times its largest last change so far, and at the end.
+    """Attributes with the error bar of a variable at the end, and as it grows; empty: the variable has no times.
 
-    It is inf for velocities, forces and what follows from them: beside a touch no two steps have the same. Empty: the
-    variable has no times.
+    It is inf for velocities, forces and what follows from them: beside a touch no two steps have the same.
     """
     if name == "time" or fine.dims[:1] != ("time",) or fine.values.dtype.kind != "f":
         return {}

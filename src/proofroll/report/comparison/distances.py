@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import HORIZON
 from proofroll.core.number_format import error, number
 from proofroll.report.labels import names
@@ -27,76 +26,48 @@ _TOLD, _PLACES, _ATTITUDES = (0.1, 0.3, 1.0), "p_WB", "attitudes"
 
 @dataclass(frozen=True)
 class DistanceLine:
-    """Largest distances of a row from the reference up to each time; None: it has no sample there.
+    """Largest distances up to each time; None: the run ended before.
 
     Attributes:
-        row: its number.
+        row: number of the run's row; None: these are the error bars of the reference.
         places: of any body's origin [m].
         turns: angle by which any body's attitude is off [rad].
     """
 
-    row: int
+    row: int | None
     places: list[float | None]
     turns: list[float | None]
 
 
 @dataclass(frozen=True)
 class Distances:
-    """Distances of all rows at a point whose truth is a reference by steps.
-
-    Attributes:
-        point: of the parameters.
-        times: up to which they are told [s], within the reference's horizon.
-        places: error bars of the reference up to these times, of places [m].
-        turns: of attitudes [rad].
-        horizon: how far the reference tells the motion, a clause; empty: that is not known.
-        lines: of the rows with a run.
-    """
+    """Distances at a ``point`` up to ``times`` [s] within the ``horizon`` in words of its reference by steps."""
 
     point: str
     times: list[float]
-    places: list[float]
-    turns: list[float]
     horizon: str
     lines: list[DistanceLine]
 
 
 def distances_of(point: str, reference: Reference | None, runs: Mapping[int, Run]) -> Distances | None:
-    """Distances of runs from a reference by steps; None: the truth of the point is another one, or tells no places.
-
-    Args:
-        point: of the parameters.
-        reference: its truth, if there is one.
-        runs: row number -> run with a trajectory.
-    """
+    """Distances of ``runs`` with trajectories, by row, from a reference by steps; None: the truth is another one."""
     if reference is None or not reference.by_steps or not reference.curves.keys() >= {_PLACES, _ATTITUDES}:
         return None
     sampled = reference.dataset["time"].to_numpy()
     told = [time for time in _TOLD if time <= sampled[-1]]
     told += [float(sampled[-1])] if len(told) < len(_TOLD) and sampled[-1] not in told else []
     ends = (np.searchsorted(sampled, told, side="right") - 1).tolist()
-    times = sampled[ends].tolist()
-    lines = []
+    known = {name: [reference.bar_until(name, sampled[end]) for end in ends] for name in (_PLACES, _ATTITUDES)}
+    lines = [DistanceLine(None, [*known[_PLACES]], [*map(_angle, known[_ATTITUDES])])]
     for row, run in runs.items():
         assert run.trajectory is not None  # by the caller
-        whole = run.result.status is Status.DONE
-        growth = errors_of(run.trajectory.dataset, reference, whole=whole)[1]
+        growth = errors_of(run.trajectory.dataset, reference, whole=run.result.status is Status.DONE)[1]
         if growth.keys() >= {_PLACES, _ATTITUDES}:
-            lines.append(DistanceLine(row, *(_at(growth[name], ends, name) for name in (_PLACES, _ATTITUDES))))
-    return Distances(
-        point=point,
-        times=times,
-        places=[reference.bar_until(_PLACES, time) for time in times],
-        turns=[_angle(reference.bar_until(_ATTITUDES, time)) for time in times],
-        horizon=str(reference.dataset.attrs.get(HORIZON, "")),
-        lines=lines,
-    )
-
-
-def _at(growth: FloatArray, ends: list[int], name: str) -> list[float | None]:
-    """Growth of a distance at some samples; of quaternions the angle."""
-    found = [float(growth[end]) if end < len(growth) else None for end in ends]
-    return found if name == _PLACES else [None if value is None else _angle(value) for value in found]
+            places, turns = growth[_PLACES].tolist(), [*map(_angle, growth[_ATTITUDES])]
+            lines.append(
+                DistanceLine(row, *([v[end] if end < len(v) else None for end in ends] for v in (places, turns)))
+            )
+    return Distances(point, sampled[ends].tolist(), str(reference.dataset.attrs.get(HORIZON, "")), lines)
 
 
 def _angle(distance: float) -> float:
@@ -106,13 +77,10 @@ def _angle(distance: float) -> float:
 
 def distance_cells(item: Distances, rows: Sequence[ReportedRow], runs: Sequence[ReportedRun]) -> Iterator[list[str]]:
     """Name, distances in mm and rad up to each time, and cost in s/s of each row; the reference's bars come first."""
-    yield ["known to", *map(_cell, item.places, item.turns), ""]
     costs = {run.row: run.rough_cost if run.seconds_per_second is None else run.seconds_per_second for run in runs}
     of_rows = names(rows)
     for line in item.lines:
-        yield [of_rows[line.row], *map(_cell, line.places, line.turns), number(costs.get(line.row))]
-
-
-def _cell(place: float | None, turn: float | None) -> str:
-    """A distance in mm and an angle in rad."""
-    return "–" if place is None else f"{error(1e3 * place)} {error(turn)}"
+        pairs = zip(line.places, line.turns, strict=True)
+        cells = ["–" if place is None else f"{error(1e3 * place)} {error(turn)}" for place, turn in pairs]
+        name, cost = ("known to", "") if line.row is None else (of_rows[line.row], number(costs.get(line.row)))
+        yield [name, *cells, cost]
