@@ -31,8 +31,7 @@ ENDS, ENDED = "ends", "ended"
 # Attribute of a reference by steps: the engine and formulation of its steps, as a setting; it is no truth.
 BY_STEPS = "by_steps"
 HORIZON = "horizon_words"  # attribute of a reference by steps: how far it tells the motion, a clause
-# Attribute of a variable whose error bar grows: times [s], each with the bar from there on, in one flat list.
-BARS = "error_bars"
+BARS = "error_bars"  # attribute of a variable: times [s], each with its error bar from there on, in one flat list
 LAWS = "laws"  # attribute of a truth: outcome of its law check, a clause
 # Attribute: widest bracket [s] of the events at the end that are left out of a comparison.
 LEFT_OUT = "widest_bracket_left_out"

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from proofroll.studies.comparison.outcome import Run
     from proofroll.studies.judging.reference import Reference
 
-# Times [s] up to which distances are told, and the observables: places of the bodies, and their quaternions.
-_TOLD, _PLACES, _ATTITUDES = (0.1, 0.3, 1.0), "p_WB", "attitudes"
+_TOLD, _PLACES = (0.1, 0.3, 1.0), "p_WB"  # times up to which distances are told [s], and places of the bodies
 
 
 @dataclass(frozen=True)
@@ -51,22 +50,25 @@ class Distances:
 
 def distances_of(point: str, reference: Reference | None, runs: Mapping[int, Run]) -> Distances | None:
     """Distances of ``runs`` with trajectories, by row, from a reference by steps; None: the truth is another one."""
-    if reference is None or not reference.by_steps or not reference.curves.keys() >= {_PLACES, _ATTITUDES}:
+    if reference is None or not reference.by_steps:
+        return None
+    variables, curves = reference.dataset.variables, reference.curves
+    observed = [_PLACES, *(name for name in curves if name in variables and variables[name].dims[-1:] == ("wxyz",))][:2]
+    if not curves.keys() >= set(observed) or len(observed) == 1:
         return None
     sampled = reference.dataset["time"].to_numpy()
     told = [time for time in _TOLD if time <= sampled[-1]]
     told += [float(sampled[-1])] if len(told) < len(_TOLD) and sampled[-1] not in told else []
     ends = (np.searchsorted(sampled, told, side="right") - 1).tolist()
-    known = {name: [reference.bar_until(name, sampled[end]) for end in ends] for name in (_PLACES, _ATTITUDES)}
-    lines = [DistanceLine(None, [*known[_PLACES]], [*map(_angle, known[_ATTITUDES])])]
+    bars = [[reference.bar_until(name, sampled[end]) for end in ends] for name in observed]
+    lines = [DistanceLine(None, [*bars[0]], [*map(_angle, bars[1])])]
     for row, run in runs.items():
         assert run.trajectory is not None  # by the caller
         growth = errors_of(run.trajectory.dataset, reference, whole=run.result.status is Status.DONE)[1]
-        if growth.keys() >= {_PLACES, _ATTITUDES}:
-            places, turns = growth[_PLACES].tolist(), [*map(_angle, growth[_ATTITUDES])]
-            lines.append(
-                DistanceLine(row, *([v[end] if end < len(v) else None for end in ends] for v in (places, turns)))
-            )
+        if growth.keys() >= set(observed):
+            far = ([*growth[name].tolist(), *[None] * len(sampled)] for name in observed)
+            places, apart = ([distances[end] for end in ends] for distances in far)
+            lines.append(DistanceLine(row, places, [None if item is None else _angle(item) for item in apart]))
     return Distances(point, sampled[ends].tolist(), str(reference.dataset.attrs.get(HORIZON, "")), lines)
 
 

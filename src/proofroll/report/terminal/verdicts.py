@@ -168,7 +168,7 @@ def _nearest(row: ReportedRow) -> str:
     worst = worst_of(row)
     assert worst is not None  # it was chosen by its judgement
     text = f"No setting agrees. Nearest: {', '.join(row_words(row))}"
-    if row.verdict in _HOLDS:
+    if row.verdict in {*_HOLDS, Verdict.NOT_JUDGED}:
         return f"{text}, {_why(row, []) or row.verdict}."
     text += f": {symbol(worst.observable)}, {error(worst.of_allowed)} times what is allowed"
     if row.verdict is not Verdict.CONVERGES or row.resolution != "dt" or not worst.order or worst.order < 0:

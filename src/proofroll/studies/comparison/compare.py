@@ -146,7 +146,7 @@ def run_plan(
 
 
 def _without_ladder(planned: Plan, results: Mapping[str, Result]) -> dict[str, Result]:
-    """Results of the further steps of rows whose own step has no result, which nobody asks for then: as that one."""
+    """Results of the further steps of rows whose own step has no result: the same, for they judge nothing then."""
     lost: dict[str, Result] = {}
     for run in planned.runs:
         result = results.get(run.ladder[1.0].key) if run.ladder else None

@@ -184,10 +184,7 @@ def error(reference: Reference, name: str, values: FloatArray, dataset: xr.Datas
 
 
 def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:
-    """Quaternions, shape (time, …, 4), with the signs of the true ones, as q and -q are the same orientation.
-
-    Behind the end of the shorter series signs stay.
-    """
+    """Quaternions, (time, …, 4), with the signs of the true ones as far as these go, as q and -q are one orientation."""
     count = min(len(values), len(true))
     if values.shape[1:] != true.shape[1:]:
         return values
