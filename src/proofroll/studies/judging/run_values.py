@@ -184,7 +184,7 @@ def error(reference: Reference, name: str, values: FloatArray, dataset: xr.Datas
 
 
 def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:
-    """Quaternions, (time, …, 4), with the signs of the true ones as far as these go, as q and -q are one orientation."""
+    """Quaternions, (time, …, 4), with the signs of the true ones as far as these go: q and -q are one orientation."""
     count = min(len(values), len(true))
     if values.shape[1:] != true.shape[1:]:
         return values
