@@ -238,17 +238,14 @@ def _bars(name: str, coarse: Variable, fine: Variable, times: FloatArray) -> dic
     """
     if name == "time" or fine.dims[:1] != ("time",) or fine.values.dtype.kind != "f":
         return {}
-    unknown = {"error_bar": math.inf}
-    if fine.attrs.get("units") not in CONTINUOUS:
-        return unknown
     changes = [fine.values - coarse.values]
     if fine.dims[-1:] == ("wxyz",):  # of two signs of a quaternion
         changes.append(fine.values + coarse.values)
     if fine.dims[-1:] in {("xyz",), ("wxyz",)}:
         changes = [np.linalg.norm(change, axis=-1) for change in changes]
     change = np.min(np.abs(changes), axis=0).reshape(len(times), -1)
-    if not np.isfinite(change).any():
-        return unknown
+    if fine.attrs.get("units") not in CONTINUOUS or not np.isfinite(change).any():
+        return {"error_bar": math.inf}
     bars = _SAFETY * np.maximum.accumulate(np.where(np.isfinite(change), change, 0.0).max(axis=1))
     grown = np.flatnonzero(np.diff(bars, prepend=-1.0) > 0)
     return {"error_bar": float(bars[-1]), BARS: np.stack([times[grown], bars[grown]], axis=1).ravel().tolist()}

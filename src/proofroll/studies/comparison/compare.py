@@ -147,13 +147,16 @@ def run_plan(
 
 def _without_ladder(planned: Plan, results: Mapping[str, Result]) -> dict[str, Result]:
     """Results of the further steps of rows whose own step has no result: the same, for they judge nothing then."""
+    own = [(run.ladder.values(), results.get(run.ladder[1.0].key)) for run in planned.runs if run.ladder]
     lost: dict[str, Result] = {}
-    for run in planned.runs:
-        result = results.get(run.ladder[1.0].key) if run.ladder else None
-        if result is not None and result.status not in {Status.DONE, Status.LEFT_OUT}:
-            steps = {case.key for case in run.ladder.values()} - results.keys()
-            lost |= dict.fromkeys(steps, Result(result.status, f"not run, as its own step was not: {result.message}"))
-    return lost
+    awaited = {*results}
+    for cases, result in own:
+        keys = [case.key for case in cases]
+        if result is None or result.status in {Status.DONE, Status.LEFT_OUT}:
+            awaited |= {*keys}
+        else:
+            lost |= dict.fromkeys(keys, Result(result.status, f"not run, as its own step was not: {result.message}"))
+    return {key: result for key, result in lost.items() if key not in awaited}
 
 
 def affordable(planned: Plan, runner: Runner) -> Plan:
