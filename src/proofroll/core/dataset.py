@@ -31,6 +31,7 @@ ENDS, ENDED = "ends", "ended"
 # Attribute of a reference by steps: the engine and formulation of its steps, as a setting; it is no truth.
 BY_STEPS = "by_steps"
 HORIZON = "horizon_words"  # attribute of a reference by steps: how far it tells the motion, a clause
+BARS = "error_bars"  # attribute of a variable: times [s], each with its error bar from there on, in one flat list
 LAWS = "laws"  # attribute of a truth: outcome of its law check, a clause
 # Attribute: widest bracket [s] of the events at the end that are left out of a comparison.
 LEFT_OUT = "widest_bracket_left_out"
@@ -64,6 +65,13 @@ def columns_of(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) ->
 def ended_early(dataset: xr.Dataset | Columns) -> tuple[float, str] | None:
     """Time [s] at which a truth ends early, and why, as a clause; None: it has all samples that were asked for."""
     return (float(dataset.attrs[ENDS]), str(dataset.attrs[ENDED])) if ENDS in dataset.attrs else None
+
+
+def bar_until(attributes: Mapping[str, Any], time: float) -> float:
+    """Error bar of a variable up to a time [s], from its attributes; infinite: it has none."""
+    times, bars = np.reshape(attributes.get(BARS, ()), (-1, 2)).T
+    count = int(np.searchsorted(times, time, side="right"))
+    return float(bars[count - 1] if count else attributes.get("error_bar", np.inf))
 
 
 def end_of_truth(end: float) -> str:
