@@ -142,6 +142,7 @@ def test_entry_points(installed: Path) -> None:
     for name in ("proofroll = ", "projection = ", "exudyn = ", "pinocchio = ", "mujoco = "):
         assert name in text
     assert "fuzz" not in text
+    assert "throughput" not in text
 
 
 def test_types_are_announced(wheel: Path) -> None:

@@ -14,6 +14,7 @@ from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import SEVERITY, Judgement, Verdict
 from proofroll.files.trajectory_file import StoredTrajectory
+from proofroll.report.comparison.distances import distances_of
 from proofroll.report.comparison.records import (
     CoarserSteps,
     ReportedComparison,
@@ -82,6 +83,11 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
                 len(outcome.rows),
             )
             for name in outcome.laws_alone
+        ],
+        distances=[
+            item
+            for name, point in outcome.points.items()
+            if (item := distances_of(name, point.reference, {row: run for row, run, _ in runs_at(outcome, name)}))
         ],
         budget=comparison.budget,
         beyond_budget=outcome.beyond_budget,
