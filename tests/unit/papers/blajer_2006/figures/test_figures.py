@@ -195,6 +195,7 @@ def test_every_axis_has_a_unit(study: FigureRuns) -> None:
             assert len(lines) == len(panel.y) * len(panel.runs)
 
 
+@pytest.mark.nightly
 def test_equal_runs_give_equal_files_in_every_form(study: FigureRuns, tmp_path: Path) -> None:
     """SVG, PNG and PDF are what they are called, twice the same, and the JSON names them."""
     small = _small(study)
