@@ -59,7 +59,7 @@ def test_columns_are_explained(name: str) -> None:
     assert named(judgement) == NAMED[name], "\n".join(judgement.lines())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=() if name == "air" else pytest.mark.nightly) for name in NAMED if name != "defaults"],

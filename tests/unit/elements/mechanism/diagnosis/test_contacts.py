@@ -103,6 +103,7 @@ size = [0.1, 0.1, 0.1]
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("corrects", [False, pytest.param(True, marks=pytest.mark.drill)])
 def test_a_convex_cone_is_named_from_rest_with_a_remedy_that_holds(tmp_path: Path, corrects: bool) -> None:

@@ -220,6 +220,7 @@ def test_figures_of_one_page_share_no_id(study: FigureRuns) -> None:
         assert "http" not in text
 
 
+@pytest.mark.nightly
 def test_past_the_first_slip_by_the_truth(runner: Runner) -> None:
     """Where slip is located its time holds and is marked, and the angles of a ball that slips are judged too."""
     whole = load_figures("paper_figures")
