@@ -17,6 +17,7 @@ import dear
 import found
 import numpy as np
 import pytest
+import seldom
 from ball_scenes import scene  # noqa: F401 -- a fixture, which pytest finds here
 from forked_workers import Forks
 from hostile import ENTRY_POINTS
@@ -72,6 +73,8 @@ def pytest_configure(config: pytest.Config) -> None:
     """Registers hooks that fixtures of a whole session call, too, which they do not in this file."""
     config.pluginmanager.register(dear, "dear")
     config.pluginmanager.register(found, "found")
+    for name, room in seldom.ROOMS.items():
+        config.addinivalue_line("markers", f"drill_of_{name}: a drill of {', '.join(room.tests)}, which set it")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -94,7 +94,19 @@ def test_every_path_in_the_text_is_there() -> None:
     pages = [TEXT, WORKED_CHANGES, *(path.read_text(encoding="utf-8") for path in DECISIONS)]
     text = re.sub(r"^ *```.*?^ *```$", "", "\n".join(pages), flags=re.DOTALL | re.MULTILINE)
     named = {name.rstrip("/") for name in re.findall(r"`([\w./-]+(?:\.py|\.md|\.toml|/))`", text)}
-    tops = ("findings", "changes", "src", "models", "comparisons", "docs", "examples", "fuzz", "benchmarks", "tests")
+    tops = (
+        "findings",
+        "changes",
+        "src",
+        "models",
+        "comparisons",
+        "docs",
+        "examples",
+        "fuzz",
+        "throughput",
+        "benchmarks",
+        "tests",
+    )
     there = [f"/{path.relative_to(ROOT)}" for top in tops for path in (ROOT / top, *(ROOT / top).rglob("*"))]
     there += [f"/{path.name}" for path in ROOT.iterdir()]
     assert [name for name in sorted(named) if not any(path.endswith(f"/{name}") for path in there)] == []

@@ -66,6 +66,7 @@ SHORTER = {
     "ladder": ["--rounds", "2"],
     "findings": ["--list"],
     "fuzz": ["--minutes", "1e-3"],  # one scene
+    "throughput": ["--until", "0.05"],
 }
 
 
@@ -85,6 +86,7 @@ def typed() -> set[str]:
     return set()
 
 
+@pytest.mark.daily("findings", "first_mechanism", "first_verdict", "json", "licences", "write_a_scene")
 @pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])

@@ -70,6 +70,7 @@ from proofroll_drill.row import Drilled
 from proofroll_fuzz.hunt import FoundKind, Hunt
 from proofroll_fuzz.shrink import SmallestScene
 from proofroll_fuzz.surprises import Surprise, SurpriseKind
+from proofroll_throughput.study import Throughput, ThroughputRow
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TEXT = (DOCS / "json.md").read_text(encoding="utf-8")
@@ -103,7 +104,8 @@ def fields(title: str) -> set[str]:
     return set(re.findall(r"^\| `(\w+)` \|", section(title), flags=re.MULTILINE))
 
 
-@pytest.mark.drill_of("check-study", "compare", "ladder", "engines")
+@pytest.mark.nightly_of("check-study", "ladder", "engines")
+@pytest.mark.drill_of("compare")
 @pytest.mark.parametrize(
     ("title", "arguments"),
     [
@@ -198,6 +200,8 @@ MAP = (StabilityStudy, Axis, BoundaryPoint, Boundary, ExplainedBoundary, MappedV
                 SmallestScene,
                 Surprise,
                 SurpriseKind,
+                Throughput,
+                ThroughputRow,
             ),
         ),
     ],

@@ -49,9 +49,9 @@ def held(comparison: Comparison) -> list[Row]:
     return list(first.values())
 
 
-# Comparisons whose rows take longest, a quarter of a minute each and more: they run every night. What switches and
-# what rolls are held in others, which run before each change lands.
-NIGHTLY = {"accuracy", "stick_slip"}
+# Comparisons whose rows take longest, ten seconds each and more: they run every night. What switches and what rolls are
+# held in others, which run before each change lands; `make report` runs all.
+NIGHTLY = {"accuracy", "paper", "sled", "slide_to_roll", "stick_slip"}
 ROWS = [
     pytest.param(
         comparison,

@@ -256,7 +256,7 @@ def test_numbers_beyond_their_bars_are_told() -> None:
     assert [name for name, *_ in beyond_bars(one, dataset(1.0, 0.5 + 2.1e-9))] == ["event_time"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_kinds_compute_otherwise(tmp_path: Path) -> None:
     """Each kind that this machine has takes effect in its processes, or says why it cannot be tried."""
     for name in ("haswell", "prescott", "no-avx2", "avx2-machine", "sse-machine", "no-heyoka"):

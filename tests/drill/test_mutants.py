@@ -134,7 +134,7 @@ tolerance = "close"
 """
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_everybody_is_told_the_same_cause(
     proofroll: Callable[..., tuple[int, str, str]],
     install_engines: Callable[[dict[str, str]], None],

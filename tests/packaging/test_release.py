@@ -59,9 +59,10 @@ def test_the_workflow_of_platforms_asks_for_what_there_is() -> None:
     assert "://" not in text
 
 
-def test_the_package_of_random_scenes_fits_the_suite() -> None:
+@pytest.mark.parametrize("folder", ["fuzz", "throughput"])
+def test_a_package_with_a_command_fits_the_suite(folder: str) -> None:
     """It has the version and the Pythons of the suite, and asks for that version: it uses more than public names."""
-    package = tomllib.loads((ROOT / "fuzz" / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    package = tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert (package["version"], package["requires-python"]) == (PROJECT["version"], PROJECT["requires-python"])
     assert f"proofroll=={PROJECT['version']}" in package["dependencies"]
     assert {*package["dependencies"]} - {f"proofroll=={PROJECT['version']}"} <= {*PROJECT["dependencies"]}

@@ -94,7 +94,7 @@ def test_headings_form_an_outline(unfolded: Visit) -> None:
     assert tree.count("heading ") == len(levels)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_everything_that_is_used_has_a_name(unfolded: Visit) -> None:
     """Links, buttons, scrolling regions and figures are announced by a name, not by silence; silence would be found."""
 
@@ -121,6 +121,7 @@ def test_a_phone_scrolls_down_only(report_page: Path, visit: Visiting) -> None:
         assert any(name.startswith("H1") for name in wide)
 
 
+@pytest.mark.nightly_of("light")
 @pytest.mark.drill
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_differs_from_its_background(unfolded: Visit, scheme: str) -> None:

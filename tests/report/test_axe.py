@@ -39,6 +39,7 @@ def test_several_comparisons_share_no_name(everything: Any, tmp_path: Path, visi
         assert grave(opened) == []
 
 
+@pytest.mark.nightly_of("900-dark", "400-light")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("width", "scheme"),

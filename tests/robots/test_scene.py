@@ -85,6 +85,7 @@ def test_a_robot_moves_as_its_file_says(robot, name):
         assert found[at] == pytest.approx(want, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.nightly_of("arm.urdf")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", FILES)
 def test_engines_follow_the_truth_of_a_robot(robot, name, monkeypatch):
@@ -220,7 +221,7 @@ def test_a_robot_of_the_gallery():
     assert float(np.abs(run.positions - truth(scene, times).positions).max()) < 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_is_advised_is_followed_to_the_end(
     proofroll: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

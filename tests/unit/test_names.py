@@ -10,7 +10,11 @@ import pytest
 from source_code import nodes
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = (ROOT / "src" / "proofroll", ROOT / "fuzz" / "proofroll_fuzz")
+PACKAGES = (
+    ROOT / "src" / "proofroll",
+    ROOT / "fuzz" / "proofroll_fuzz",
+    ROOT / "throughput" / "proofroll_throughput",
+)
 # Determiners, adverbs and participles that hide what a name holds.
 BARE = frozenset({
     "after", "along", "at", "before", "changed", "closed", "each", "first", "found", "given", "held", "here", "known",

@@ -10,13 +10,13 @@ from typer.core import TyperGroup
 GROUPS = {
     "Ask": ("scenes", "run", "replay", "watch", "compare", "recommend", "report", "diff"),
     "Bring": ("new", "check", "judge", "export"),
-    "Study": ("stability", "ladder", "fuzz", "balance", "paper"),
+    "Study": ("stability", "ladder", "fuzz", "throughput", "balance", "paper"),
     "Maintain": ("engines", "findings", "cite"),
 }
 _OTHERS = "Others"
 _WIDE = 80  # columns of a screen
 # Command of earlier versions -> command that does the same now. The last two come with a clone, not with the wheel;
-# `fuzz` is looked for here only where its package is not installed.
+# `fuzz` and `throughput` are looked for here only where their packages are not installed.
 NOW = {
     "tradeoff": "proofroll recommend SCENE --plot FILE.svg",
     "plot": "proofroll run SCENE --engine NAME --plot FILE, and of a stored run proofroll replay RUN",
@@ -26,6 +26,7 @@ NOW = {
     "figures": "proofroll paper figures",
     "vocabulary": "proofroll check --keys [WORD]",
     "fuzz": "in a package of its own: pip install proofroll-fuzz; in a clone of the repository, pip install ./fuzz",
+    "throughput": "in a package of its own: pip install proofroll-throughput; in a clone, pip install ./throughput",
     "bench": "python -m proofroll_benchmarks; in a clone of the repository, pip install ./benchmarks",
     "drill": "python -m proofroll_drill; in a clone of the repository, pip install ./tests/drill",
 }
@@ -37,6 +38,10 @@ class GroupedCommands(TyperGroup):
     def collect_usage_pieces(self, ctx: Any) -> list[str]:  # noqa: ARG002 -- of the base
         """Words behind the program's name; the options are among them, as they have no list."""
         return ["[--version]", "COMMAND", "[ARGS]...", "[--help]"]
+
+    def format_help_text(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 -- of the base
+        """Writes what the commands answer below the usage, without an empty line, which a screen lacks."""
+        formatter.write(f"{self.help}\n")
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Writes a line for each command, with the title of its group beside the first."""

@@ -27,7 +27,7 @@ def replay(
     control: options.Control = None,
     _root: options.Root = None,
 ) -> None:
-    """Show stored runs beside the truth, as a page; or list them.
+    """Show stored runs beside the truth as a page, or list them.
 
     Several runs of one scene are shown together, at the instants that all have. Below are the curves of the first, as
     with `proofroll run --plot`. Without a name, the runs that are kept are listed.

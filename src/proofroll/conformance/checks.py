@@ -2,7 +2,7 @@
 
 import atexit
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
@@ -12,16 +12,19 @@ from functools import cache, partial
 from typing import Any
 from unittest import SkipTest
 
-from proofroll.conformance import building, declarations, motion, response
+from proofroll.conformance import batches, building, declarations, motion, response
 from proofroll.conformance.subject import (
     Subject,
     UnlikeSceneError,
+    alike_scenes,
     checked_on,
     contrasts,
     failure_message,
     scenes,
     truth_scenes,
 )
+from proofroll.core.engine_abilities import RunsBatches
+from proofroll.core.scene import Scene
 from proofroll.running.in_processes import process_pool
 
 # Outcome of a check in a separate process; these processes, one for each formulation and preset of an engine.
@@ -69,6 +72,11 @@ _OF_PRESETS: tuple[Callable[[Subject], None], ...] = (
     motion.velocities_are_the_rates,
     motion.order_is_as_declared,
     motion.tolerance_has_an_effect,
+)
+# Checks that run once per formulation and preset of an engine that runs batches, and scenes of one structure.
+_OF_BATCHES: tuple[Callable[[Subject, Sequence[Scene]], None], ...] = (
+    batches.copies_move_as_runs,
+    batches.a_copy_that_overflows_stays_alone,
 )
 
 
@@ -240,6 +248,12 @@ def runs(engine: Any) -> Iterator[tuple[str, partial[None]]]:
                 if checked_on(engine, formulation, scene):
                     subject = Subject(engine, settings, scene)
                     yield f"law_acts[{formulation}-{preset}-{name}]", partial(response.law_acts, subject, without)
+            for name, alike in alike_scenes().items() if isinstance(engine, RunsBatches) else ():
+                if checked_on(engine, formulation, alike[0]):
+                    subject = Subject(engine, settings, alike[0])
+                    for of_copies in _OF_BATCHES:
+                        key = f"{of_copies.__name__}[{formulation}-{preset}-{name}]"
+                        yield key, partial(of_copies, subject, alike)
 
 
 def _first(engine: Any, settings: Any) -> Subject | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, TypeVar
@@ -44,6 +44,12 @@ def contrasts() -> dict[str, tuple[Scene, Scene]]:
     """Scenes in whose run one law acts, with the same scene without it, of kinds that have such, by the law's name."""
     kinds = [kind for kind in load_element_kinds() if hasattr(kind, "contrasts")]
     return {name: scenes for kind in kinds for name, scenes in _made(kind.contrasts).items()}
+
+
+def alike_scenes() -> dict[str, Sequence[Scene]]:
+    """Scenes of one structure, the last one with velocities that overflow, of kinds that have such, by name."""
+    kinds = [kind for kind in load_element_kinds() if hasattr(kind, "alike_scenes")]
+    return {name: scenes for kind in kinds for name, scenes in _made(kind.alike_scenes).items()}
 
 
 @cache

@@ -85,7 +85,8 @@ def truth_message(dataset: xr.Dataset | Columns) -> str:
     if end is not None:
         times = dataset["time"].values
         notes = [note for note in notes if note != end[1]]
-        samples = f", behind its {len(times)} samples" if end[0] > times[0] else ""  # at its start it has none
+        counted = f"{len(times)} sample{'s' if len(times) > 1 else ''}"
+        samples = f", behind its {counted}" if end[0] > times[0] else ""  # at its start it has none
         notes.append(f"{end_of_truth(end[0])}{samples}: {end[1]}")
     if any(notes):
         return "; ".join(filter(None, notes))

@@ -6,6 +6,7 @@ from enum import StrEnum
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
@@ -33,6 +34,31 @@ class TakesTargets(Protocol):
 
     def drive(self, values: FloatArray) -> None:
         """Sets the held signals, constant until the next call; called between two calls of ``advance``."""
+
+
+class Batch(Protocol):
+    """Copies of scenes that an engine moves together; ``device``: place for a reader, ``cpu`` for the processor."""
+
+    device: str
+
+    def advance(self, t: float) -> None:
+        """Moves all copies to time ``t`` [s]; one whose state is not finite ends no other, and raises nothing."""
+
+    def sample(self) -> Sample:
+        """State of all copies now: arrays of a run's sample with the copies in front, (copies, bodies, 3)."""
+
+
+@runtime_checkable
+class RunsBatches(Protocol):
+    """Ability of an engine that moves many copies of scenes together, as engines for training do."""
+
+    @classmethod
+    def build_batch(cls, scenes: Sequence[Scene], pattern: Sequence[int], settings: Any) -> Batch:
+        """Copies at time 0: the ``scenes`` have one structure, and ``pattern`` is the index of one for each copy.
+
+        Raises:
+            Refused: the engine cannot move such scenes together; the text says why.
+        """
 
 
 @runtime_checkable

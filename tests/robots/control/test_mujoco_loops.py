@@ -93,8 +93,12 @@ PLANTED: dict[str, tuple[dict[str, float], list[str]]] = {
 }
 
 
-@pytest.mark.drill_of(
-    *(f"{item}-{name}" for item in ("EULER", "IMPLICITFAST") for name in (*[*PLANTED][:1], *[*PLANTED][-2:]))
+@pytest.mark.drill_of("EULER-a heavier link and a constant torque", "IMPLICITFAST-more damping and a spring")
+@pytest.mark.nightly_of(
+    "EULER-a heavier link",
+    "EULER-more damping and a spring",
+    "IMPLICITFAST-a heavier link",
+    "IMPLICITFAST-a heavier link and a constant torque",
 )
 @pytest.mark.parametrize("name", PLANTED)
 @pytest.mark.parametrize("integrator", ["EULER", "IMPLICITFAST"])

@@ -80,7 +80,7 @@ def test_rows_of_models_with_options(tmp_path: Path, model: Callable[[str], Path
     assert not any(row.short for row in default_comparison(str(path), {}).rows)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_creep_of_a_screw_shows(proofroll: Proofroll, tmp_path: Path) -> None:
     """A screw whose coupling creeps in plain MuJoCo is wrong in the row of the file, and right in matched."""
     path = tmp_path / "screw.xml"

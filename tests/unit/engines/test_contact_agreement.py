@@ -117,6 +117,7 @@ def scene_of(name: str, mechanism: Mechanism) -> Scene:
     return Scene(name, "", (MechanismElement(mechanism),))
 
 
+@pytest.mark.nightly_of("rod-mujoco[formulation=geoms,preset=tuned,dt=2e-4]-0.08-0.001")
 @pytest.mark.drill_of(
     "box-pinocchio[formulation=impulses,dt=1e-4]-0.09-0.0002",
     "cylinder-mujoco[formulation=geoms,preset=tuned,dt=1e-4]-0.09-0.0002",

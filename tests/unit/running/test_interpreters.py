@@ -85,7 +85,7 @@ def test_a_place_is_no_part_of_a_result(old: Path, tmp_path: Path) -> None:
     assert case_in(other).key != case_in(old).key
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_an_environment_that_changed_is_a_row(old: Path, tmp_path: Path) -> None:
     """An engine upgraded, or deleted, after it was asked fails with both versions; all other rows arrive."""
@@ -103,7 +103,7 @@ def test_an_environment_that_changed_is_a_row(old: Path, tmp_path: Path) -> None
     assert "there is no" in by_status[Status.MISSING]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_another_scene_there_is_a_row(old: Path, tmp_path: Path) -> None:
     """A case whose scene reads otherwise where the engine runs is no result."""
     case = Case(**{**vars(case_in(old)), "scene_digest": "other"})
@@ -134,7 +134,7 @@ def writes(text: str) -> Callable[[Path], Path]:
     return lambda folder: script(folder / "program", text)
 
 
-@pytest.mark.drill_of("too-old")
+@pytest.mark.nightly_of("too-old")
 @pytest.mark.parametrize(
     ("make", "error", "says"),
     [
@@ -221,7 +221,7 @@ def test_releases(text: str, numbers: tuple[int, ...]) -> None:
     assert release(text) == numbers
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_command_line_takes_a_place(old: Path, proofroll: Callable[..., Any], tmp_path: Path) -> None:
     """Run, and compare with the rows of an engine moved there."""
     code, out, _ = proofroll("run", "sphere_in_cylinder", "--engine", f"aged@{old}", "--until", "0.02", "--json")

@@ -23,6 +23,7 @@ BARS = 1e-10  # s, and units of values: 1e-12 is seen
 ROOTS = np.array([-14.0783896927982, -0.3228664296, -0.7753418818 - 4.4648677130j, -0.7753418818 + 4.4648677130j])
 
 
+@pytest.mark.nightly_of("bricard", "babyboot", "pushed_box", "andrews_squeezer")
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=MARKS[name in NIGHTLY]) for name in tables()]
 )

@@ -81,6 +81,7 @@ def value_table(
     shown: Collection[str],
     *,
     all_digits: bool = True,
+    ended: float | None = None,
 ) -> Any:
     """Table of the last values: positions first, then velocities, energies and residuals, then forces.
 
@@ -93,6 +94,7 @@ def value_table(
         bars: variable -> error bar, where one is known.
         shown: variables of the table.
         all_digits: False for seven digits of each value.
+        ended: time of the values [s] where it is before the end that was asked for; None: it is that end.
     """
     from rich.table import Column, Table
 
@@ -113,9 +115,10 @@ def value_table(
         alike.setdefault(row, []).append(name)
     rows = [(text, *cells) for (_, *cells), names in alike.items() for text in short_names(names)]
     widths = [max(map(len, column), default=0) for column in zip(*rows, strict=True)]
-    if bars or all_digits or sum(widths) + 2 * len(widths) > _COLUMN:
+    if bars or all_digits or ended is not None or sum(widths) + 2 * len(widths) > _COLUMN:
         of_bars = [Column("error bar", justify="right")] if bars else []
-        table = Table("at the end", Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
+        when = "at the end" if ended is None else f"at {ended:.6g} s"
+        table = Table(when, Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
         for row in rows:
             table.add_row(*row)
         return table

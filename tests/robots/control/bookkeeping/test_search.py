@@ -51,6 +51,12 @@ def test_a_right_loop_is_accused_of_nothing(program: str, step: float) -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly_of(
+    "mujoco-0.002-velocity in the base",
+    "pinocchio-0.001-gravity 9.80",
+    "mujoco's servos-0.005-sign of a joint",
+    "mujoco-0.005-pose off",
+)
 @pytest.mark.parametrize(
     ("program", "step", "name"),
     [

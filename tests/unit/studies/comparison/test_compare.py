@@ -405,7 +405,7 @@ def test_a_failure_that_was_expected_and_does_not_come(tmp_path: Path) -> None:
     assert said.startswith("alpha at speed=4 agrees, expected: failed")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) -> None:
     """At a stair edge what hangs on the time of slip is ill-posed, agreement included; energy and gap are judged."""
     bounds = {
@@ -431,7 +431,7 @@ def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) ->
     assert (run.verdict, run.contradictions) == (Verdict.ILL_POSED, [])
 
 
-@pytest.mark.drill_of("0.0001")
+@pytest.mark.nightly_of("0.0001")
 @pytest.mark.parametrize("tolerance", [1e-4, 2e-3])
 def test_events_that_are_late_alike_in_every_run_are_no_other_limit(tmp_path: Path, tolerance: float) -> None:
     """An event that ends with the same step on each rung of a ladder is known to that step, within tolerance or not."""

@@ -1,13 +1,12 @@
-"""Engine MJX: MuJoCo's equations in JAX, in double or single precision; one copy."""
+"""Engine MJX: MuJoCo's equations in JAX, in double or single precision; one copy, or many."""
 
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar
 
 import jax
-import mujoco
 import numpy as np
 from mujoco import mjx
 
@@ -16,15 +15,14 @@ from proofroll.adapter import (
     MechanismBuilt,
     MechanismCapability,
     MechanismSample,
-    MujocoArrays,
     Scene,
     drive,
-    mechanism_of,
     targets_at,
     whole_steps,
 )
-from proofroll.engines.mujoco import mjspec
+from proofroll_mjx.batch import MjxBatch
 from proofroll_mjx.settings import LACKING, PRESETS, PROVIDES, MjxSettings
+from proofroll_mjx.start import kinds_of_step, set_precision, start_of
 
 _steps = jax.jit(lambda model, data, count: jax.lax.fori_loop(0, count, lambda _, state: mjx.step(model, state), data))
 _forward = jax.jit(mjx.forward)
@@ -35,6 +33,7 @@ class Mjx:
 
     name: ClassVar[str] = "mjx"
     title: ClassVar[str] = "MJX"
+    witness: ClassVar[bool] = False
     provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, PROVIDES)
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = dict.fromkeys(PRESETS, LACKING)
     settings: ClassVar[type[MjxSettings]] = MjxSettings
@@ -56,20 +55,17 @@ class Mjx:
         """See :class:`proofroll.core.engine.Engine`."""
         return cls(scene, settings)
 
+    @classmethod
+    def build_batch(cls, scenes: Sequence[Scene], pattern: Sequence[int], settings: MjxSettings) -> MjxBatch:
+        """See :class:`proofroll.core.engine_abilities.RunsBatches`."""
+        return MjxBatch(scenes, pattern, settings)
+
     def __init__(self, scene: Scene, settings: MjxSettings) -> None:
-        wide = settings.formulation == "f64"
-        if jax.config.jax_enable_x64 != wide:
-            jax.config.update("jax_enable_x64", wide)
-            jax.clear_caches()
-        self._mechanism, self._dt, self._count = mechanism_of(scene), settings.dt, 0
-        host = mjspec(scene, portable=True, sensors=False, dt=settings.dt, integrator=settings.integrator).compile()
-        start = mujoco.MjData(host)
-        mujoco.mj_resetDataKeyframe(host, start, host.key("start").id)
-        mujoco.mj_forward(host, start)
-        self._arrays = MujocoArrays.of(self._mechanism, host)
-        self._model, data = mjx.put_model(host), mjx.put_data(host, start)
-        kinds = jax.eval_shape(mjx.step, self._model, data)  # of integers a step makes others than put_data
-        data = jax.tree.map(lambda array, kind: jax.numpy.asarray(array, kind.dtype), data, kinds)
+        set_precision(settings)
+        start = start_of(scene, settings)
+        self._mechanism, self._arrays, self._model, data = start
+        self._dt, self._count = settings.dt, 0
+        data = jax.tree.map(lambda array, kind: jax.numpy.asarray(array, kind.dtype), data, kinds_of_step(start))
         self._data = jax.block_until_ready(_steps(self._model, data, 0))  # compiles
 
     def drive(self, values: Iterable[float]) -> None:

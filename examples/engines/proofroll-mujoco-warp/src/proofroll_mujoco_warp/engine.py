@@ -1,12 +1,11 @@
-"""Engine MuJoCo Warp: MuJoCo's equations as kernels of Warp, in single precision; one world."""
+"""Engine MuJoCo Warp: MuJoCo's equations as kernels of Warp, in single precision; one world, or many."""
 
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar
 
-import mujoco
 import mujoco_warp
 import numpy as np
 import warp
@@ -23,8 +22,9 @@ from proofroll.adapter import (
     targets_at,
     whole_steps,
 )
-from proofroll.engines.mujoco import mjspec
-from proofroll_mujoco_warp.settings import INTEGRATORS, LACKING, PRESETS, PROVIDES, MujocoWarpSettings
+from proofroll_mujoco_warp.batch import MujocoWarpBatch
+from proofroll_mujoco_warp.settings import LACKING, PRESETS, PROVIDES, MujocoWarpSettings
+from proofroll_mujoco_warp.start import rows_of, start_of
 
 warp.config.quiet = True
 
@@ -34,6 +34,7 @@ class MujocoWarp:
 
     name: ClassVar[str] = "mujoco_warp"
     title: ClassVar[str] = "MuJoCo Warp"
+    witness: ClassVar[bool] = False
     provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, PROVIDES)
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = dict.fromkeys(PRESETS, LACKING)
     settings: ClassVar[type[MujocoWarpSettings]] = MujocoWarpSettings
@@ -49,15 +50,18 @@ class MujocoWarp:
         """See :class:`proofroll.core.engine.Engine`."""
         return cls(scene, settings)
 
+    @classmethod
+    def build_batch(
+        cls, scenes: Sequence[Scene], pattern: Sequence[int], settings: MujocoWarpSettings
+    ) -> MujocoWarpBatch:
+        """See :class:`proofroll.core.engine_abilities.RunsBatches`."""
+        return MujocoWarpBatch(scenes, pattern, settings)
+
     def __init__(self, scene: Scene, settings: MujocoWarpSettings) -> None:
         self._mechanism, self._dt, self._count = mechanism_of(scene), settings.dt, 0
-        integrator = INTEGRATORS[settings.formulation]
-        host = mjspec(scene, portable=True, sensors=False, dt=settings.dt, integrator=integrator).compile()
-        start = mujoco.MjData(host)
-        mujoco.mj_resetDataKeyframe(host, start, host.key("start").id)
-        mujoco.mj_forward(host, start)
+        host, start = start_of(scene, settings)
         self._arrays = MujocoArrays.of(self._mechanism, host)
-        self._model, rows = mujoco_warp.put_model(host), max(256, 4 * start.nefc)
+        self._model, rows = mujoco_warp.put_model(host), rows_of(start)
         mujoco_warp.step(self._model, mujoco_warp.put_data(host, start, njmax=rows))  # compiles
         self._data = mujoco_warp.put_data(host, start, njmax=rows)
         warp.synchronize()

@@ -35,6 +35,7 @@ _SHOWN = (
     *("engine_on_mounts", "spatial_slider_crank"),
 )
 _SPEED = 1.0  # rad/s, at which a damper acts
+_OVERFLOWING = 1e200  # rad/s, whose square no number holds
 
 
 def _changed(scene: Scene, name: str, **parts: Any) -> Scene:
@@ -178,6 +179,17 @@ class MechanismKind:
             ),
             "friction_of_contacts": (sleds[0], sleds[1]),
         }
+
+    @staticmethod
+    def alike_scenes() -> Mapping[str, Sequence[Scene]]:
+        """Scenes for copies that move together; the last one's velocities are not finite after a few steps."""
+        from proofroll.files.scene_file import load_scene
+
+        plain = load_scene(_PLAIN)
+        hinges = the_mechanism(plain).mechanism.joints
+        fast = tuple(replace(joint, v0=(_OVERFLOWING,)) for joint in hinges)
+        other = load_scene(_PLAIN, angle=0.7, mass=1.6)
+        return {_PLAIN: (plain, other, _changed(plain, f"{_PLAIN}-overflowing", joints=fast))}
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:

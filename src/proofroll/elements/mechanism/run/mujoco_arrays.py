@@ -36,13 +36,15 @@ class MujocoArrays:
         """State of the bodies.
 
         Args:
-            read: array of MjData by its name: ``xpos``, ``xquat``, ``cvel`` and ``subtree_com``, of one state.
+            read: array of MjData by its name: ``xpos``, ``xquat``, ``cvel`` and ``subtree_com``, of one state or, with
+                the copies in front, of a batch.
         """
         names = ("xpos", "xquat", "cvel", "subtree_com")
         origins, turned, twists, centres = (np.array(read(name), float) for name in names)
-        p_WB, q_WB, w_WB = origins[self.bodies], turned[self.bodies], twists[self.bodies, :3]
-        v_WB = twists[self.bodies, 3:] + cross(w_WB, p_WB - centres[self.roots])
-        return MechanismSample(p_WB, v_WB, w_WB, q_WB / np.linalg.norm(q_WB, axis=1, keepdims=True))
+        p_WB, q_WB, twist = (values[..., self.bodies, :] for values in (origins, turned, twists))
+        w_WB = twist[..., :3]
+        v_WB = twist[..., 3:] + cross(w_WB, p_WB - centres[..., self.roots, :])
+        return MechanismSample(p_WB, v_WB, w_WB, q_WB / np.linalg.norm(q_WB, axis=-1, keepdims=True))
 
     def built(self, read: Callable[[str], Any], gravity: Any) -> MechanismBuilt:
         """Masses, centres of mass, inertias and gravity [m/s²].

@@ -51,6 +51,7 @@ def test_mujocos_laws_of_friction_are_named(preset: str, words: str) -> None:
     assert only.startswith(words)
 
 
+@pytest.mark.nightly_of("2.0-0.05")
 @pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize(("until", "every"), [(2.0, 0.05), (0.6, 0.01)])

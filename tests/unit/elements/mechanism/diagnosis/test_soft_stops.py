@@ -33,6 +33,7 @@ def causes(scene: Scene, engine: str, step: float, **settings: str) -> list[Caus
     return diagnose(Evidence(element, [], run, truth(scene, TIMES), step), hypotheses_of(element))
 
 
+@pytest.mark.nightly_of("0.001")
 @pytest.mark.parametrize("step", [1e-3, 2.5e-4])
 def test_a_soft_stop_is_named(tmp_path: Path, step: float) -> None:
     """Stops of 0.04 degrees on both sides catch the arm softly in MuJoCo, and that explains what comes after."""
