@@ -67,7 +67,8 @@ for each second of motion, of one run on a busy machine, so to a factor of two.
 - `default`: what a MuJoCo model has that says nothing (Euler, 2 ms, soft contacts, pyramidal cone).
 - `matched`: hard contacts and elliptic cones at 1 ms.
 - `tuned`: the same without the lift that MuJoCo's convex cone gives to feet that slide, with damping as armature.
-- Of an MJCF the first setting has the options of its own file.
+- Of an MJCF the first setting has the options of its own file; what the adapter sets otherwise, as the softness of its
+  geoms, `compare` names.
 """
 MADE = "<!-- {} made from {} -->"
 
@@ -205,9 +206,15 @@ def main(folders: list[str]) -> None:
             sys.stderr.write(f"{entry.name}: {entry.package} is not at hand\n")
             continue
         kept[entry.name] = section(entry, path, runner)
-        text = [kept[item.name] for item in entries() if item.name in kept]
-        PAGE.write_text("\n".join([HEAD.format(rate=RATE), *text]), encoding="utf-8")
+        write(kept)
         sys.stderr.write(f"{entry.name}\n")
+    write(kept)
+
+
+def write(kept: dict[str, str]) -> None:
+    """Writes the page of these sections, by robot."""
+    text = [kept[entry.name].rstrip("\n") + "\n" for entry in entries() if entry.name in kept]
+    PAGE.write_text("\n".join([HEAD.format(rate=RATE), *text]), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from folded import whole
 from rich.console import Console
 
 from proofroll.core.comparison import Row
-from proofroll.core.dataset import BARS, BY_STEPS, HORIZON
+from proofroll.core.dataset import BARS, BY_STEPS, ENDED, ENDS, HORIZON
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.distances import DistanceLine, Distances, distance_cells, distances_of
@@ -100,6 +100,15 @@ def test_nothing_is_told_behind_the_horizon() -> None:
     assert item is not None
     assert item.times == pytest.approx([0.1, 0.3, 0.44])
     assert item.lines[1].turns == [0, 0, 0]
+
+
+def test_the_end_of_a_reference_is_not_called_that_of_a_truth() -> None:
+    """The clause on an early end says what ends."""
+    ends: dict[str, Any] = {ENDS: 0.46, ENDED: "so"}
+    made = reference(0.44)
+    for attrs, word in (({}, "truth"), ({BY_STEPS: "other"}, "reference")):
+        item = dataclasses.replace(made, dataset=made.dataset.assign_attrs({**ends, **attrs}))
+        assert item.ended == f"the {word} ends at t = 0.46 s: so"
 
 
 def test_a_truth_has_no_such_table() -> None:
