@@ -197,6 +197,7 @@ def test_no_robot_on_its_page_is_stale(monkeypatch: pytest.MonkeyPatch, tmp_path
     robots = importlib.import_module("robots")
     page = robots.PAGE.read_text(encoding="utf-8")
     kept = robots.sections(page)
+    assert page.startswith(robots.HEAD.format(rate=robots.RATE))
     assert not [entry.name for entry in robots.stale(page) if entry.name in kept], "python docs/robots.py FOLDER"
     assert "solo12" in [entry.name for entry in robots.stale(page.replace("solo12 made from ", "solo12 made from 0"))]
     monkeypatch.setattr(robots, "PAGE", tmp_path / "robots.md")

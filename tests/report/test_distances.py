@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
+import io
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 import xarray as xr
+from folded import whole
+from rich.console import Console
 
 from proofroll.core.comparison import Row
-from proofroll.core.dataset import BARS, BY_STEPS, HORIZON
+from proofroll.core.dataset import BARS, BY_STEPS, ENDED, ENDS, HORIZON
+from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
-from proofroll.report.comparison.distances import Distances, distance_cells, distances_of
+from proofroll.report.comparison.distances import DistanceLine, Distances, distance_cells, distances_of
+from proofroll.report.page.html import page
+from proofroll.report.page.records import ReportContent
+from proofroll.report.terminal.verdicts import verdict_parts
 from proofroll.running.case import Result, Status
 from proofroll.studies.comparison.outcome import Run
 from proofroll.studies.judging.reference import Reference
@@ -74,7 +82,10 @@ def test_a_run_that_ends_early_is_told_as_far_as_it_goes() -> None:
     assert item is not None
     assert item.lines[1].places == [0, pytest.approx(1e-3), None]
     assert item.lines[1].turns == [0, 0, None]
-    row, run = SimpleNamespace(engine="other"), SimpleNamespace(row=0, rough_cost=0.5, seconds_per_second=None)
+    row, run = (
+        SimpleNamespace(engine="other"),
+        SimpleNamespace(row=0, point="", rough_cost=0.5, seconds_per_second=None),
+    )
     name = "proofroll.report.comparison.distances.names"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(name, lambda _: ["other"])
@@ -91,7 +102,37 @@ def test_nothing_is_told_behind_the_horizon() -> None:
     assert item.lines[1].turns == [0, 0, 0]
 
 
+def test_the_end_of_a_reference_is_not_called_that_of_a_truth() -> None:
+    """The clause on an early end says what ends."""
+    ends: dict[str, Any] = {ENDS: 0.46, ENDED: "so"}
+    made = reference(0.44)
+    for attrs, word in (({}, "truth"), ({BY_STEPS: "other"}, "reference")):
+        item = dataclasses.replace(made, dataset=made.dataset.assign_attrs({**ends, **attrs}))
+        assert item.ended == f"the {word} ends at t = 0.46 s: so"
+
+
 def test_a_truth_has_no_such_table() -> None:
     """Only a reference by steps is told so: a truth has one bar, and tells velocities and forces, too."""
     assert told(reference(1.0), motion(1.0)) is None
     assert distances_of("", None, {}) is None
+
+
+def test_page_terminal_and_json_show_the_table(content: ReportContent, parse: Any) -> None:
+    """At its point each has the bars of the reference first, then a line for each row with its cost there."""
+    runs = content.comparisons[0].runs
+    lines = [DistanceLine(None, [1e-4, 2e-4], [1e-3, 1e-3]), DistanceLine(1, [5e-3, None], [0.02, None])]
+    point = runs[0].point
+    item = Distances(point, [0.1, 0.44], "1 mm until 0.3 s", lines)
+    comparison = dataclasses.replace(content.comparisons[0], distances=[item])
+    text = " ".join(parse(whole(page(dataclasses.replace(content, comparisons=[comparison]), [[]]))).text.split())
+    assert f"Distance from the reference at {point}" in text
+    assert "Horizon: 1 mm until 0.3 s." in text
+    assert "up to [s]0.10.44s/s known to0.1 1e-30.2 1e-3 alpha fine, default, dt 1e-3 s5 0.02–0.01" in text
+    out = io.StringIO()
+    for part in verdict_parts(comparison):
+        Console(file=out, width=80, highlight=False, markup=False).print(part)
+    shown = " ".join(out.getvalue().split())
+    assert f"from the reference at {point}, of any body [mm] and its attitude [rad]: up to 0.1 s 0.44 s s/s" in shown
+    assert "alpha fine, default, dt 1e-3 s 5 0.02 – 0.01" in shown
+    assert plain(comparison)["distances"][0]["lines"][1] == {"row": 1, "places": [5e-3, None], "turns": [0.02, None]}
+    assert "Distance from the reference" not in parse(whole(page(content, [[]]))).text

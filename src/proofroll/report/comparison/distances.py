@@ -79,7 +79,8 @@ def _angle(distance: float) -> float:
 
 def distance_cells(item: Distances, rows: Sequence[ReportedRow], runs: Sequence[ReportedRun]) -> Iterator[list[str]]:
     """Name, distances in mm and rad up to each time, and cost in s/s of each row; the reference's bars come first."""
-    costs = {run.row: run.rough_cost if run.seconds_per_second is None else run.seconds_per_second for run in runs}
+    there = [run for run in runs if run.point == item.point]
+    costs = {run.row: run.rough_cost if run.seconds_per_second is None else run.seconds_per_second for run in there}
     of_rows = names(rows)
     for line in item.lines:
         pairs = zip(line.places, line.turns, strict=True)

@@ -120,7 +120,7 @@ def _truth_ends(outcome: Outcome) -> list[str]:
     bounds = {name: bound for band in outcome.comparison.bands.values() for name, bound in band.bounds.items()}
     by_steps = {_by_steps_words(reference, bounds): None for reference in truths.values() if reference.by_steps}
     ends = [
-        f"Not judged behind the end of the truth{at_point(outcome.points[name].case.parameters)}: {reference.ended}."
+        f"Nothing is judged behind the last value{at_point(outcome.points[name].case.parameters)}: {reference.ended}."
         for name, reference in truths.items()
         if reference.ended
     ]

@@ -148,8 +148,7 @@ def run_plan(
 def _without_ladder(planned: Plan, results: Mapping[str, Result]) -> dict[str, Result]:
     """Results of the further steps of rows whose own step has no result: the same, for they judge nothing then."""
     own = [(run.ladder.values(), results.get(run.ladder[1.0].key)) for run in planned.runs if run.ladder]
-    lost: dict[str, Result] = {}
-    awaited = {*results}
+    lost, awaited = dict[str, Result](), {*results}
     for cases, result in own:
         keys = [case.key for case in cases]
         if result is None or result.status in {Status.DONE, Status.LEFT_OUT}:

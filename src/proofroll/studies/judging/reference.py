@@ -146,8 +146,8 @@ class Reference:
     @property
     def ended(self) -> str:
         """Clause on the time and reason of an early end of the truth, behind which nothing is judged; or empty."""
-        end = ended_early(self.dataset)
-        return f"{end_of_truth(end[0])}: {end[1]}" if end else ""
+        end, word = ended_early(self.dataset), "reference" if self.by_steps else "truth"
+        return f"{end_of_truth(end[0]).replace('truth', word)}: {end[1]}" if end else ""
 
     @property
     def untouched(self) -> bool:
