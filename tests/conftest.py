@@ -17,6 +17,7 @@ import dear
 import found
 import numpy as np
 import pytest
+import seldom
 from ball_scenes import scene  # noqa: F401 -- a fixture, which pytest finds here
 from forked_workers import Forks
 from hostile import ENTRY_POINTS
@@ -72,6 +73,8 @@ def pytest_configure(config: pytest.Config) -> None:
     """Registers hooks that fixtures of a whole session call, too, which they do not in this file."""
     config.pluginmanager.register(dear, "dear")
     config.pluginmanager.register(found, "found")
+    for name, room in seldom.ROOMS.items():
+        config.addinivalue_line("markers", f"drill_of_{name}: a drill of {', '.join(room.tests)}, which set it")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -112,7 +115,8 @@ class _TogetherWhatShares(LoadScopeScheduling):
         rows = nodeid.partition("-")[0].replace("[accuracy", "[paper")
         # Where a mark chooses, tests of a unit share little beside what each of them takes, but with those that differ
         # in their last parameter; in one file they would keep one process busy.
-        chosen = self.config.option.markexpr not in {"", "not drill", "not nightly"}
+        expression = self.config.option.markexpr
+        chosen = expression not in {"", "not drill"} and not expression.startswith("not nightly")
         unit = "sources" if source else nodeid.rpartition("-")[0] or nodeid if chosen else path
         return {"report": folder, "agreement": rows, "conformance": check, "unit": unit}.get(folder, path)
 

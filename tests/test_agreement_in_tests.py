@@ -387,7 +387,7 @@ def test_what_is_not_judged_is_named() -> None:
     assert of_places == dict.fromkeys(("p_WB", "v_WB", "w_WB", "q_WB", "energy"), "no tolerance is given for it")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_bodies_beside_the_tracked_points_are_named_where_no_tolerance_judges_them() -> None:
     """A crank that is a metre off agrees in the places of tracked points; that its own place is not judged is said."""
     run = proofroll.simulate("slider_crank", "projection", until=0.05)
@@ -486,7 +486,7 @@ def test_a_mechanism_that_switches_is_judged(name: str) -> None:
     assert found.agrees, found
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_lies_behind_the_end_of_a_truth_is_not_judged() -> None:
     """A run agrees whatever it does behind the end of the truth, and differs by what it does before."""
     scene = load_scene("bouncing_ball", back_spin=60.0, height=0.1, restitution=0.5, tangential_restitution=1.0)

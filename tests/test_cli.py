@@ -207,7 +207,7 @@ def test_run_for_a_person(proofroll: Proofroll) -> None:
     assert max(map(len, out.splitlines())) <= 80
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_run_tells_events(proofroll: Proofroll) -> None:
     """Each event stands with its bracket; of a long sequence the first ones do, and how many more there are."""
     slips = ["run", "sphere_in_cylinder", "--engine", "truth", "--set", "mu_static=0.15"]
@@ -250,7 +250,8 @@ def test_scenes(proofroll: Proofroll) -> None:
     assert found["sphere_in_cylinder"]["parameters"]["speed"]["unit"] == "m/s"
 
 
-@pytest.mark.drill_of("proofroll run bric-2-bricard", "proofroll compare pap-2-paper")
+@pytest.mark.nightly_of("proofroll compare pap-2-paper")
+@pytest.mark.drill_of("proofroll run bric-2-bricard")
 @pytest.mark.parametrize(
     ("words", "index", "found"),
     [
@@ -331,7 +332,8 @@ tolerance = "tight"
 """
 
 
-@pytest.mark.drill_of("tiny-1", "exits-3")
+@pytest.mark.nightly_of("exits-3")
+@pytest.mark.drill_of("tiny-1")
 @pytest.mark.parametrize(("engine", "code"), [("tiny", 1), ("exits", 3), ("absent", 3)])
 def test_compare(proofroll: Proofroll, tmp_path: Path, engine: str, code: int) -> None:
     """A claim that a verdict contradicts ends with 1, an engine that is lost with 3."""
@@ -344,7 +346,7 @@ def test_compare(proofroll: Proofroll, tmp_path: Path, engine: str, code: int) -
     assert "Traceback" not in err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_compare_on_a_full_disk(tmp_path: Path) -> None:
     """A result that cannot be written ends the comparison with one line and exit 2, and blames no engine."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "projection"))
@@ -402,7 +404,7 @@ def test_an_engine_that_is_asked_for_has_a_row(proofroll: Proofroll, tmp_path: P
     assert rows[0]["resolution_value"] == 0.005
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_engine_of_a_report_without_a_row(proofroll: Proofroll, tmp_path: Path) -> None:
     """Beside an engine that has rows in a report, one that has none is named once; what was asked for is run."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
@@ -414,7 +416,7 @@ def test_an_engine_of_a_report_without_a_row(proofroll: Proofroll, tmp_path: Pat
     assert err.count(said) == 1
 
 
-@pytest.mark.drill_of("exits")
+@pytest.mark.nightly_of("exits")
 @pytest.mark.parametrize("engine", ["absent", "exits"])
 def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Path, engine: str) -> None:
     """An engine that is missing or crashes ends a comparison without claims with exit 3, and has a row that says so."""
@@ -426,7 +428,7 @@ def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Pa
     assert "1 fails." in out
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--until`` and ``--every`` are those of a scene's comparison; a comparison file has its own."""
     command = ["compare", "sphere_in_cylinder", "--engine", "oracle", "--out", str(tmp_path), "--json"]
@@ -443,7 +445,7 @@ def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "until = 1.0: a comparison file has its own times; name a scene instead" in err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_name_that_a_scene_and_a_comparison_share(proofroll: Proofroll, tmp_path: Path) -> None:
     """It means the comparison, with a row of what is asked for; with a budget, times or parameters, the scene.
 
@@ -481,7 +483,7 @@ def test_run_lists_events(proofroll: Proofroll) -> None:
         assert event["time_low"] <= event["time"] <= event["time_high"] < event["time_low"] + 1.1e-3
 
 
-@pytest.mark.drill_of("pinocchio[formulation=impulses,preset=tuned]-0-agree-done")
+@pytest.mark.nightly_of("pinocchio[formulation=impulses,preset=tuned]-0-agree-done")
 @pytest.mark.parametrize(
     ("engine", "code", "verdict", "status"),
     [
@@ -649,6 +651,7 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     assert (code, err, out.startswith("Usage: ")) == (2, "", True)
 
 
+@pytest.mark.nightly_of("-")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("shell", "shown"),
@@ -736,7 +739,7 @@ def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
         assert ("attitude.w " in out) == bool(asked)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_ladder(proofroll: Proofroll, tmp_path: Path) -> None:
     """The ladder is two tables and sentences within 100 columns, or one JSON document; a missing engine exits 3."""
     arguments = ["ladder", "sphere_in_cylinder", "--engine", "laddered", "--until", "0.1", "--out", str(tmp_path)]

@@ -42,7 +42,7 @@ def test_an_answer_is_found_once_and_then_stored(proofroll: Proofroll, tmp_path:
     assert "<option" in lines
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_tolerance_below_the_truth_is_no_ones_fault(proofroll: Proofroll, tmp_path: Path) -> None:
     """Where the truth itself is not known so well no engine is judged, and nothing is advised: exit code 1."""
     code, out, _ = proofroll(*asked(tmp_path, "--tolerance", "1e-18 m"))

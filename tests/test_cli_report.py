@@ -128,7 +128,7 @@ def test_a_statement_that_does_not_hold_is_a_contradiction(proofroll: Proofroll,
     assert "Nothing was compared in this report" in (out / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_part_that_fails_does_not_take_the_report_away(
     proofroll: Proofroll, tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -184,7 +184,7 @@ def test_a_stopped_report_keeps_what_has_ended_and_goes_on(
     assert content["awaited"] == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_progress_counts_comparisons(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """While cases run it is said how many comparisons have ended, and about how long the rest will take."""
     said: list[str] = []
@@ -213,7 +213,7 @@ def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) ->
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_page_after_the_first_comparison(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -292,7 +292,7 @@ def test_a_budget_is_spent_briefly_first_and_grows(
     assert (speeds, set(verdicts)) == ([[2.0, 4.0], [2.0, 4.0]], {"agrees"})
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_used_budget_begins_no_further_study(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -317,7 +317,7 @@ def test_a_second_report_into_one_folder(tmp_path: Path) -> None:
     assert not (tmp_path / "report.html").exists()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_planted_change_of_one_per_cent_is_found_and_nothing_else(
     command_line: Proofroll,
     install_engines: Callable[[Mapping[str, str]], None],
@@ -358,7 +358,7 @@ def test_only_some_groups_of_scenes_are_run(proofroll: Proofroll, tmp_path: Path
     assert _of_groups([claim, other], "ball rolling") == [claim]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_each_scene_is_searched_for_the_first_screen(proofroll: Proofroll, tmp_path: Path) -> None:
     """Page, terminal and JSON have one sentence from one record, which recommend prints, too, and compare first."""
     given = ["double_pendulum", "--tolerance", "1e-4", "--engine", "mujoco", "--out", str(tmp_path)]

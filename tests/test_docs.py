@@ -12,6 +12,7 @@ from collections.abc import Callable
 from fnmatch import fnmatch
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -21,6 +22,7 @@ from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Sp
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.files.comparison_file import comparison_names, further_comparison_names
 from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample
+from proofroll.robots.control.controller import read_controller
 from proofroll.running.idle_workers import Workers
 from proofroll_fuzz.command import fuzz
 
@@ -84,6 +86,7 @@ def typed() -> set[str]:
     return set()
 
 
+@pytest.mark.daily("findings", "first_verdict", "json", "licences", "write_a_scene")
 @pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])
@@ -186,6 +189,41 @@ def test_no_page_of_the_gallery_is_stale(monkeypatch: pytest.MonkeyPatch) -> Non
     stale = gallery.stale(with_one_changed, known, Workers())
     assert list(stale) == ["four_bar"], "make gallery"
     assert stale["four_bar"] in kept["four_bar"], "make gallery"
+
+
+def test_no_robot_on_its_page_is_stale(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Each section was made from today's controllers, engines and libraries; of packages that are away it stays."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    robots = importlib.import_module("robots")
+    page = robots.PAGE.read_text(encoding="utf-8")
+    kept = robots.sections(page)
+    assert page.startswith(robots.HEAD.format(rate=robots.RATE))
+    assert not [entry.name for entry in robots.stale(page) if entry.name in kept], "python docs/robots.py FOLDER"
+    assert "solo12" in [entry.name for entry in robots.stale(page.replace("solo12 made from ", "solo12 made from 0"))]
+    monkeypatch.setattr(robots, "PAGE", tmp_path / "robots.md")
+    monkeypatch.setattr(robots, "located", lambda *_: None)
+    robots.PAGE.write_text(page.replace("solo12 made from ", "solo12 made from 0"), encoding="utf-8")
+    robots.main([])
+    assert robots.sections(robots.PAGE.read_text(encoding="utf-8")).keys() == robots.sections(page).keys()
+
+
+def test_the_controllers_of_robots_are_what_the_page_says(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A trot swings diagonal legs alike about the pose that a hold holds, and both start with the same tilt."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    robots = importlib.import_module("robots")
+    names = [f"{leg}_{part}" for leg in ("FL", "FR", "HL", "HR") for part in ("HAA", "HFE", "KFE")]
+    entry, pose = robots.entries()[0], dict.fromkeys(names, 0.5)
+    assert robots.phases([name for name in names if name.endswith("HFE")]) == {
+        "FL_HFE": 0.0, "FR_HFE": np.pi, "HL_HFE": np.pi, "HR_HFE": 0.0,
+    }  # fmt: skip
+    assert robots.phases(["left", "right"]) == {"left": 0.0, "right": np.pi}
+    for motion, count in (("hold", 0), ("trot", 8)):
+        (tmp_path / "c.toml").write_text(robots.controller(entry, motion, pose), encoding="utf-8")
+        read = read_controller(tmp_path / "c.toml")
+        assert (read.rate, len(read.targets)) == (50, count)
+        assert np.linalg.norm(read.start.base[3:]) == pytest.approx(1)
+        assert read.start.drop == 0.01
+        assert read.ground.feet == entry.feet
 
 
 def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

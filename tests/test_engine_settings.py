@@ -52,7 +52,7 @@ def arguments(tmp_path: Path) -> Callable[[str], list[str]]:
     return of
 
 
-@pytest.mark.drill_of("balance under control")
+@pytest.mark.nightly_of("balance under control")
 @pytest.mark.parametrize("path", PATHS)
 def test_a_wrong_setting_is_told_alike(
     command_line: Proofroll, arguments: Callable[[str], list[str]], path: str
@@ -65,6 +65,15 @@ def test_a_wrong_setting_is_told_alike(
             assert word in err
 
 
+@pytest.mark.nightly_of(
+    "balance under control",
+    "comparison of a file",
+    "comparison of a scene",
+    "comparison under control",
+    "recommendation for a scene",
+    "run of a robot",
+    "run under control",
+)
 @pytest.mark.drill
 @pytest.mark.parametrize("path", sorted(PATHS.keys() - NO_OWN_STEP))
 def test_a_step_in_brackets_is_the_one_that_is_taken(

@@ -62,7 +62,7 @@ def test_the_force_of_a_coupling_is_that_on_one_joint(tmp_path: Path) -> None:
         assert float(values[-1]) == pytest.approx(force, rel=1e-11)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_parcel_slides_on_a_conveyor(tmp_path: Path) -> None:
     """The conveyor's parcel starts with the acceleration mu g."""
     (tmp_path / "scene.toml").write_text(SCENES["conveyor"], encoding="utf-8")

@@ -51,6 +51,7 @@ def interrupted(arguments: list[str], ready: Callable[[int], bool], times: int =
     return process.returncode, out, err
 
 
+@pytest.mark.nightly_of("command1")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     "command", [["engines", "--capabilities"], ["run", "sphere_in_cylinder", "--engine", "sleeper"]]
@@ -139,7 +140,8 @@ def test_a_signal_while_a_module_is_imported(module: str, number: int) -> None:
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.drill_of("arguments0", "arguments1")
+@pytest.mark.nightly_of("arguments1")
+@pytest.mark.drill_of("arguments0")
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no /dev/full")
 @pytest.mark.parametrize("arguments", [["scenes"], ["scenes", "--json"], ["--help"]])
 def test_an_output_that_is_full(arguments: list[str]) -> None:

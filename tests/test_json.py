@@ -104,7 +104,8 @@ def fields(title: str) -> set[str]:
     return set(re.findall(r"^\| `(\w+)` \|", section(title), flags=re.MULTILINE))
 
 
-@pytest.mark.drill_of("check-study", "compare", "ladder", "engines")
+@pytest.mark.nightly_of("check-study", "ladder", "engines")
+@pytest.mark.drill_of("compare")
 @pytest.mark.parametrize(
     ("title", "arguments"),
     [

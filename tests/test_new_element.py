@@ -131,7 +131,7 @@ def test_compare(command_line: Proofroll) -> None:
     assert {j["observable"] for run in content["runs"] for j in run["judgements"]} == {"x", "pull", "energy_error"}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_recommend(command_line: Proofroll, springs: Path) -> None:
     """Recommend bounds the deciding observable."""
     arguments = ("--until", "0.1", "--tolerance", "1e-3", "--engine", "sprung", "--json")
@@ -142,7 +142,7 @@ def test_recommend(command_line: Proofroll, springs: Path) -> None:
     assert [bound["quantity"] for bound in found["bounds"]] == ["x"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.usefixtures("springs")
 def test_stability(command_line: Proofroll) -> None:
     """Stability finds boundaries, measures them by the kind's own number and names its own sign of failure."""

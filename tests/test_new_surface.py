@@ -123,6 +123,7 @@ def trough(
     _look_again()
 
 
+@pytest.mark.nightly_of("dish")
 @pytest.mark.drill
 @pytest.mark.parametrize("kind", ["trough", "dish"])
 def test_compare(proofroll: Proofroll, trough: Path, kind: str) -> None:

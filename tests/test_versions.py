@@ -123,7 +123,7 @@ def test_what_versions_are_asked_is_allowed(
         assert says in err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_versions_that_do_the_same(
     versions: Callable[..., tuple[int, str, str]],
     tmp_path: Path,

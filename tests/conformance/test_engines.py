@@ -45,7 +45,7 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
 OF_BUILDING = ("builds_or_refuses", "builds_only_what_is_required")
 # Of what hangs on a formulation's model or adapter, not on its step, and of what is held against truths, one preset is
 # asked on every scene in every run of the tests; in the drills each scene is asked of one other preset, in turns: of
-# how it moves, or of its certificate and its first steps; a quarter of them before a change lands, another quarter by
+# how it moves, or of its certificate and its first steps; an eighth of them before a change lands, another eighth by
 # each check. What is known to fail is asked wherever it is.
 OF_MODELS = (
     "certificate_holds",
@@ -87,7 +87,7 @@ def marks(engine: Any, check: Check) -> tuple[pytest.MarkDecorator, ...] | None:
         turn, odd = divmod(TURNS.index(scene[0]), 2)
         if odd == (name == "moves_as_the_truth"):
             return None
-        mark = pytest.mark.nightly if (turn + number) % 4 else mark
+        mark = pytest.mark.nightly if (turn + number) % 8 else mark
     return (mark,) if preset == others[turn % len(others)] else None
 
 

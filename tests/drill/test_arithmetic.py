@@ -138,7 +138,7 @@ def test_what_follows_a_wrong_event_is_no_decision(found: list[str], kept: list[
     assert until_wrong(found, ["slip", "stick"]) == kept
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_a_comparison_decides_is_recorded(tmp_path: Path) -> None:
     """A run with its verdict, its events and its limits, and the truth that it is held against."""
     row = Row("mujoco[formulation=geoms]", "loose", ladder=[1.0, 0.5, 0.25])
@@ -256,7 +256,7 @@ def test_numbers_beyond_their_bars_are_told() -> None:
     assert [name for name, *_ in beyond_bars(one, dataset(1.0, 0.5 + 2.1e-9))] == ["event_time"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_kinds_compute_otherwise(tmp_path: Path) -> None:
     """Each kind that this machine has takes effect in its processes, or says why it cannot be tried."""
     for name in ("haswell", "prescott", "no-avx2", "avx2-machine", "sse-machine", "no-heyoka"):

@@ -31,6 +31,7 @@ def test_a_number_that_is_read_back_is_the_cause(name: str) -> None:
     assert ";" not in found.said
 
 
+@pytest.mark.nightly_of("LoopAboutCentre")
 @pytest.mark.drill_of("LoopReaction")
 @pytest.mark.parametrize("name", REACTIONS)
 def test_reactions_that_are_told_wrongly_at_time_0_are_named(name: str) -> None:

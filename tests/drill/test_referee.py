@@ -115,6 +115,7 @@ def test_a_ball_starts_where_the_coordinates_of_its_wall_say(seed: int) -> None:
     assert abs(referee.run(np.zeros(1, np.longdouble)).seen[0]["gap"]) < 1e-17
 
 
+@pytest.mark.nightly_of("7017", "17", "7092")
 # A bowl on which the ball slips until it sticks, a torus with resistance, a plane on which it bounces, two tori on
 # which it slips at first (it was taken to leave them), a plane whose gap has the round-off of the place, two bowls on
 # which the direction of a slip still turns at its end.
@@ -144,6 +145,7 @@ def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPa
     assert not hold_ball(17).sound
 
 
+@pytest.mark.nightly_of("41")
 @pytest.mark.drill
 # An ellipsoid that lands, spheres that pass each other, a rod that lands and whose slip stops.
 @pytest.mark.parametrize("seed", [41, 52, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (27, 20018))])

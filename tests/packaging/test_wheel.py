@@ -53,7 +53,7 @@ def python(installed: Path, folder: Path, *arguments: str) -> subprocess.Complet
     )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_type_checkers_refuse_what_is_not_there(installed: Path, tmp_path: Path) -> None:
     """A strict type checker knows the public names, and the types of their arguments."""
     (tmp_path / "user.py").write_text("import proofroll\nproofroll.nothing()\nproofroll.simulate('pendulum', 3)\n")

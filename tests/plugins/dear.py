@@ -14,13 +14,12 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
+import seldom
 
 VARIABLE = "PROOFROLL_NO_DEAR"
 # Processor time [s] above which a test is a drill (CONTRIBUTING.md), on a processor that takes LOOP [s] for the loop.
 LIMIT = 1.0
 LOOP = 0.008
-# Folder of tests -> mark of its drills, which .ci/run leaves out where nothing changed of what they hold.
-_SELDOM = {"conformance": "drill_of_the_judge", "meta": "drill_of_the_judge", "robots": "drill_of_robots"}
 # Largest number of tests named in the line.
 _MOST = 10
 _BEGAN = pytest.StashKey[float]()
@@ -69,27 +68,36 @@ def _slowness() -> float:
 def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Marks as drills what runs at night alone, and the cases of a test that its mark ``drill_of`` names.
 
+    Cases that the mark ``nightly_of`` names run at night alone, and those that the mark ``daily`` does not name.
     Drills of some folders get a mark besides. Where a single case is asked for, names are not compared with cases.
 
     Raises:
         pytest.UsageError: a mark names a case that its test has not.
     """
-    named, cases = {}, defaultdict(set)
+    named: dict[str, set[str]] = {}
+    cases = defaultdict(set)
     for item in items:
         case = item.name.partition("[")[2].removesuffix("]")
         function = item.nodeid.partition("[")[0]
         cases[function].add(case)
-        names = {name for mark in item.iter_markers("drill_of") for name in mark.args}
-        if names:
+        drills, nightly, daily = (_names(item, mark) for mark in ("drill_of", "nightly_of", "daily"))
+        if names := drills | nightly | daily:
             named[function] = names
-        if case in names or item.get_closest_marker("nightly"):
+        if case in nightly or (daily and case not in daily):
+            item.add_marker("nightly")
+        if case in drills or item.get_closest_marker("nightly"):
             item.add_marker("drill")
-        if item.get_closest_marker("drill") and (mark := _SELDOM.get(item.nodeid.split("/")[1])):
+        if item.get_closest_marker("drill") and (mark := seldom.mark_of(item.nodeid)):
             item.add_marker(mark)
     whole = not any("[" in argument for argument in config.args)
     for function, names in named.items() if whole else ():
         if unknown := names - cases[function]:
-            raise pytest.UsageError(f"{function}: drill_of names {', '.join(sorted(unknown))}, which it has not")
+            raise pytest.UsageError(f"{function}: a mark names {', '.join(sorted(unknown))}, which it has not")
+
+
+def _names(item: pytest.Item, mark: str) -> set[str]:
+    """Cases that a mark of a test names."""
+    return {name for found in item.iter_markers(mark) for name in found.args}
 
 
 @pytest.hookimpl(wrapper=True)

@@ -102,6 +102,7 @@ def trajectories(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly_of("1", "2", "3")
 @pytest.mark.parametrize("seed", range(4))
 def test_a_damaged_trajectory_is_judged_or_a_line(seed: int, trajectories: list[Path], tmp_path: Path) -> None:
     """Files of four formats with bytes changed, cut off or doubled, twenty times each."""
@@ -115,6 +116,7 @@ def test_a_damaged_trajectory_is_judged_or_a_line(seed: int, trajectories: list[
 
 
 @pytest.mark.drill
+@pytest.mark.nightly_of("1", "2", "3")
 @pytest.mark.parametrize("seed", range(4))
 def test_a_damaged_scene_is_a_scene_or_a_line(seed: int, tmp_path: Path) -> None:
     """Files of shipped scenes with a few characters or values changed, thirty of them."""

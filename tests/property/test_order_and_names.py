@@ -31,7 +31,7 @@ def as_written(name: str) -> xr.Dataset:
     return run(load_scene(name))
 
 
-@pytest.mark.drill_of("rocking_block")
+@pytest.mark.nightly_of("rocking_block", "flick")
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.drill) for name in SLOW)])
 @given(order=st.randoms(use_true_random=False))
 def test_order_and_names_change_nothing(name: str, order: random.Random) -> None:

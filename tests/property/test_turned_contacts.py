@@ -88,6 +88,7 @@ def _cases() -> list[Any]:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly_of("0.0-0.0-1", "0.0-7.0-2")
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(("slides", "spins", "seed"), [(0.0, 0.0, 1), (0.0, 7.0, 2), (1.5, -4.0, 3)])
 def test_a_ball_with_resistance_rolls_alike_in_a_turned_world(slides: float, spins: float, seed: int) -> None:

@@ -87,20 +87,21 @@ def _cases(quick: Iterable[Any], night: Iterable[Any]) -> list[Any]:
     return [*(pytest.param(case, marks=pytest.mark.drill) for case in quick), *tonight]
 
 
+@pytest.mark.nightly_of("stop", "friction_hold")
 @pytest.mark.parametrize("name", _cases(QUICK, NIGHT))
 def test_a_scene_is_told_alike_elsewhere(name: str) -> None:
     """Verdicts, events, causes and the end of the truth of a scene of a mechanism are those of it elsewhere."""
     assert_told_alike(load_scene(name), (QUICK | NIGHT)[name], sum(map(ord, name)))
 
 
-@pytest.mark.parametrize("seed", _cases([2, 30], range(60)))
+@pytest.mark.parametrize("seed", _cases([30], range(60)))
 def test_a_random_mechanism_is_told_alike_elsewhere(seed: int) -> None:
     """The same of random trees and loops of all kinds of joints."""
     _, mechanism = random_mechanism(seed)
     assert_told_alike(Scene("random", "", (MechanismElement(mechanism),)), 0.2, seed)
 
 
-@pytest.mark.parametrize("seed", _cases([0, 18], range(110)))
+@pytest.mark.parametrize("seed", _cases([0], range(110)))
 def test_a_random_contact_is_told_alike_elsewhere(seed: int) -> None:
     """The same of random bodies that touch."""
     _, mechanism, until = random_contacts(seed)

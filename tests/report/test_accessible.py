@@ -121,6 +121,7 @@ def test_a_phone_scrolls_down_only(report_page: Path, visit: Visiting) -> None:
         assert any(name.startswith("H1") for name in wide)
 
 
+@pytest.mark.nightly_of("light")
 @pytest.mark.drill
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_differs_from_its_background(unfolded: Visit, scheme: str) -> None:

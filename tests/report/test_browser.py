@@ -38,7 +38,7 @@ def test_every_section_says_something(report_page: Path, visit: Visiting) -> Non
         assert seen.page.evaluate("reading.empty()") == ["replay"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_table_with_rows_below_says_so(report_page: Path, visit: Visiting) -> None:
     """A table that shows not all of its rows says that there are more, until the last one has been in sight."""
     region = ".scroll:has(.matrix)"
@@ -82,7 +82,7 @@ def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -
         assert seen.messages == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_no_number_is_broken_at_its_hyphen(report_page: Path, visit: Visiting) -> None:
     """On a phone, with everything open, each number like 1e-4 stands in one line; without the care for it, not."""
     with visit(report_page, before=UNDRAWN, viewport={"width": 400, "height": 900}) as seen:
@@ -118,7 +118,7 @@ def test_what_is_folded_is_built_when_it_is_opened(everything: Any, tmp_path: Pa
         assert seen.messages == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_open_all_opens_all_and_closes_again(report_page: Path, visit: Visiting) -> None:
     """The button builds and opens every fold; pressed again, those are open that were so at first."""
     opened = "document.querySelectorAll('details[open]').length"
@@ -145,7 +145,7 @@ def test_an_address_with_a_fragment_opens_its_evidence(report_page: Path, visit:
         seen.wait(f"document.getElementById('{name}').getBoundingClientRect().top < innerHeight")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_command_is_copied(report_page: Path, visit: Visiting) -> None:
     """The button beside the command of a run copies it, letter by letter, also in a part that is unfolded later."""
     name = "evidence-invented.beta.speed-4"
@@ -193,7 +193,7 @@ def place(seen: Visit, share: float, figure: int = 0) -> tuple[float, float]:
     )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_zoom_in_one_figure_is_zoom_in_all(drawn: Visit) -> None:
     """Dragging in a figure sets the time axis of each, and is told once: nothing is passed back."""
     mouse = drawn.page.mouse
@@ -247,7 +247,7 @@ def test_first_slips_and_bounds_of_friction_are_drawn(drawn: Visit) -> None:
     assert figure.evaluate(slips) == 5, "of the truth and of four runs"
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_contents_follow_the_reader(report_page: Path, visit: Visiting) -> None:
     """Wherever a reader is, the contents are in sight and mark the section that is being read."""
     with visit(report_page, before=UNDRAWN) as seen:

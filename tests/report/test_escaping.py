@@ -109,7 +109,7 @@ def test_poison_would_be_felt(poisoned_page: Path, poison: Poison, tmp_path: Pat
             assert elements >= 1
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_everything_that_others_write_is_shown_as_it_is_written(
     report_page: Path, poisoned_page: Path, poison: Poison, visit: Visiting
 ) -> None:
@@ -132,7 +132,7 @@ def text_of(page: Path, visit: Visiting) -> str:
         return " ".join(seen.page.evaluate(TEXT).split())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_long_words_of_others_do_not_widen_a_phone(poisoned_page: Path, visit: Visiting) -> None:
     """A name without a gap is broken or scrolls in its region."""
     with visit(poisoned_page, **PHONE) as seen:

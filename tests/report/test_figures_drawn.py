@@ -95,7 +95,7 @@ SKETCH = "getComputedStyle(document.querySelector('.drawing .ball')).stroke"
 GROUND = "getComputedStyle(document.body).backgroundColor"
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_colours_follow_the_screen_while_it_is_open_and_paper_is_white(seen: Visit) -> None:
     """Page, figures and drawings change with the scheme, a zoom stays; for print they are light in any scheme."""
     light = [seen.page.evaluate(INK), seen.page.evaluate(SKETCH), seen.page.evaluate(GROUND)]

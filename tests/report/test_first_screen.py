@@ -89,6 +89,7 @@ def test_the_first_screen_is_there_without_a_program(report_page: Path, screen: 
         assert figure_of(item) in text
 
 
+@pytest.mark.nightly_of("900", "1400")
 @pytest.mark.drill
 @pytest.mark.parametrize("width", [400, 900, 1400])
 def test_nothing_moves_while_the_page_loads(report_page: Path, visit: Visiting, width: int) -> None:
@@ -102,7 +103,7 @@ def test_nothing_moves_while_the_page_loads(report_page: Path, visit: Visiting, 
         assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_lines_for_a_model_are_copied(report_page: Path, visit: Visiting) -> None:
     """A card's fold has a command and a test of the engine to take, each with a button that copies it."""
     copied = "window.copied = []; navigator.clipboard.writeText = async (text) => { copied.push(text); };"

@@ -39,7 +39,7 @@ def test_page_needs_no_other_file_and_no_network(html: str, parse: Any) -> None:
         assert tag not in {"link", "iframe", "object", "base"}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_address_is_the_same_in_a_report_of_more(everything: Any, tmp_path: Path, parse: Any) -> None:
     """With another comparison before it, and without its first row, the ids of a comparison, its rows and runs stay."""
     first = everything.content.comparisons[0]
@@ -162,7 +162,7 @@ def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, 
     )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_largest_report_we_make_stays_small(made: tuple[Outcome, Store]) -> None:
     """Six points, 24 rows and 201 samples: what the default study has."""
     content = report_content([made[0]], COMMAND)

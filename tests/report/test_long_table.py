@@ -77,7 +77,7 @@ def test_a_rough_cost_is_without_time_of_other_processes() -> None:
         assert _ended(outcome, result)["cost"] == cost
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_documented_line_reads_the_table(
     made: tuple[Outcome, Store], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -88,7 +88,7 @@ def test_pdf_holds_the_verdicts_and_is_short(printed: PdfReader) -> None:
     assert "Skip to the answer" not in text
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_pdf_has_bookmarks_and_a_title(printed: PdfReader) -> None:
     """A reader of the file finds their way by the headings."""
     titles = [entry.title for entry in printed.outline if not isinstance(entry, list)]
@@ -98,14 +98,14 @@ def test_pdf_has_bookmarks_and_a_title(printed: PdfReader) -> None:
     assert printed.metadata.title == "proofroll: which engine can be trusted"
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_was_never_looked_at_is_drawn_for_paper(on_paper: tuple[PdfReader, list[list[str]], list[int]]) -> None:
     """A figure far below the screen has no picture until the page is printed, once its parts are here."""
     before, printed = on_paper[2]
     assert before < printed == 6
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_paper_is_white_in_the_dark(on_paper: tuple[PdfReader, list[list[str]], list[int]]) -> None:
     """Who reads on a dark screen prints dark on white, the figures too, and then has their dark screen back."""
     before, (ground, ink), after = on_paper[1]

@@ -385,7 +385,7 @@ def test_the_replay_plays(written: Any, replayed: Visit) -> None:
     assert opened.requested == [(written[1] / "report.html").as_uri()]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_errors_of_ghosts_stand_below_the_picture(
     made: Any, content: ReportContent, tmp_path: Path, visit: Visiting
 ) -> None:
@@ -419,7 +419,7 @@ def test_errors_of_ghosts_stand_below_the_picture(
         assert opened.messages == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_case_opens_at_the_largest_error_in_sight(
     made: Any, content: ReportContent, tmp_path: Path, visit: Visiting
 ) -> None:
@@ -475,6 +475,7 @@ def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
     assert opened.messages == []
 
 
+@pytest.mark.nightly_of("three.js")
 @pytest.mark.drill
 @pytest.mark.parametrize("lacking", ["WebGL", "three.js"])
 def test_without_a_picture_the_values_follow_the_time(
@@ -495,6 +496,7 @@ def test_without_a_picture_the_values_follow_the_time(
         assert opened.messages == []
 
 
+@pytest.mark.nightly_of("projection-False")
 @pytest.mark.drill
 @pytest.mark.parametrize(("engine", "hidden"), [("truth", True), ("projection", False)])
 def test_a_run_alone_has_no_table_of_ghosts(

@@ -65,7 +65,7 @@ def test_a_table_sorts_by_a_column(live: Visit) -> None:
     assert live.messages == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_reason_goes_with_its_row(live: Visit) -> None:
     """The reason why there is no result stands in the row, in full, and is found by the filter."""
     assert "gamma is not installed here" in live.page.locator(f"{TABLE} tr[data-engine='gamma']").inner_text()
@@ -98,7 +98,7 @@ def test_a_table_downloads_as_csv(live: Visit, tmp_path: Path) -> None:
     assert [address for address in live.requested if not address.startswith(("file:", "blob:"))] == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_every_list_sorts_and_downloads(report_page: Path, visit: Visiting) -> None:
     """Each table, a map, too, and one with joined cells; with two rows or more it filters; nothing below moves."""
     with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
@@ -125,7 +125,7 @@ def test_every_list_sorts_and_downloads(report_page: Path, visit: Visiting) -> N
         assert opened.messages == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, tmp_path: Path) -> None:
     """A map offers no sorting, as its text says; it filters, and its file names axis and value of each column."""
     with visit(report_page.parent / "studies.html", viewport={"width": 1280, "height": 900}) as opened:
@@ -155,7 +155,7 @@ def test_what_is_no_ranking_keeps_its_order(report_page: Path, visit: Visiting, 
     assert {len(row) for row in rows} == {len(head)}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_table_shows_that_it_has_columns_beyond_its_edge(report_page: Path, visit: Visiting) -> None:
     """The edge of a table that is wider than the screen fades until a reader has scrolled to its last column."""
     with visit(report_page, viewport={"width": 400, "height": 900}) as opened:

@@ -83,7 +83,7 @@ def test_content_is_made_once_for_each_part(made: tuple[Outcome, Store]) -> None
     assert not before.further
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_sections_answer_in_order(written_page: str, written_studies: str, parse: Any) -> None:
     """What agrees, what to use, why; each section is there, has a heading and says something."""
     elements = parse(written_page)

@@ -32,7 +32,8 @@ def arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "robot/arm.xml"
 
 
-@pytest.mark.drill_of("report", "recommend", "compare", "ladder", "check", "run")
+@pytest.mark.nightly_of("run", "recommend", "ladder", "report")
+@pytest.mark.drill_of("compare", "check")
 @pytest.mark.parametrize(
     ("words", "more"),
     [(["check"], ASKED), (["run"], ["--engine", "truth", "--until", "0.1", "--out", "run.csv"]), (["compare"], SHORT),

@@ -85,6 +85,7 @@ def test_a_robot_moves_as_its_file_says(robot, name):
         assert found[at] == pytest.approx(want, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.nightly_of("arm.urdf")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", FILES)
 def test_engines_follow_the_truth_of_a_robot(robot, name, monkeypatch):
@@ -184,7 +185,7 @@ def test_stops_are_there_when_asked_for(robot):
     assert "ill_posed" not in struck.attrs
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path, monkeypatch):
     """Run, compare, report and stability start from the file alone; engines that are asked are held to the truth."""
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.2)
@@ -220,7 +221,7 @@ def test_a_robot_of_the_gallery():
     assert float(np.abs(run.positions - truth(scene, times).positions).max()) < 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_is_advised_is_followed_to_the_end(
     proofroll: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

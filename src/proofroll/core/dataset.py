@@ -31,6 +31,7 @@ ENDS, ENDED = "ends", "ended"
 # Attribute of a reference by steps: the engine and formulation of its steps, as a setting; it is no truth.
 BY_STEPS = "by_steps"
 HORIZON = "horizon_words"  # attribute of a reference by steps: how far it tells the motion, a clause
+BARS = "error_bars"  # attribute of a variable: times [s], each with its error bar from there on, in one flat list
 LAWS = "laws"  # attribute of a truth: outcome of its law check, a clause
 # Attribute: widest bracket [s] of the events at the end that are left out of a comparison.
 LEFT_OUT = "widest_bracket_left_out"
@@ -66,6 +67,13 @@ def ended_early(dataset: xr.Dataset | Columns) -> tuple[float, str] | None:
     return (float(dataset.attrs[ENDS]), str(dataset.attrs[ENDED])) if ENDS in dataset.attrs else None
 
 
+def bar_until(attributes: Mapping[str, Any], time: float) -> float:
+    """Error bar of a variable up to a time [s], from its attributes; infinite: it has none."""
+    times, bars = np.reshape(attributes.get(BARS, ()), (-1, 2)).T
+    count = int(np.searchsorted(times, time, side="right"))
+    return float(bars[count - 1] if count else attributes.get("error_bar", np.inf))
+
+
 def end_of_truth(end: float) -> str:
     """Clause on the time [s] from which a truth has no value."""
     return f"the truth ends at t = {end:.6g} s"
@@ -77,7 +85,8 @@ def truth_message(dataset: xr.Dataset | Columns) -> str:
     if end is not None:
         times = dataset["time"].values
         notes = [note for note in notes if note != end[1]]
-        samples = f", behind its {len(times)} samples" if end[0] > times[0] else ""  # at its start it has none
+        counted = f"{len(times)} sample{'s' if len(times) > 1 else ''}"
+        samples = f", behind its {counted}" if end[0] > times[0] else ""  # at its start it has none
         notes.append(f"{end_of_truth(end[0])}{samples}: {end[1]}")
     if any(notes):
         return "; ".join(filter(None, notes))

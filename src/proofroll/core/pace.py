@@ -32,7 +32,7 @@ class Pace:
         self.text, self.over, self.until, self.aloud = "", False, 0.0, False
         self._tell: Callable[[str], object] = str
         self._limit, self._began = math.inf, 0.0
-        self._route, self._begun, self._end, self._told, self._part = "", 0.0, math.inf, 0.0, 1.0
+        self._route, self._begun, self._end, self._told, self._part = "", (0.0, 0.0), math.inf, 0.0, 1.0
 
     @contextmanager
     def limited(self, seconds: float, tell: Callable[[str], object] = str) -> Iterator[None]:
@@ -56,7 +56,7 @@ class Pace:
 
         ``smooth``: nothing switches, so that what follows the routes takes as long as they do.
         """
-        self._route, self._begun, self._end = route, time.process_time(), end
+        self._route, self._begun, self._end = route, (time.process_time(), -1.0), end
         self._part = _ROUTES[route] * (_SMOOTH if smooth else 1.0)
 
     def leave(self) -> None:
@@ -75,9 +75,12 @@ class Pace:
         if now - self._began > self._part * self._limit:
             self.over = True
             raise OutOfTime(f"its limit of {self._limit:g} s of processor time was reached", t)
-        if part > 0 and now - self._told > _EVERY:
-            self._told, spent = now, now - self._begun
-            left = spent * (1 / part - 1) + (spent / part if self._route == "first" else 0.0)
+        if self._begun[1] < 0:  # what came before, like compiling, says nothing of the pace
+            self._begun = now, part
+        came = part - self._begun[1]
+        if came > 0 and now - self._told > _EVERY:
+            self._told, whole = now, (now - self._begun[0]) / came
+            left = whole * (1 - part) + (whole if self._route == "first" else 0.0)
             self.text = f"{part * self.until:.3g} of {self.until:.3g} s, about {left:.0f} s left"
             self._tell(self.text)
 

@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable
 from proofroll.core.controlled_engine import commanded
-from proofroll.core.dataset import BY_STEPS, CONTINUOUS, ENDED, ENDS, HORIZON, columns_of
+from proofroll.core.dataset import BARS, BY_STEPS, CONTINUOUS, ENDED, ENDS, HORIZON, bar_until, columns_of
 from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.core.events import Event, with_events
@@ -97,8 +97,8 @@ def reference_by_steps(element: MechanismElement, times: FloatArray, engines: Se
     events = [replace(item, time_low=item.time_low - near, time_high=item.time_high + near) for item in told]
     variables = {}
     for name, item in fine.columns.variables.items():
-        bar = _bar(name, coarse.columns.variables[name], item)
-        variables[name] = item if bar is None else item._replace(attrs={**item.attrs, "error_bar": bar})
+        bars = _bars(name, coarse.columns.variables[name], item, times[:count])
+        variables[name] = item._replace(attrs={**item.attrs, **bars})
     words = ", ".join(number(run.step, 3) for run in runs)
     attrs = {
         "route": f"reference by steps of {_words(engines[0])}, dt {words} s",
@@ -170,6 +170,8 @@ def _to_horizon(dataset: xr.Dataset, apart: FloatArray, change: FloatArray) -> x
     if not beyond.size or beyond[0] < 1:
         return dataset
     cut = dataset.isel(time=slice(0, int(beyond[0])))
+    for item in cut.data_vars.values():
+        item.attrs |= {"error_bar": bar_until(item.attrs, float(cut["time"][-1]))} if BARS in item.attrs else {}
     return cut.assign_attrs({ENDS: float(times[beyond[0]]), ENDED: f"it is too sensitive from there on: {text}"})
 
 
@@ -229,17 +231,21 @@ def _run(
     return _SteppedRun(step=step, columns=Columns(variables, columns.attrs), events=events, whole=whole)
 
 
-def _bar(name: str, coarse: Variable, fine: Variable) -> float | None:
-    """Error bar of a variable; None: it has no times.
+def _bars(name: str, coarse: Variable, fine: Variable, times: FloatArray) -> dict[str, Any]:
+    """Attributes with the error bar of a variable at the end, and as it grows; empty: the variable has no times.
 
     It is inf for velocities, forces and what follows from them: beside a touch no two steps have the same.
     """
     if name == "time" or fine.dims[:1] != ("time",) or fine.values.dtype.kind != "f":
-        return None
-    if fine.attrs.get("units") not in CONTINUOUS:
-        return math.inf
-    change = np.abs(fine.values - coarse.values)
+        return {}
+    changes = [fine.values - coarse.values]
     if fine.dims[-1:] == ("wxyz",):  # of two signs of a quaternion
-        change = np.minimum(change, np.abs(fine.values + coarse.values))
-    known = change[np.isfinite(change)]
-    return _SAFETY * float(known.max(initial=0.0)) if known.size else math.inf
+        changes.append(fine.values + coarse.values)
+    if fine.dims[-1:] in {("xyz",), ("wxyz",)}:
+        changes = [np.linalg.norm(change, axis=-1) for change in changes]
+    change = np.min(np.abs(changes), axis=0).reshape(len(times), -1)
+    if fine.attrs.get("units") not in CONTINUOUS or not np.isfinite(change).any():
+        return {"error_bar": math.inf}
+    bars = _SAFETY * np.maximum.accumulate(np.where(np.isfinite(change), change, 0.0).max(axis=1))
+    grown = np.flatnonzero(np.diff(bars, prepend=-1.0) > 0)
+    return {"error_bar": float(bars[-1]), BARS: np.stack([times[grown], bars[grown]], axis=1).ravel().tolist()}

@@ -230,8 +230,8 @@ def test_each_command_takes_a_controller(written: Any, tmp_path: Path) -> None:
     assert result.exception.field == "--control"
 
 
-@pytest.mark.drill
-@pytest.mark.parametrize("rate", [pytest.param(50, marks=pytest.mark.nightly), 60])
+@pytest.mark.nightly
+@pytest.mark.parametrize("rate", [50, 60])
 def test_engines_agree_under_a_policy(rate: int, written: Any, tmp_path: Path) -> None:
     """A robot under a policy is compared in all engines, at a rate that no usual step divides, too."""
     robot, control = written((CONTROL + POLICY + START).replace("rate = 50", f"rate = {rate}"))

@@ -47,7 +47,7 @@ def test_what_rounding_leaves_hides_no_armature() -> None:
     assert layer.causes[0].size == pytest.approx(0.0, abs=0.1)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_orders_of_a_robot_of_a_package() -> None:
     """Each other order of the joints of solo12 is named where its actions act, and a clean record of it holds."""
     robot = solo12()
@@ -61,7 +61,7 @@ def test_orders_of_a_robot_of_a_package() -> None:
         assert words in first.causes[0].sentence
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_sizes_are_fitted() -> None:
     """Sizes of gains, limits, scale and armature come back to three digits and more."""
     for attribute, factor in (("kp", 0.37), ("kd", 1.73), ("scale", 0.61), ("limit", 0.7), ("armature", 0.33)):
@@ -71,7 +71,7 @@ def test_sizes_are_fitted() -> None:
         assert cause.size == pytest.approx(factor, rel=1e-6)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_implicit_damping_is_no_armature() -> None:
     """A record with implicit kd holds at two steps; an armature of h kd in an explicit one is named as an armature."""
     for step in (1e-3, 2e-3):
@@ -84,7 +84,7 @@ def test_implicit_damping_is_no_armature() -> None:
     assert [item.id for item in next(layer for layer in layers if not layer.holds).causes][:1] == ["armature"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_implicit_damping_and_an_armature_are_named_together() -> None:
     """Where no effort is clamped, one step cannot tell implicit kd from an armature h kd: both are named."""
     law = LAW.change(limit=np.full(len(LAW.joints), 100.0))
@@ -222,7 +222,7 @@ def test_digits_of_a_stream_are_rounding(digits: int) -> None:
     assert bars[[0, 2]] == pytest.approx(0.5 * 10.0 ** np.array([3.0 - digits, 1.0 - digits]), rel=1e-9)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_inertia_that_is_another_has_no_size() -> None:
     """An inertia of a body is named with what is off with it alone; it is no mass."""
     trunk, *legs = ROBOT.bodies
@@ -244,7 +244,7 @@ def test_rates_that_are_not_there_are_not_early() -> None:
     assert reading.layer.causes[0].sentence.startswith("v_WB: one row early")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_fewest_causes_tell_the_importer() -> None:
     """Of robots that importers make, the one that needs no further cause is named, though another comes before it."""
     masses = [(1.2 if k % 2 else 0.8) * body.mass for k, body in enumerate(ROBOT.bodies)]
@@ -272,7 +272,7 @@ def test_assumed_steps_decide_nothing() -> None:
     assert assumed.reason.endswith("rows are the usual step")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_no_cause_explains_is_not_called_rounding() -> None:
     """Rows of a robot whose thighs are heavier hold in no layer of accelerations."""
     bodies = [replace(body, mass=(1.5 if body.name.endswith("HFE") else 1.0) * body.mass) for body in ROBOT.bodies]

@@ -62,7 +62,7 @@ def record(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> Callable[..
 @pytest.mark.parametrize(
     ("program", "name", "base"),
     [
-        ("mujoco", "arm.urdf", "fixed"),
+        pytest.param("mujoco", "arm.urdf", "fixed", marks=pytest.mark.nightly),
         ("isaaclab", "legs.urdf", "free"),
         pytest.param("mujoco", "legs.urdf", "free", marks=pytest.mark.nightly),
         pytest.param("isaaclab", "arm.urdf", "fixed", marks=pytest.mark.nightly),
@@ -126,7 +126,7 @@ def test_a_probe_of_an_mjcf(proofroll: Proofroll, record: Callable[..., list[str
     assert np.abs(hip).max() < np.radians(40)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("masses", [(2.1, 2.121), pytest.param((2.1, 2.079), marks=pytest.mark.nightly)])
 def test_a_link_on_a_fixed_axis(
     masses: tuple[float, float], proofroll: Proofroll, record: Callable[..., list[str]]

@@ -50,7 +50,8 @@ def arrays(name: str, folder: Path) -> Path:
     return folder / f"{name}.npz"
 
 
-@pytest.mark.drill_of("air", "defaults", "honest", "servos", "stop")
+@pytest.mark.drill_of("air", "stop")
+@pytest.mark.nightly_of("defaults", "servos", "honest")
 @pytest.mark.parametrize("name", NAMED)
 def test_columns_are_explained(name: str) -> None:
     """Columns under our names: each setting that PyBullet's user left is named, and nothing besides."""
@@ -58,14 +59,10 @@ def test_columns_are_explained(name: str) -> None:
     assert named(judgement) == NAMED[name], "\n".join(judgement.lines())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=() if name in {"air", "stop"} else pytest.mark.nightly)
-        for name in NAMED
-        if name != "defaults"
-    ],
+    [pytest.param(name, marks=() if name == "air" else pytest.mark.nightly) for name in NAMED if name != "defaults"],
 )
 def test_arrays_of_pybullet_have_its_frame(name: str, tmp_path: Path) -> None:
     """Arrays under PyBullet's names: the frame of its base is no mistake, and the rest is named as before."""
@@ -74,7 +71,7 @@ def test_arrays_of_pybullet_have_its_frame(name: str, tmp_path: Path) -> None:
     assert judgement.looked_at
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_degrees_keep_the_frame_of_the_base(tmp_path: Path) -> None:
     """Arrays with joints in degrees are held against the robot with PyBullet's frame of the base, which is exact."""
     robot = tmp_path / "floater.urdf"
@@ -87,7 +84,7 @@ def test_degrees_keep_the_frame_of_the_base(tmp_path: Path) -> None:
     assert named(judgement) == [("state", "degrees")], "\n".join(judgement.lines())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_searches_of_a_record_share_one_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """All searches of a record have one time, and one that ended among importers is told."""
     ends: list[float] = []
@@ -104,8 +101,8 @@ def test_searches_of_a_record_share_one_time(monkeypatch: pytest.MonkeyPatch) ->
     assert "the search for robots as importers read it ended after" in layer.reason
 
 
-@pytest.mark.drill
-@pytest.mark.parametrize("known", [False, True])
+@pytest.mark.nightly
+@pytest.mark.parametrize("known", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_steps_that_are_assumed_are_told(known: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where forces differ and the file has no ``sim_dt``, the answer says that PyBullet's usual step was assumed.
 

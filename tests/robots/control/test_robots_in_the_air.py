@@ -53,7 +53,7 @@ def test_engines_agree_on_a_robot_under_a_policy(name: str, tmp_path: Path) -> N
     assert apart < 1e-6
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", [pytest.param("solo12", marks=pytest.mark.nightly), "panda"])
 def test_the_truth_of_a_robot_is_exact(name: str, tmp_path: Path) -> None:
     """The truth of a robot under a policy has an error bar below 1e-10 m, and holds both engines to 1e-6 m."""

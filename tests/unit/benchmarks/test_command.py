@@ -41,7 +41,7 @@ def proofroll(
     return run
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_adapters_json(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--json`` has a ratio with its interval for the engine that was asked for, and says of each row what it is."""
     kept = tmp_path / "bench.json"
@@ -79,7 +79,7 @@ def test_an_engine_that_does_not_exist(proofroll: Proofroll, command: str) -> No
     assert err.count("\n") == 1
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers  # what a first answer costs is measured
 def test_study(proofroll: Proofroll, capfd: pytest.CaptureFixture[str]) -> None:
     """``--json`` has the part outside the engines, shares that add up, all cases, and what a first answer costs.

@@ -45,7 +45,7 @@ def random_balls(count: int) -> dict[str, FloatArray]:
     return {"v2": random.uniform(-6, 6, count), "mu": random.uniform(0.05, 0.6, count), "f": f}
 
 
-@pytest.mark.drill_of("euler")
+@pytest.mark.nightly_of("euler")
 @pytest.mark.parametrize("model", ["reduced", "rotating_frame", "euler"])
 def test_the_papers_case(model: Any) -> None:
     """Every model finds the paper's first slip, and the place where it happens."""
@@ -56,7 +56,7 @@ def test_the_papers_case(model: Any) -> None:
     assert run.run(UNTIL) == pytest.approx(true_time(PAPER), abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_random_balls_against_the_truth() -> None:
     """Forty balls slip when the truth says, within 1e-10 s, and never where it says never."""
     balls = random_balls(40)

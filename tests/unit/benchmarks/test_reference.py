@@ -34,7 +34,7 @@ TIMES = np.array([0.2, 0.4])
 TRUE_P = rolled(rolling_ball(FREE), np.append(0.0, TIMES)).p_WB[1:]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @needs_heyoka
 def test_the_loosest_tolerance_that_holds() -> None:
     """A tighter bound takes a tighter tolerance, each bound is held, and one below round-off by none."""
@@ -83,7 +83,7 @@ def test_search_leaves_out_what_an_engine_can_do_without() -> None:
     assert list(searching._without(terms, "b", settings | {"exact": False, "damping": 0.0})) == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @needs_heyoka
 def test_bulk_is_checked_against_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """The error of the first slips in bulk is round-off, and a single wrong one shows."""
@@ -106,7 +106,7 @@ def test_a_ratio_needs_both() -> None:
     assert (nothing["value"], nothing["met"]) == (None, False)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @needs_heyoka
 def test_the_whole_without_engines(monkeypatch: pytest.MonkeyPatch) -> None:
     """The content is one JSON document with every ratio, and its tables fit the terminal."""

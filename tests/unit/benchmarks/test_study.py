@@ -25,7 +25,7 @@ def test_shares_add_up() -> None:
     assert found["within_goal"] is False
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_case_says_where_its_time_went(
     tmp_path: Path, make_case: Callable[..., Case], install_engines: Callable[[Mapping[str, str]], None]
 ) -> None:
@@ -51,7 +51,7 @@ def test_records_from_before_are_readable() -> None:
     assert Result.from_dict({"status": "done", "message": "reached 1 s"}).spent == {}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_first_answer_takes_longer_than_none(install_engines: Callable[[Mapping[str, str]], None]) -> None:
     """A process that starts and answers takes time; one that cannot load its engine gives no answer about it."""
     install_engines({"tiny": "tiny:Tiny", "absent": "no_such_module:Engine"})

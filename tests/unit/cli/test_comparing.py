@@ -16,7 +16,7 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.running.time_budget import TimeBudget
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_each_engine_is_started_once(
     tmp_path: Path,
@@ -87,6 +87,7 @@ TENDON = """<mujoco><worldbody>
 <tendon><spatial stiffness="20"><site site="t"/><site site="s"/></spatial></tendon></mujoco>"""
 
 
+@pytest.mark.nightly_of("asked1")
 @pytest.mark.drill
 @pytest.mark.parametrize("asked", [(), ("--engine", "mujoco")])
 def test_what_no_engine_takes_has_a_row_of_each_with_its_reason(
@@ -107,7 +108,7 @@ def test_what_no_engine_takes_has_a_row_of_each_with_its_reason(
     assert "needs the tendon spatial tendon0 (couplings=0 leaves it out); no formulation" in rows["mujoco"]["reason"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_two_kinds_that_no_engine_has_together(
     tmp_path: Path, mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,7 +121,7 @@ def test_two_kinds_that_no_engine_has_together(
     assert "needs revolute joints; no formulation of reduced's adapter has that" in row["reason"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_first_look_stays_within_its_budget(
     tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -90,6 +90,7 @@ def test_a_robot_as_a_scene_moves_as_its_file(proofroll: Proofroll, tmp_path: Pa
         assert np.array_equal(written[quantity], own[quantity]), quantity
 
 
+@pytest.mark.nightly_of("panda", "half_cheetah", "ant", "hopper")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", ["ur5", "panda", "hopper", "half_cheetah", "ant"])
 def test_robots_of_packages_as_scenes(tmp_path: Path, name: str) -> None:

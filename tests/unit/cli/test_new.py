@@ -35,6 +35,7 @@ def test_a_scene(proofroll: Proofroll) -> None:
     assert '"status": "done"' in out
 
 
+@pytest.mark.nightly_of("./rod")
 @pytest.mark.drill
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "./rod"])
 def test_a_comparison(

@@ -18,6 +18,7 @@ Proofroll = Callable[..., tuple[int, str, str]]
 RUN = ["--until", "0.1", "--every", "0.05"]
 
 
+@pytest.mark.nightly_of("pendulum-truth-names1-.png-\\x89PNG")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("scene", "engine", "names", "ending", "begins"),

@@ -17,6 +17,7 @@ from proofroll.running.simulation import build
 TIMES = time_grid(0.2, 5e-3)
 
 
+@pytest.mark.nightly_of("neither")
 @pytest.mark.drill
 @pytest.mark.parametrize("wrong", [0, None], ids=["ball", "neither"])
 def test_an_element_that_is_right_is_not_accused(wrong: int | None) -> None:

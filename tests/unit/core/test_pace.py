@@ -29,8 +29,21 @@ def test_it_says_how_far_a_truth_has_come() -> None:
         for step in range(200):
             pace.reached(1.0 + step / 200)
     # half of the first route took a second: as much again is left of it, and twice that for the second route
-    assert told == ["1.98 of 4 s, about 3 s left", "2.98 of 4 s, about 0 s left", "3.99 of 4 s, about 0 s left", ""]
+    assert told == ["1.98 of 4 s, about 3 s left", "2.98 of 4 s, about 1 s left", "3.99 of 4 s, about 0 s left", ""]
     assert pace.text == ""
+
+
+def test_what_comes_before_a_route_says_nothing_of_its_pace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A route that compiles for a minute and then comes far in a second is nearly over."""
+    clock, told = [0.0], list[str]()
+    monkeypatch.setattr("proofroll.core.pace.time.process_time", lambda: clock[0])
+    pace = Pace()
+    pace.until = 1.0
+    with pace.limited(1000.0, told.append):
+        pace.follow("second", 1.0)
+        for clock[0], reached in ((60.0, 0.0), (61.5, 0.5)):
+            pace.reached(reached)
+    assert told == ["0.5 of 1 s, about 2 s left", ""]
 
 
 def follow_on(pace: Pace) -> None:

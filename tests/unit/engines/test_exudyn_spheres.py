@@ -95,3 +95,14 @@ def test_friction_beyond_the_coefficient_that_stands_for_unbounded_is_refused():
     """A ball that hardly presses needs 200 times its normal force, which that coefficient does not hold."""
     with pytest.raises(Refused, match=r"ball_on_wall needs a friction of .* a coefficient of 100 stands for unbounded"):
         EXUDYN.build(load_scene("sphere_in_cylinder", speed=0.05), MATCHED)
+
+
+def test_a_run_that_begins_anew_is_at_its_time():
+    """After an instant of a controller Exudyn's own clock, by which it says when it stops, goes on."""
+    run = EXUDYN.build(sled(), MATCHED)
+    run.advance(0.01)
+    again = run.integration.again()
+    assert (again.t, again.solver.it.currentTime) == (0.01, 0.01)
+    run.integration = again
+    run.advance(0.02)
+    assert again.solver.it.currentTime == pytest.approx(0.02)

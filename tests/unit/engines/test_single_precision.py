@@ -180,7 +180,7 @@ because = "it computes with 24 bits"
 """
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.usefixtures("single")
 def test_a_comparison_tells_precision_and_floor(
     command_line: Callable[..., tuple[int, str, str]], tmp_path: Path
@@ -219,7 +219,7 @@ def test_single_precision_conforms(check: Callable[[], None]) -> None:
     check()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_conformance_can_run_each_preset_in_a_process_of_its_own() -> None:
     """A switch of the whole process fails no check of another preset there; without, one accuses the other."""
     name = "certificate_holds[{}-matched-pendulum]"

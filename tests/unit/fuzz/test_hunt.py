@@ -136,6 +136,7 @@ def test_the_exit_code_tells_new_kinds(tmp_path: Path, command_line: Callable[..
     assert "1 scenes were refused by the reader: seeds 1" in out or "No surprise" in out
 
 
+@pytest.mark.nightly_of("3", "7")
 @pytest.mark.drill
 @pytest.mark.parametrize("seed", [2, 3, 7])
 def test_a_sound_engine_is_not_accused(seed: int, install_engines: Install, tmp_path: Path) -> None:

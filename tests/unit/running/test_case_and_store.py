@@ -160,6 +160,7 @@ def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
         Store(tmp_path / "cases")
 
 
+@pytest.mark.nightly_of("True")
 @pytest.mark.drill
 @pytest.mark.parametrize("there", [False, True])
 def test_a_wrong_name_leaves_no_folder(tmp_path: Path, there: bool) -> None:

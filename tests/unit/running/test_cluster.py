@@ -151,7 +151,7 @@ def room(dask: DaskCluster) -> Path:
     return dask.folder
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_worker_with_other_engines(dask: DaskCluster, shared: Cluster, tmp_path: Path) -> None:
     """A worker that has not the same versions and engines is refused, with what both have."""
     other = tmp_path / "other"
@@ -222,7 +222,7 @@ def test_results_are_those_of_home(dask: DaskCluster, shared: Cluster, tmp_path:
     assert (one.attrs["ran_on"], other.attrs["ran_on"]) == ("", HOST)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_runs_one_after_another(dask: DaskCluster, tmp_path: Path) -> None:
     """Each run has its own results, though Dask tells of the last of a run when the next has begun."""
     dask.one_worker()
@@ -233,7 +233,7 @@ def test_runs_one_after_another(dask: DaskCluster, tmp_path: Path) -> None:
         assert runner.run(cases).keys() == {case.key for case in cases}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_scene_that_cannot_be_read(
     dask: DaskCluster, shared: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -288,7 +288,7 @@ def test_an_address_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sys.warnoptions[-1:] != ["ignore"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_ctrl_c(tmp_path: Path, room: Path) -> None:
     """Ctrl-C ends the command, its cluster and the process of the case, with one line."""
     (tmp_path / "waits.toml").write_text(

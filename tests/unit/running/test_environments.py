@@ -126,7 +126,7 @@ def test_a_mistyped_engine_is_not_installed(
         make_environment.add(name, [requirement])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_interrupted_environment_leaves_nothing(wheels: Path, tmp_path: Path) -> None:
     """Ctrl-C ends what was started, exits 130, and no half is taken for a whole."""
     pidfile = tmp_path / "pid"

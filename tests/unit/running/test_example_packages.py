@@ -39,7 +39,7 @@ def test_an_engine_without_a_package_is_refused(packages: dict[str, Path], advic
         install("chrono", packages)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_package_that_pip_refuses_says_why(tmp_path: Path) -> None:
     """A package for another Python is refused in pip's own words."""
     project = '[project]\nname = "none"\nversion = "1"\nrequires-python = "<3"\n'

@@ -74,7 +74,7 @@ def test_an_engine_runs_where_its_name_says(
     assert files[0] != files[1]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_place_is_no_part_of_a_result(old: Path, tmp_path: Path) -> None:
     """The same packages at another path make the same case, so that what is stored is used; other packages do not."""
     other = seeing(tmp_path / "copy", "1.0")
@@ -85,7 +85,7 @@ def test_a_place_is_no_part_of_a_result(old: Path, tmp_path: Path) -> None:
     assert case_in(other).key != case_in(old).key
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_an_environment_that_changed_is_a_row(old: Path, tmp_path: Path) -> None:
     """An engine upgraded, or deleted, after it was asked fails with both versions; all other rows arrive."""
@@ -103,7 +103,7 @@ def test_an_environment_that_changed_is_a_row(old: Path, tmp_path: Path) -> None
     assert "there is no" in by_status[Status.MISSING]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_another_scene_there_is_a_row(old: Path, tmp_path: Path) -> None:
     """A case whose scene reads otherwise where the engine runs is no result."""
     case = Case(**{**vars(case_in(old)), "scene_digest": "other"})
@@ -112,7 +112,7 @@ def test_another_scene_there_is_a_row(old: Path, tmp_path: Path) -> None:
     assert "is another scene where" in result.message
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_worker_that_echoes_another_version_is_no_result(old: Path, tmp_path: Path) -> None:
     """What ran is compared with what had answered, also on this side of the pipe."""
     case = case_in(old)
@@ -134,7 +134,7 @@ def writes(text: str) -> Callable[[Path], Path]:
     return lambda folder: script(folder / "program", text)
 
 
-@pytest.mark.drill_of("too-old")
+@pytest.mark.nightly_of("too-old")
 @pytest.mark.parametrize(
     ("make", "error", "says"),
     [
@@ -221,7 +221,7 @@ def test_releases(text: str, numbers: tuple[int, ...]) -> None:
     assert release(text) == numbers
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_command_line_takes_a_place(old: Path, proofroll: Callable[..., Any], tmp_path: Path) -> None:
     """Run, and compare with the rows of an engine moved there."""
     code, out, _ = proofroll("run", "sphere_in_cylinder", "--engine", f"aged@{old}", "--until", "0.02", "--json")

@@ -55,7 +55,7 @@ def built(name: str, scene: str = "pendulum", **options: Any) -> Any:
     return kind.build(load_scene(scene), resolve_settings(kind, options))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_program_in_perl_is_judged(proofroll: Callable[..., Any], tmp_path: Path) -> None:
     """The example agrees with the truth, at the order that it declares."""
     claim = tmp_path / "rod.toml"
@@ -162,6 +162,7 @@ def test_a_program_that_does_not_answer_is_asked_once(tmp_path: Path) -> None:
     assert not begun.exists() or begun.read_text().split() == ["begun"]
 
 
+@pytest.mark.nightly_of("recommend")
 @pytest.mark.parametrize(
     "command", ["run", *(pytest.param(name, marks=pytest.mark.drill) for name in ("compare", "recommend"))]
 )

@@ -29,7 +29,7 @@ def changed(folder: Path, texts: dict[str, str], **parameters: float) -> Scene:
     return load_scene(str(folder), **parameters)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=5, deadline=None)
 @given(e=st.just(0.0) | st.floats(0.01, 0.8), height=st.floats(0.01, 3))
 def test_infinitely_many_bounces(e: float, height: float) -> None:
@@ -56,6 +56,7 @@ def test_an_impact_at_the_end_is_not_among_the_events() -> None:
     assert len(events_of(truth(scene, np.array([0.0, 2.5 * falls * (1 + 1e-6)])))) == 3
 
 
+@pytest.mark.nightly_of("0.5-2.4-0.985-0.1-0.0")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("e", "height", "tilt", "radius", "speed"), [(0.5, 2.4, 0.985, 0.1, 0.0), (0.6, 0.451, -0.28, 0.068, -0.714)]

@@ -11,7 +11,8 @@ import xarray as xr
 
 from proofroll import Refused, simulate
 from proofroll.core import plugins
-from proofroll.core.dataset import BY_STEPS, ENDED, ENDS, HORIZON
+from proofroll.core.columns import Variable
+from proofroll.core.dataset import BARS, BY_STEPS, ENDED, ENDS, HORIZON, bar_until
 from proofroll.core.engine_abilities import Steps, stepped
 from proofroll.core.errors import Missing
 from proofroll.core.pace import PACE, OutOfTime
@@ -133,6 +134,34 @@ def test_a_reference_ends_at_its_horizon(
     assert words in cut.attrs[HORIZON]
     assert cut.attrs.get(ENDS) == (None if end is None else pytest.approx(end))
     assert cut.sizes["time"] == (4 if end is None else round(end / 0.1))
+
+
+def test_the_bar_grows_in_time() -> None:
+    """Three times the largest last change so far: the length of a vector, of two quaternions the nearer sign."""
+    times = np.array([0.0, 0.1, 0.2, 0.3])
+    moved = np.array([[0, 0, 0], [3e-3, 0, 4e-3], [1e-3, 0, 0], [0, 6e-3, 8e-3]])
+    places = Variable(("time", "xyz"), np.zeros((4, 3)), {"units": "m"})
+    attrs = by_steps._bars("p", places, places._replace(values=moved), times)
+    assert [bar_until(attrs, time) for time in (0.0, 0.05, 0.1, 0.25, 9.0)] == pytest.approx(
+        [0, 0, 15e-3, 15e-3, 30e-3]
+    )
+    assert attrs["error_bar"] == pytest.approx(30e-3)
+    assert len(attrs[BARS]) == 6
+    turned = Variable(("time", "wxyz"), np.tile([1.0, 0, 0, 0], (4, 1)), {"units": "1"})
+    assert by_steps._bars("q", turned, turned._replace(values=-turned.values), times)["error_bar"] == 0
+    speeds = places._replace(attrs={"units": "m/s"})
+    assert by_steps._bars("v", speeds, speeds, times) == {"error_bar": np.inf}
+    assert by_steps._bars("time", Variable(("time",), times), Variable(("time",), times), times) == {}
+    assert bar_until({"error_bar": 2.0}, 0.1) == 2.0
+    assert bar_until({}, 0.1) == np.inf
+
+
+def test_a_reference_is_known_as_well_as_before_its_horizon() -> None:
+    """What is behind the horizon does not widen the bar of what is told."""
+    attrs = {"error_bar": 9.0, BARS: [0.0, 1.0, 0.1, 2.0, 0.3, 9.0]}
+    whole = xr.Dataset({"x": ("time", np.arange(4.0), attrs)}, coords={"time": 0.1 * np.arange(4)})
+    cut = by_steps._to_horizon(whole, np.array([0, 1e-4, 2e-2, 3e-2]), np.zeros(4))
+    assert cut["x"].attrs["error_bar"] == 2.0
 
 
 @pytest.mark.drill

@@ -54,7 +54,7 @@ def test_a_slider_passes_its_dead_centre() -> None:
     assert np.isinf(found.horizon)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_driven_crank_carries_its_slider_through_both_senses() -> None:
     """The drive's torque has both signs of friction in turn."""
     found = truth_of(piston("0.7853981633974483 + 10*t"), np.linspace(0.0, 0.4, 5))
@@ -64,7 +64,7 @@ def test_a_driven_crank_carries_its_slider_through_both_senses() -> None:
     assert friction.tolist() == [2.0, 2.0, 2.0, -2.0, -2.0]
 
 
-@pytest.mark.drill_of("sine")
+@pytest.mark.nightly_of("sine")
 @pytest.mark.parametrize(
     ("motion", "speed", "acceleration", "turns"),
     [

@@ -57,7 +57,7 @@ def _gap(_: float, y: np.ndarray) -> float:
 _gap.terminal = True  # type: ignore[attr-defined]  # as solve_ivp reads it
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_pushed_box_meets_one_that_falls_back() -> None:
     """They meet when and as fast as two pendulums of an own integration do, and go on without approaching."""
     alone = solve_ivp(_accelerated, (0.0, 0.2), [0.0, _SPIN, 0.0, 0.0], events=_gap, rtol=1e-12, atol=1e-14)

@@ -26,6 +26,7 @@ def slider(law="", at=0.0, v0=1.0, mass=1.0, **more):
     return Mechanism((Body("m", mass),), (joint,), springs=springs, gravity=(0, 0, 0), **more)
 
 
+@pytest.mark.nightly_of("False")
 @pytest.mark.drill
 @pytest.mark.parametrize("compiled", [True, pytest.param(False, marks=pytest.mark.drill)])
 def test_a_spring_with_two_stiffnesses_swings_through_its_kink(compiled, monkeypatch):
@@ -41,7 +42,7 @@ def test_a_spring_with_two_stiffnesses_swings_through_its_kink(compiled, monkeyp
     assert not found.events
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_laws_with_one_meaning_give_one_motion():
     """abs, max, min and sign write one law in four ways."""
     laws = ("2.5*(L-1) + 1.5*abs(L-1)", "max(4*(L-1), L-1)", "-min(-4*(L-1), 1-L)", "(2.5 + 1.5*sign(L-1))*(L-1)")
@@ -60,6 +61,7 @@ def test_a_start_at_a_kink_takes_the_side_of_its_motion(at, v0):
     assert found.record.q[-1, 0] == pytest.approx(true, abs=1e-12)
 
 
+@pytest.mark.daily("force-max(0, sin(3*t))", "torque-abs(cos(3*t))", "target-sign(sin(3*t))", "force-min(t, 1 - t)")
 @pytest.mark.parametrize("text", ["max(0, sin(3*t))", "abs(cos(3*t))", "sign(sin(3*t))", "min(t, 1 - t)"])
 @pytest.mark.drill
 @pytest.mark.parametrize("part", ["force", "torque", "target"])

@@ -29,6 +29,7 @@ def shaken(motion: Signal) -> Mechanism:
     return replace(mechanism, joints=(replace(base, motion=motion, q0=(), v0=()), replace(hinge, damping=0.01)))
 
 
+@pytest.mark.nightly_of("True")
 @pytest.mark.drill
 @pytest.mark.parametrize("table", [pytest.param(False, marks=pytest.mark.drill), True])
 def test_a_shaken_pendulum_is_that_of_its_equation(table: bool) -> None:
@@ -59,7 +60,7 @@ def test_a_shaken_pendulum_is_that_of_its_equation(table: bool) -> None:
     assert truth.bars["named"][-1] < 1e-9 * np.abs(force).max()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_driven_four_bar_is_geometry() -> None:
     """The rocker has Freudenstein's angle, and the work of the drive is the change of energy."""
     mechanism, times = mechanism_named("driven_four_bar"), np.linspace(0, 1, 401)
@@ -182,6 +183,7 @@ def test_friction_and_stops_beside_a_motion_switch_alike() -> None:
     assert np.abs(run["drive.shaker"].to_numpy() - truth.record.named[:, 0])[1:].max() < 1e-8
 
 
+@pytest.mark.nightly_of("3.0")
 @pytest.mark.drill
 @pytest.mark.parametrize("angle", [0.3, pytest.param(3.0, marks=pytest.mark.drill)])
 def test_a_motion_that_leaves_nothing_free_holds_its_laws(angle: float) -> None:

@@ -58,7 +58,7 @@ def test_truth_of_a_ball_agrees_with_rolling_rows() -> None:
     assert not outside(true, found, {str(name): str(name) for name in true.data_vars if name in found})
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_numbers_and_series_agree() -> None:
     """DOP853 on the same rows, projected after each step, moves the ball as the series do."""
     pytest.importorskip("heyoka")

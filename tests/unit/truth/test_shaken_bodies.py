@@ -27,6 +27,7 @@ def _turned(mechanism: Mechanism, seed: int) -> tuple[Mechanism, np.ndarray]:
     return turned, np.array(level.gravity)
 
 
+@pytest.mark.nightly_of("0")
 @pytest.mark.parametrize("seed", _SEEDS)
 def test_a_can_on_a_shaken_plate_slips_and_sticks(seed: int) -> None:
     """It slips where the plate brakes harder than friction can, and sticks where the plate has its speed again."""
@@ -58,6 +59,7 @@ def test_a_can_on_a_shaken_plate_slips_and_sticks(seed: int) -> None:
     assert moved == pytest.approx(way * np.sin(rate * 0.4) + apart, abs=1e-11)
 
 
+@pytest.mark.nightly_of("0")
 @pytest.mark.parametrize("seed", _SEEDS)
 def test_a_box_that_is_pushed_to_and_fro_on_a_slope_turns(seed: int) -> None:
     """All four corners slip, turn where the box stops under a push beyond friction, stick, and slip again.

@@ -93,6 +93,7 @@ def test_a_leg_that_rubs_in_its_joints_rests_on_its_tip(lean: float, bend: float
     assert np.isnan(found.record.named).all()
 
 
+@pytest.mark.nightly_of("100000000.0")
 @pytest.mark.parametrize("ratio", [1e6, pytest.param(1e8, marks=pytest.mark.drill)])
 def test_a_box_rests_on_one_that_is_far_lighter(ratio: float) -> None:
     """Forces that cancel on a light body leave few digits of its own: both boxes rest, whatever the ratio of masses."""

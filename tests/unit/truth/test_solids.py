@@ -261,7 +261,7 @@ def over_the_rim(times: Any, moment: float) -> Any:
     return np.array([x, z, turn]).T
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_slides_over_a_rim_tips_when_its_centre_passes_it() -> None:
     """Its leading corners end at the rim, where edges cross; it tips about these as an independent solver says."""
     start, since = -0.12, np.array([0.0, 0.03, 0.06, 0.09])
@@ -361,6 +361,7 @@ def mujoco_distances(shapes: tuple[Geometry, ...], found: TwoRouteMotion) -> lis
 TUMBLE_FIRST = {("box", 1), ("capsule", 0)}
 
 
+@pytest.mark.nightly_of("box-1-False")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("other", "seed", "swapped"),
@@ -396,7 +397,7 @@ def test_solids_that_tumble_collide_without_overlap(other: str, seed: int, swapp
     assert np.abs(momentum - momentum[0]).max() < 1e-12
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.nightly), 0.6])
 def test_an_elastic_cube_that_lands_flat_beside_its_centre_rises_as_it_fell(friction: float) -> None:
     """Four points at one speed return it together: the cube does not turn, and its error bar is round-off."""

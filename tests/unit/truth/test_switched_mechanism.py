@@ -427,7 +427,7 @@ def test_spheres_that_graze_each_other_are_ill_posed(apart: float) -> None:
     assert found.events == ()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_many_joints_at_rest_on_a_body_that_spins() -> None:
     """Eight rubbing joints, at rest on a body that turns and falls, stay or begin to move by one law in both routes."""
     bodies, joints = [Body("trunk", 3.0, inertia=(0.05, 0.06, 0.07))], []

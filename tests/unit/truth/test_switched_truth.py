@@ -155,6 +155,7 @@ def test_infinitely_many_impacts_end_when_their_sum_says() -> None:
     assert found.pressed[1, 0, 2] == pytest.approx(0.517 * 9.81, abs=DIGITS)
 
 
+@pytest.mark.nightly_of("0.2")
 @pytest.mark.drill
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_the_error_of_rebounds_cut_short_is_within_the_bars(friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -410,7 +411,7 @@ def sliding_box(
     return Mechanism((box,), (free,), gravity=gravity, geometries=shapes, pairs=pairs)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_slides_straight_on_four_corners_stops_where_coulomb_says() -> None:
     """Friction brakes it by mu g however its corners share the load; what each of them carries is not told."""
     found = truth_of(sliding_box((0.8, 0.6)), np.array([0.0, 0.1, 0.5]))
@@ -612,7 +613,7 @@ def test_a_pendulum_rebounds_from_a_wall_by_newtons_law_whatever_the_friction() 
     assert bar["slip.hit"] >= bar["v.hinge"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_capsule_slides_and_rolls_on_both_its_ends() -> None:
     """Its ends share what holds them along its axis in many ways; its motion is the one of a roller all the same."""
     mass, inertia, radius, mu = 0.5, 6e-4, 0.05, 0.3
@@ -769,7 +770,7 @@ def test_a_plate_that_turns_on_thirty_two_feet_has_no_determinate_friction() -> 
     assert "carry the load together in more ways than one" in found.reason
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_lands_on_an_edge_tips_on_its_face_and_rests() -> None:
     """Both corners of the edge land, then both of the other edge, and all four share the weight."""
     turned = (float(np.cos(0.15)), 0.0, float(np.sin(0.15)), 0.0)

@@ -81,7 +81,7 @@ def test_error_bar_covers_a_closed_form_that_had_no_part_in_it(scene):
     assert truth.bars["q_WB"][-1] < 1e-11
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_chosen_rows_that_become_dependent_are_exchanged(scene):
     """A ring whose rows chosen at the start become dependent at a regular pose has a truth beyond, by two routes."""
     pytest.importorskip("heyoka")
@@ -157,7 +157,7 @@ def test_the_bar_has_what_round_off_grows_to(scene, monkeypatch):
     assert found.bars["p_WB"][-1] > 1e-2 * NUDGE / BESIDE
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_growth_is_the_same_by_another_arithmetic(scene, monkeypatch):
     """Taylor series and DOP853 tell how motions part to one in ten thousand, so that no horizon flips between them."""
     pytest.importorskip("heyoka")
@@ -209,7 +209,7 @@ def test_singular_poses_without_a_closed_form_end_a_truth(scene):
     assert found.record.q[1] == pytest.approx(shorter.record.q[1], abs=1e-13)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_collapsed_sarrus_linkage_ends_a_truth():
     """Two pairs of hinged plates guide a platform down until they lie flat, where all rows of its loops lose rank."""
     times = np.linspace(0.0, 1.0, 11)
@@ -414,7 +414,7 @@ def test_routes_that_start_apart_are_an_error_of_ours(scene, monkeypatch):
     assert "singular" not in str(refused.value)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_energy_of_a_wound_spring_needs_no_more_samples_than_asked_for(monkeypatch):
     """A spring on the fast axis of a universal joint holds its energy at four samples over ten turns."""
     monkeypatch.setattr(maximal_taylor, "heyoka", None)
@@ -458,6 +458,7 @@ def test_routes_of_a_spinning_body_agree(scene):
     assert max(found.differences["q_WB"], found.differences["points"]) < 2e-10
 
 
+@pytest.mark.nightly_of("False-switching", "True-smooth")
 @pytest.mark.drill
 @pytest.mark.parametrize("route", [find_truth, switched_truth], ids=["smooth", "switching"])
 @pytest.mark.parametrize("compiled", [True, False])
@@ -474,6 +475,7 @@ def test_a_failure_of_the_rates_ends_the_truth_at_its_time(monkeypatch, route, c
         assert found.ended.startswith("the bushing mount turns by more than 3 rad")
 
 
+@pytest.mark.nightly_of("50.0-0.00655755831")
 @pytest.mark.parametrize(
     ("until", "place"),
     [(5.0, -0.027406676253), pytest.param(50.0, 0.00655755831, marks=pytest.mark.drill)],

@@ -156,6 +156,7 @@ def test_a_coefficient_below_zero_is_refused_by_its_name() -> None:
         law(spinning_friction=-1.0)
 
 
+@pytest.mark.nightly_of("laws3-velocity3-0.06-0.0")
 @pytest.mark.parametrize(
     ("laws", "velocity", "height", "slope"),
     [
@@ -183,12 +184,11 @@ def test_the_projection_solver_follows_friction_against_turning(
     assert max(item.error for item in moved) < 1e-11  # 1e-13 is seen
 
 
-@pytest.mark.drill_of(
-    "laws0-velocity0-0.0-pinocchio[formulation=impulses]-errors0",
-    "laws1-velocity1-0.2-exudyn[formulation=spheres]-errors2",
-    "laws0-velocity0-0.0-exudyn[formulation=spheres]-errors2",
-    "laws3-velocity3-0.0-exudyn[formulation=spheres]-errors2",
+@pytest.mark.nightly_of("laws3-velocity3-0.0-exudyn[formulation=spheres]-errors2")
+@pytest.mark.nightly_of(
+    "laws1-velocity1-0.2-exudyn[formulation=spheres]-errors2", "laws0-velocity0-0.0-exudyn[formulation=spheres]-errors2"
 )
+@pytest.mark.drill_of("laws0-velocity0-0.0-pinocchio[formulation=impulses]-errors0")
 @pytest.mark.parametrize(
     ("setting", "errors"),
     [

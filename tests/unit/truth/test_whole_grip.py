@@ -49,6 +49,7 @@ def _way(time: float) -> float:
 _TURNS = [Rotation.identity(), Rotation.from_euler("xyz", [0.4, -1.1, 2.3])]
 
 
+@pytest.mark.nightly_of("level")
 @pytest.mark.drill
 @pytest.mark.parametrize(("turn", "along"), [(_TURNS[0], 2.0), (_TURNS[1], 0.0)], ids=["level", "turned"])
 def test_a_pulled_box_slips_with_all_its_feet(turn: Rotation, along: float) -> None:

@@ -100,6 +100,7 @@ class Integration:
         self.dt = settings.dt
         self.system = system
         self.options = simulation_settings(settings, dependent=dependent, mass=mass)
+        self.options.timeIntegration.startTime, self.options.timeIntegration.endTime = at, at + settings.dt
         explicit = settings.integrator in EXPLICIT
         pushed = moved(at) if moved else {}
         start = None

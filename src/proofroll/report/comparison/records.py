@@ -14,6 +14,7 @@ from proofroll.core.number_format import counted
 from proofroll.core.observable import Role
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import MERGED
+from proofroll.report.comparison.distances import Distances
 from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import names
 from proofroll.report.pages import section_id, slug
@@ -158,6 +159,7 @@ class ReportedComparison:
         shown_by: name of the kind of element that adds to its report.
         requires: capabilities that its scene requires of a formulation, sorted.
         spread: of the points where only laws of mechanics are judged.
+        distances: of the points whose truth is a reference by steps.
         step_bound: clause on the longest stable step and on those of the rows; empty: nothing bounds it.
         omitted: clauses on what the scene's file describes and the comparison leaves out.
         unjudged: reactions that a comparison without a file does not judge.
@@ -187,6 +189,7 @@ class ReportedComparison:
     beyond_budget: list[str] = field(default_factory=list)
     truth_ends: list[str] = field(default_factory=list)
     spread: list[Spread] = field(default_factory=list)
+    distances: list[Distances] = field(default_factory=list)
     step_bound: str = ""
     omitted: list[str] = field(default_factory=list)
     unjudged: list[str] = field(default_factory=list)

@@ -14,6 +14,7 @@ from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import SEVERITY, Judgement, Verdict
 from proofroll.files.trajectory_file import StoredTrajectory
+from proofroll.report.comparison.distances import distances_of
 from proofroll.report.comparison.records import (
     CoarserSteps,
     ReportedComparison,
@@ -83,6 +84,11 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
             )
             for name in outcome.laws_alone
         ],
+        distances=[
+            item
+            for name, point in outcome.points.items()
+            if (item := distances_of(name, point.reference, {row: run for row, run, _ in runs_at(outcome, name)}))
+        ],
         budget=comparison.budget,
         beyond_budget=outcome.beyond_budget,
         truth_ends=[*_truth_ends(outcome), *([outcome.no_contact] if outcome.no_contact else _quiet(outcome))],
@@ -114,7 +120,7 @@ def _truth_ends(outcome: Outcome) -> list[str]:
     bounds = {name: bound for band in outcome.comparison.bands.values() for name, bound in band.bounds.items()}
     by_steps = {_by_steps_words(reference, bounds): None for reference in truths.values() if reference.by_steps}
     ends = [
-        f"Not judged behind the end of the truth{at_point(outcome.points[name].case.parameters)}: {reference.ended}."
+        f"Nothing is judged behind the last value{at_point(outcome.points[name].case.parameters)}: {reference.ended}."
         for name, reference in truths.items()
         if reference.ended
     ]

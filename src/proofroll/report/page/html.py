@@ -18,6 +18,7 @@ from proofroll.report import labels
 from proofroll.report.answer import picture, sentences
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.comparison.closing import closing_notes
+from proofroll.report.comparison.distances import distance_cells
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page import first_screen, model_lines, verdict_strips
@@ -125,6 +126,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "verdict_text": labels.verdict_text,
         "setting": labels.setting,
         "closing_notes": closing_notes,
+        "distance_cells": distance_cells,
         "alone_words": ALONE,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,

@@ -1,13 +1,14 @@
-"""Tables of ``proofroll run`` on the terminal: values at the end, and bounces."""
+"""Tables of ``proofroll run`` on the terminal: values at the end, bounces, matrices of the equations of motion."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
 from proofroll.core.bounces import Bounce
 from proofroll.core.number_format import with_bar
 from proofroll.core.quantity import powers_of
+from proofroll.report.kinds import EquationMatrices
 
 FORCES = ("N", "N m")
 _DIGITS, _FEW_DIGITS = 12, 7
@@ -81,6 +82,7 @@ def value_table(
     shown: Collection[str],
     *,
     all_digits: bool = True,
+    ended: float | None = None,
 ) -> Any:
     """Table of the last values: positions first, then velocities, energies and residuals, then forces.
 
@@ -93,6 +95,7 @@ def value_table(
         bars: variable -> error bar, where one is known.
         shown: variables of the table.
         all_digits: False for seven digits of each value.
+        ended: time of the values [s] where it is before the end that was asked for; None: it is that end.
     """
     from rich.table import Column, Table
 
@@ -113,9 +116,10 @@ def value_table(
         alike.setdefault(row, []).append(name)
     rows = [(text, *cells) for (_, *cells), names in alike.items() for text in short_names(names)]
     widths = [max(map(len, column), default=0) for column in zip(*rows, strict=True)]
-    if bars or all_digits or sum(widths) + 2 * len(widths) > _COLUMN:
+    if bars or all_digits or ended is not None or sum(widths) + 2 * len(widths) > _COLUMN:
         of_bars = [Column("error bar", justify="right")] if bars else []
-        table = Table("at the end", Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
+        when = "at the end" if ended is None else f"at {ended:.6g} s"
+        table = Table(when, Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
         for row in rows:
             table.add_row(*row)
         return table
@@ -158,3 +162,24 @@ def _place(unit: str) -> int:
     """Place of a variable in the table by its unit: places and angles, velocities, the rest, forces and moments."""
     order = {"s": 0, "m": 1, "rad": 1, "m/s": 2, "rad/s": 2}
     return 4 if unit in FORCES else order.get(unit, 3)
+
+
+def matrix_lines(content: EquationMatrices) -> Iterator[Any]:
+    """Table of M, h and g with a row for each velocity, and how far they are from the truth's."""
+    from rich.table import Table
+    from rich.text import Text
+
+    yield "M v' + h + g = tau at the start, in the velocities of the joints:"
+    table = Table(box=None, pad_edge=False)
+    table.add_column("velocity")
+    names = [Text(name) for name in content.velocities]
+    for heading in (*names, Text("h"), Text("g")):
+        table.add_column(heading, justify="right")
+    for number, name in enumerate(names):
+        row = [] if content.M is None else content.M[number]
+        ends = (part[number] for part in (content.h, content.g) if part is not None)
+        table.add_row(name, *(f"{value:.8g}" for value in (*row, *ends)))
+    yield table
+    if content.differences:
+        shown = ", ".join(f"{name} {value:.1g}" for name, value in content.differences.items())
+        yield f"differences from the truth's, relative to their largest entries: {shown}"

@@ -175,11 +175,11 @@ def _ended_words(content: RunContent, engine: str) -> str:
     steps = [step(name, content.settings[name]) for name in resolution]
     title = ", ".join(filter(None, (*words, *precision_words(content.precision), *steps)))
     if content.status != Status.DONE or content.engine == "truth":
-        return f"{title}: {content.message}; {content.wall_seconds:.2g} s of computing"
+        return f"{title}: {content.message}; {number(content.wall_seconds)} s of computing"
     speed = f" ({number(content.until / content.wall_seconds)}× real time)" if content.wall_seconds else ""
     seconds = content.build_seconds or 0.0
     build = f", after {number(seconds)} s before the first step" if seconds > _BUILD else ""
-    return f"{title} reached {content.until:g} s in {content.wall_seconds:.2g} s{speed}{build}."
+    return f"{title} reached {content.until:g} s in {number(content.wall_seconds)} s{speed}{build}."
 
 
 def _hidden_forces(content: RunContent) -> list[str]:
@@ -231,7 +231,11 @@ def run_lines(
     least = {f"smallest {name}": value for name, value in (content.smallest or {}).items()}
     units = content.units | {f"smallest {name}": content.units.get(name, "1") for name in content.smallest or {}}
     bars = content.error_bars or {}
-    table = value_table(content.final | least, units, bars, [*shown, *least], all_digits=everything or bool(bars))
+    last = content.final.get("time", content.until)
+    ended = None if last >= content.until - content.every / 2 else last
+    table = value_table(
+        content.final | least, units, bars, [*shown, *least], all_digits=everything or bool(bars), ended=ended
+    )
     lines += ["", table, ""]
     if hidden:
         lines.append(Text(f"{len(hidden)} forces and moments: --forces"))

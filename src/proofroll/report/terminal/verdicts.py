@@ -13,6 +13,7 @@ from proofroll.core.number_format import counted, error, number, spaced
 from proofroll.core.verdict import SEVERITY, LimitResult, Verdict
 from proofroll.report.answer.sentences import measure
 from proofroll.report.comparison.closing import closing_notes
+from proofroll.report.comparison.distances import Distances, distance_cells
 from proofroll.report.comparison.records import (
     CoarserSteps,
     ReportedComparison,
@@ -86,6 +87,8 @@ def verdict_parts(
         yield from row_lines(row, runs, [item for item, _ in listed], orders=orders)
     for item in content.spread:
         yield from ("", *spread_parts(item))
+    for distances in content.distances:
+        yield from ("", *distance_parts(distances, content))
     yield ""
     yield from closing_lines(content, [row for row, _ in engines], orders=orders)
 
@@ -165,7 +168,7 @@ def _nearest(row: ReportedRow) -> str:
     worst = worst_of(row)
     assert worst is not None  # it was chosen by its judgement
     text = f"No setting agrees. Nearest: {', '.join(row_words(row))}"
-    if row.verdict in _HOLDS:
+    if row.verdict in {*_HOLDS, Verdict.NOT_JUDGED}:
         return f"{text}, {_why(row, []) or row.verdict}."
     text += f": {symbol(worst.observable)}, {error(worst.of_allowed)} times what is allowed"
     if row.verdict is not Verdict.CONVERGES or row.resolution != "dt" or not worst.order or worst.order < 0:
@@ -288,6 +291,16 @@ def spread_parts(spread: Spread) -> Iterator[Table | str]:
         yield table
     if len(spread.lines) > _WIDEST:
         yield f"Narrower spreads, in the report and its JSON: {len(spread.lines) - _WIDEST}."
+
+
+def distance_parts(distances: Distances, content: ReportedComparison) -> Iterator[Table | str]:
+    """Table of the distances from a reference by steps."""
+    place = f" at {distances.point}" if distances.point else ""
+    yield f"Largest distance from the reference{place}, of any body [mm] and its attitude [rad]:"
+    table = plain_table(Column("up to"), *numeric(*(f"{time:.3g} s" for time in distances.times), "s/s"))
+    for cells in distance_cells(distances, content.rows, content.runs):
+        table.add_row(*cells)
+    yield table
 
 
 def closing_lines(content: ReportedComparison, engines: Sequence[ReportedRow], *, orders: bool = False) -> list[str]:

@@ -137,8 +137,25 @@ def run_plan(
     budget = TimeBudget(seconds, planned.comparison.spent)
     results: dict[str, Result] = {}
     for cases in planned.stages:
-        results |= runner.run(cases, progress, budget)
+        lost = _without_ladder(planned, results)
+        for case in cases:
+            if progress and case.key in lost:
+                progress(case, lost[case.key])
+        results |= lost | runner.run([case for case in cases if case.key not in lost], progress, budget)
     return results
+
+
+def _without_ladder(planned: Plan, results: Mapping[str, Result]) -> dict[str, Result]:
+    """Results of the further steps of rows whose own step has no result: the same, for they judge nothing then."""
+    own = [(run.ladder.values(), results.get(run.ladder[1.0].key)) for run in planned.runs if run.ladder]
+    lost, awaited = dict[str, Result](), {*results}
+    for cases, result in own:
+        keys = [case.key for case in cases]
+        if result is None or result.status in {Status.DONE, Status.LEFT_OUT}:
+            awaited |= {*keys}
+        else:
+            lost |= dict.fromkeys(keys, Result(result.status, f"not run, as its own step was not: {result.message}"))
+    return {key: result for key, result in lost.items() if key not in awaited}
 
 
 def affordable(planned: Plan, runner: Runner) -> Plan:

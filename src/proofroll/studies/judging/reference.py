@@ -19,6 +19,7 @@ from proofroll.core.dataset import (
     CONTINUOUS,
     LEFT_OUT,
     Key,
+    bar_until,
     before_end,
     common_span,
     end_of_truth,
@@ -138,11 +139,15 @@ class Reference:
             return False
         return self.true(name, self.curves[name]).error_bar <= tolerance
 
+    def bar_until(self, name: str, time: float) -> float:
+        """Error bar of a variable up to a time [s], in its unit."""
+        return bar_until(self.dataset.variables[name].attrs, time)
+
     @property
     def ended(self) -> str:
         """Clause on the time and reason of an early end of the truth, behind which nothing is judged; or empty."""
-        end = ended_early(self.dataset)
-        return f"{end_of_truth(end[0])}: {end[1]}" if end else ""
+        end, word = ended_early(self.dataset), "reference" if self.by_steps else "truth"
+        return f"{end_of_truth(end[0]).replace('truth', word)}: {end[1]}" if end else ""
 
     @property
     def untouched(self) -> bool:
@@ -209,7 +214,7 @@ class Reference:
         if curve is None:  # for example a force that the equations do not determine all the time
             return np.full_like(values, np.nan), np.inf
         if item.role != Role.RESIDUAL:
-            return curve, float(self.dataset.variables[name].attrs.get("error_bar", np.inf))
+            return curve, self.bar_until(name, float(self.dataset.variables["time"].values[-1]))
         # Zero for a perfect run; the residual of the truth is the resolution of the measurement.
         return np.zeros_like(values), float(np.max(np.abs(curve), initial=0.0))
 

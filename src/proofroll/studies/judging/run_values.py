@@ -184,10 +184,12 @@ def error(reference: Reference, name: str, values: FloatArray, dataset: xr.Datas
 
 
 def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:
-    """Quaternions, shape (…, 4), with the signs of the true ones, as q and -q are the same orientation."""
-    if values.shape != true.shape:
+    """Quaternions, (time, …, 4), with the signs of the true ones as far as these go: q and -q are one orientation."""
+    count = min(len(values), len(true))
+    if values.shape[1:] != true.shape[1:]:
         return values
-    return np.asarray(values * np.where(np.sum(values * true, axis=-1, keepdims=True) < 0, -1.0, 1.0))
+    signs = np.where(np.sum(values[:count] * true[:count], axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    return np.concatenate([values[:count] * signs, values[count:]])
 
 
 def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:

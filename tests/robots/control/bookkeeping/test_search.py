@@ -51,6 +51,12 @@ def test_a_right_loop_is_accused_of_nothing(program: str, step: float) -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly_of(
+    "mujoco-0.002-velocity in the base",
+    "pinocchio-0.001-gravity 9.80",
+    "mujoco's servos-0.005-sign of a joint",
+    "mujoco-0.005-pose off",
+)
 @pytest.mark.parametrize(
     ("program", "step", "name"),
     [
@@ -70,7 +76,7 @@ def test_a_mistake_is_named_from_states_alone(program: str, step: float, name: s
     assert found.explanations[0].after < 1e-3 * found.before
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_sizes_come_back() -> None:
     """An unknown size is fitted to more than three digits."""
     found = _found("mujoco", 2e-3, kp=0.37 * 5.0)

@@ -11,6 +11,7 @@ from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 
 
+@pytest.mark.nightly_of("after")
 @pytest.mark.drill
 @pytest.mark.parametrize("side", ["before", "after"])
 def test_a_restitution_is_named_whichever_side_of_the_impact_a_sample_shows(side: str) -> None:

@@ -28,7 +28,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.running.time_budget import TimeBudget
-from proofroll.studies.comparison.compare import affordable, compare, evaluate
+from proofroll.studies.comparison.compare import affordable, compare, evaluate, run_plan
 from proofroll.studies.comparison.expectations import contradictions_of
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import Plan, Planned, point_name
@@ -405,7 +405,7 @@ def test_a_failure_that_was_expected_and_does_not_come(tmp_path: Path) -> None:
     assert said.startswith("alpha at speed=4 agrees, expected: failed")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) -> None:
     """At a stair edge what hangs on the time of slip is ill-posed, agreement included; energy and gap are judged."""
     bounds = {
@@ -431,7 +431,7 @@ def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) ->
     assert (run.verdict, run.contradictions) == (Verdict.ILL_POSED, [])
 
 
-@pytest.mark.drill_of("0.0001")
+@pytest.mark.nightly_of("0.0001")
 @pytest.mark.parametrize("tolerance", [1e-4, 2e-3])
 def test_events_that_are_late_alike_in_every_run_are_no_other_limit(tmp_path: Path, tolerance: float) -> None:
     """An event that ends with the same step on each rung of a ladder is known to that step, within tolerance or not."""
@@ -475,7 +475,7 @@ def test_what_holds_on_every_path_is_judged_at_a_stair_edge(tmp_path: Path) -> N
     assert "differs, expected: agrees" in said
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_neighbouring_points_have_truths_of_their_own(
     tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]
 ) -> None:
@@ -560,6 +560,41 @@ def test_a_budget_buys_the_time_that_a_truth_ends_in(longest: float, until: floa
     assert {case.until for case in found.cases} == {found.comparison.until}
     assert (found.comparison.spent >= 60.0) is (longest < 0.01)
     assert ("(the first 0.05 s, for which the budget suffices)" in found.comparison.title) is (until == 0.05)
+
+
+@pytest.mark.parametrize("status", [Status.DIVERGED, Status.REFUSED, Status.DONE])
+def test_the_other_steps_of_a_lost_row_are_not_run(status: Status) -> None:
+    """Where a row's own step has no result, no other step of it is run, but for those that another row needs."""
+    comparison = dataclasses.replace(claim([ROW], [4.0]), budget=60.0)
+    usual, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
+    given = (comparison.scene, {}, usual.digest)
+
+    def case(dt: float) -> Case:
+        return Case(*given, dataclasses.replace(FACTS, settings={"dt": dt}), comparison.until, comparison.every)
+
+    fine, coarse = ({1.0: case(dt), 2.0: case(2 * dt), 4.0: case(4 * dt)} for dt in (1e-3, 2e-3))
+    rows = [Planned(ROW, {}, FACTS, ladder) for ladder in (fine, coarse)]
+    asked = Plan(comparison, usual, file, {"": usual}, {"": Case(*given, TRUTH, 0.4, 0.02)}, rows)
+    ran: list[str] = []
+
+    class Answering:
+        def run(self, cases: Sequence[Case], *_: object) -> dict[str, Result]:
+            ran.extend(case.key for case in cases)
+            return {case.key: Result(status if case.key == fine[1.0].key else Status.DONE, "so") for case in cases}
+
+    told: dict[str, Result] = {}
+    results = run_plan(asked, Answering(), lambda case, result: told.update({case.key: result}))  # type: ignore[arg-type]
+    assert results.keys() == {case.key for case in asked.cases}
+    assert set(ran) == results.keys(), "the finer row shares its other steps with the coarser one"
+    alone = dataclasses.replace(asked, runs=rows[:1])
+    ran.clear()
+    results = run_plan(alone, Answering(), lambda case, result: told.update({case.key: result}))  # type: ignore[arg-type]
+    assert results.keys() == {case.key for case in alone.cases}
+    others = {fine[2.0].key, fine[4.0].key}
+    assert set(ran) & others == (others if status is Status.DONE else set())
+    if status is not Status.DONE:
+        assert all(results[key] is told[key] for key in others)
+        assert {results[key].status for key in others} == {status}
 
 
 LEFT_OUT = Result(Status.LEFT_OUT, "the 60 s of processor time did not suffice")

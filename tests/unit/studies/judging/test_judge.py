@@ -31,6 +31,7 @@ def test_the_cost_of_judging_does_not_grow_with_the_number_of_variables(monkeypa
     assert indexed < 10
 
 
+@pytest.mark.nightly_of("False")
 @pytest.mark.drill
 @pytest.mark.parametrize("of_a_run", [True, False])
 def test_a_sample_on_an_impact_may_be_of_either_side(*, of_a_run: bool) -> None:

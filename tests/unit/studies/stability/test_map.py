@@ -107,7 +107,7 @@ def test_a_quick_map_does_not_make_runs_that_are_foretold_to_be_long(small: Any)
     assert point.ladder[coarsest] / point.ladder[max(made)] <= 8 < point.ladder[coarsest] / point.ladder[max(made) + 1]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_checks_the_truth_is_mapped_on_request(tmp_path: Path) -> None:
     """Without names its formulations are absent with a sentence; by its name it is on the map."""
     axis = dataclasses.replace(SPEED, values=[2.0])
@@ -132,7 +132,7 @@ def test_a_run_that_met_the_limit_of_time_contradicts_nothing() -> None:
     assert "limit of time" in claim.untested(late)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
     """What has neither step nor tolerance is named with the reason, and its neighbour is mapped by its tolerance."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})

@@ -22,6 +22,7 @@ def box_on(gravity: tuple[float, float, float], joint: Joint, friction: float) -
     return Mechanism((Body("box", 1.0, inertia=INERTIA),), (joint,), gravity=gravity, geometries=shapes, pairs=pairs)
 
 
+@pytest.mark.nightly_of("False")
 @pytest.mark.drill
 @pytest.mark.parametrize("planar", [pytest.param(False, marks=pytest.mark.drill), True])
 def test_a_box_that_begins_to_slide_on_four_corners_is_well_posed(planar: bool) -> None:
@@ -41,7 +42,7 @@ def test_a_box_that_begins_to_slide_on_four_corners_is_well_posed(planar: bool) 
     assert np.isnan(found.pressed[:, ::2, 2]).all()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("pull", [150.0, pytest.param(200.0, marks=pytest.mark.nightly)])
 def test_a_block_slides_on_a_block_that_is_pulled_away(pull: float) -> None:
     """Friction drives the upper block by mu g however its corners share its weight, at any pull that tears it off."""

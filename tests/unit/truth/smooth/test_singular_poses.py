@@ -72,7 +72,7 @@ def parallelogram(damping):
 REPORTING_ERRORS = r"near t = 0.2\d*, 0.7\d* s the rows of the loops lose rank and the motion may branch"
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_parallelogram_in_closed_form_says_where_it_may_branch():
     """It goes on as the formula does, and the truth says from where on lengths decide; before that it says nothing."""
     element = MechanismElement(parallelogram(0.0))
@@ -128,7 +128,7 @@ def pushed_ball():
     )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_slip_from_rest_that_ends_at_a_singular_pose_starts_at_rest():
     """The stretch is known from its start on, not from where the slip has a direction."""
     found = truth_of(pushed_ball(), np.array([0.0, 0.1, 0.3]))
@@ -137,6 +137,7 @@ def test_a_slip_from_rest_that_ends_at_a_singular_pose_starts_at_rest():
     assert found.bars["v_WB"].max() < 1e-11
 
 
+@pytest.mark.nightly_of("contact")
 @pytest.mark.drill
 @pytest.mark.parametrize("mechanism", [parallelogram(0.1), pushed_ball()], ids=["smooth", "contact"])
 def test_a_truth_that_ends_before_all_times_is_refused_for_the_reason_of_its_end(mechanism):

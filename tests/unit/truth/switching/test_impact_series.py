@@ -52,7 +52,7 @@ def _angle(high: float, slope: float) -> float:
     return float(angle)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_block_rocks_to_its_rest() -> None:
     """Infinitely many impacts of both corners in turn end when their geometric series says."""
     block = mechanism_named("rocking_block")
@@ -148,7 +148,7 @@ def test_a_series_of_impacts_is_summed_when_speeds_and_intervals_shrink_alike() 
     assert series_of(0.5, 2.0)[0] is None
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_error_of_impacts_cut_short_is_within_the_bars(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the sum of a series begins changes the motion of a rocking block within its bars."""
     block = mechanism_named("rocking_block")

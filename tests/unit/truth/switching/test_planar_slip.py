@@ -199,7 +199,10 @@ def test_a_slip_that_turns_fast_is_followed_from_its_first_instant() -> None:
     assert found.record.v[-1, :2] == pytest.approx(right, abs=1e-6)
 
 
-@pytest.mark.parametrize("until", np.linspace(0.13, 0.4, 20).tolist())
+@pytest.mark.parametrize(
+    "until",
+    [pytest.param(end, marks=pytest.mark.nightly if k % 4 else ()) for k, end in enumerate(np.linspace(0.13, 0.4, 20))],
+)
 def test_a_slip_that_stops_in_its_first_instants_ends_there(until: float) -> None:
     """A bead under a swelling push sticks when its speed is zero, whatever the end of the run is."""
     found = truth_of(PUSHED, np.array([0.0, until]))
@@ -213,6 +216,7 @@ def test_a_slip_that_stops_in_its_first_instants_ends_there(until: float) -> Non
         assert found.record.v[-1, 0] == pytest.approx(0.0, abs=1e-14)
 
 
+@pytest.mark.nightly_of("0.4", "0.25")
 @pytest.mark.drill
 @pytest.mark.parametrize("until", [0.19, 0.21, 0.25, 0.4])
 def test_a_slip_on_a_shaken_floor_ends_when_the_floor_has_its_speed(until: float) -> None:

@@ -68,7 +68,7 @@ def test_a_can_on_a_slope_stands_up_to_the_slope_at_which_its_weight_leaves_the_
         truth_of(can(slope=limit + 1e-3, friction=1.2), np.array([0.0, 0.5]))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_can_slides_down_a_slope_on_its_end_as_a_point_does() -> None:
     """Friction in one direction is μ times the load, wherever the load acts."""
     slope, mu = 0.4, 0.2

@@ -51,6 +51,7 @@ def test_mujocos_laws_of_friction_are_named(preset: str, words: str) -> None:
     assert only.startswith(words)
 
 
+@pytest.mark.nightly_of("2.0-0.05")
 @pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize(("until", "every"), [(2.0, 0.05), (0.6, 0.01)])
@@ -103,7 +104,7 @@ size = [0.1, 0.1, 0.1]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("corrects", [False, pytest.param(True, marks=pytest.mark.drill)])
+@pytest.mark.parametrize("corrects", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_a_convex_cone_is_named_from_rest_with_a_remedy_that_holds(tmp_path: Path, corrects: bool) -> None:
     """A box that starts to slide rises at μ times its acceleration in MuJoCo; with the remedy it follows the truth."""
     folder = tmp_path / "box"

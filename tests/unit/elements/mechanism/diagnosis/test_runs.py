@@ -413,6 +413,7 @@ def test_first_steps_contradict_masses_of_another_order(factor: float, contradic
     assert contradicts_first_steps(first, 5.0, Change(mechanism, mass=masses)) is contradicted
 
 
+@pytest.mark.nightly_of("1.0-1.05-False")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("damping", "moved_with", "named"),

@@ -33,6 +33,7 @@ def causes(scene: Scene, engine: str, step: float, **settings: str) -> list[Caus
     return diagnose(Evidence(element, [], run, truth(scene, TIMES), step), hypotheses_of(element))
 
 
+@pytest.mark.nightly_of("0.001")
 @pytest.mark.parametrize("step", [1e-3, 2.5e-4])
 def test_a_soft_stop_is_named(tmp_path: Path, step: float) -> None:
     """Stops of 0.04 degrees on both sides catch the arm softly in MuJoCo, and that explains what comes after."""
@@ -43,6 +44,7 @@ def test_a_soft_stop_is_named(tmp_path: Path, step: float) -> None:
     assert "stiffer" in cause.remedy
 
 
+@pytest.mark.nightly_of("projection-settings0-0.04", "exudyn-settings1-2.0")
 @pytest.mark.parametrize("half", [0.04, 2.0])
 @pytest.mark.parametrize(("engine", "settings"), [("projection", {"integrator": "rk4"}), ("exudyn", {})])
 def test_an_engine_whose_stops_are_hard_is_not_accused(

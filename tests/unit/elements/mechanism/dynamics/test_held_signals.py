@@ -259,7 +259,7 @@ def test_a_run_tells_what_its_policy_set() -> None:
     assert element.along(None).first_motion.acceleration == pytest.approx(element.first_motion.acceleration)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_causes_under_a_policy_are_those_of_the_engine() -> None:
     """A wrong gain under a policy is named as without one, and an honest engine is not accused."""
     from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene

@@ -29,6 +29,7 @@ from proofroll.running.store import Store
 # All runs of the paper take half a minute.
 pytestmark = pytest.mark.drill
 
+METHOD = "projection[formulation=euler,rtol=1e-9]"
 # What most is drawn and said of.
 RUNS = ("free4", "resisted4")
 # Long enough for the first slip past 1.7 s.
@@ -56,15 +57,13 @@ def runner(tmp_path_factory: pytest.TempPathFactory) -> Runner:
 @pytest.fixture(scope="module")
 def whole(runner: Runner) -> FigureRuns:
     """All of the paper's runs in the paper's method, beside the truth."""
-    figures = dataclasses.replace(load_figures("paper_figures"), every=8e-3)
-    return run_figures(figures, runner, "projection[formulation=euler,rtol=1e-9]")
+    return run_figures(dataclasses.replace(load_figures("paper_figures"), every=8e-3), runner, METHOD)
 
 
 @pytest.fixture(scope="module")
-def study(whole: FigureRuns) -> FigureRuns:
+def study(runner: Runner) -> FigureRuns:
     """Those at 4 m/s alone."""
-    runs, truths = ({name: made[name] for name in RUNS} for made in (whole.runs, whole.truths))
-    return dataclasses.replace(whole, figures=only(whole.figures, *RUNS), runs=runs, truths=truths)
+    return run_figures(only(load_figures("paper_figures"), *RUNS, every=8e-3), runner, METHOD)
 
 
 def test_what_the_paper_states_holds(study: FigureRuns) -> None:
@@ -140,6 +139,7 @@ WRONGS = [_values(np.negative), _values(lambda v: v[::-1]), _values(lambda v: 1.
           _late]  # fmt: skip
 
 
+@pytest.mark.nightly
 def test_no_statement_is_one_that_no_run_can_contradict(whole: FigureRuns) -> None:
     """For each statement about each run there is a wrong run that contradicts it, and the right one does not."""
     right = judgements(whole)
@@ -195,6 +195,7 @@ def test_every_axis_has_a_unit(study: FigureRuns) -> None:
             assert len(lines) == len(panel.y) * len(panel.runs)
 
 
+@pytest.mark.nightly
 def test_equal_runs_give_equal_files_in_every_form(study: FigureRuns, tmp_path: Path) -> None:
     """SVG, PNG and PDF are what they are called, twice the same, and the JSON names them."""
     small = _small(study)
@@ -219,6 +220,7 @@ def test_figures_of_one_page_share_no_id(study: FigureRuns) -> None:
         assert "http" not in text
 
 
+@pytest.mark.nightly
 def test_past_the_first_slip_by_the_truth(runner: Runner) -> None:
     """Where slip is located its time holds and is marked, and the angles of a ball that slips are judged too."""
     whole = load_figures("paper_figures")

@@ -55,6 +55,7 @@ def test_quadrature(tilt: float, k: float, axial: float, spin: float) -> None:
     np.testing.assert_allclose(found["N"], press, rtol=1e-9)
 
 
+@pytest.mark.nightly_of("0.4-2.2")
 @pytest.mark.drill
 @pytest.mark.parametrize(("k", "speed"), [(0.4, 2.2), pytest.param(2 / 3, 2.1, marks=pytest.mark.drill)])
 def test_where_it_leaves_the_wall(k: float, speed: float) -> None:

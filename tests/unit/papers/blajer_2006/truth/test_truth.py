@@ -50,7 +50,8 @@ def test_closed_form_of_the_paper(speed: float) -> None:
         assert found[name].to_numpy() == pytest.approx(values, rel=1e-12, abs=1e-12), name
 
 
-@pytest.mark.drill_of("0.0-asks1", "0.0005-asks1")
+@pytest.mark.nightly_of("0.0005-asks1")
+@pytest.mark.drill_of("0.0-asks1")
 @pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 @pytest.mark.parametrize("asks", [(), ("orientation",)])
 @pytest.mark.parametrize("rolling_resistance", [0.0, 5e-4])
@@ -62,7 +63,7 @@ def test_series_leave_round_off(rolling_resistance: float, asks: tuple[str, ...]
     assert ("attitude" in found) == bool(asks)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 def test_ten_thousand_oscillations() -> None:
     """The height is known to a millionth of a radius after 10,000 oscillations."""
