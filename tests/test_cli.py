@@ -641,7 +641,7 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     lines = out.splitlines()
     assert len(lines) < 24  # with the line of the next command
     assert max(map(len, lines)) <= 80
-    rows = [re.fullmatch(r"(\w*) +(\w+)  +([A-Z].*)", line) for line in lines[3:]]
+    rows = [re.fullmatch(r"(\w*) +(\w+)  +([A-Z].*)", line) for line in lines[2:]]
     assert [row[2] for row in rows if row] == [name for names in GROUPS.values() for name in names]
     assert [row[1] for row in rows if row and row[1]] == list(GROUPS)
     assert all(row[3].endswith(".") and "..." not in row[3] for row in rows if row)  # no summary is cut

@@ -26,9 +26,8 @@ def throughput(
         typer.Option(help="Engine, e.g. mjx[integrator=RK4]; repeat.", autocompletion=options.engines_like),
     ] = None,
     step: Annotated[list[float] | None, typer.Option(help="Fixed step [s]; repeat.")] = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", help="Another parameter, parameter=value; repeat.")
-    ] = None,
+    settings: options.Set = None,
+    _root: options.Root = None,
     until: Annotated[float | None, typer.Option(help="Last time [s]; by default as of proofroll run.")] = None,
     every: Annotated[float | None, typer.Option(help="Interval between judged samples [s].")] = None,
     quantity: Annotated[str | None, typer.Option(help="Observable of the errors, e.g. q.elbow.")] = None,
