@@ -711,7 +711,7 @@ def test_a_reader_that_stops_reading() -> None:
     for words in ("scenes --json", "scenes", "--version"):
         reader, writer = os.pipe()
         os.close(reader)
-        asked = [sys.executable, "-m", "proofroll.cli", *words.split()]
+        asked = [sys.executable, "-m", "proofroll", *words.split()]
         done = subprocess.run(asked, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
         os.close(writer)
         assert (done.returncode, done.stderr) == (0, "")

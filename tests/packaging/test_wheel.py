@@ -108,7 +108,7 @@ def test_it_is_the_wheel_that_is_used(installed: Path, tmp_path: Path) -> None:
 @pytest.mark.drill
 def test_scenes(installed: Path, tmp_path: Path) -> None:
     """The command line finds the scenes without the repository."""
-    done = python(installed, tmp_path, "-m", "proofroll.cli", "scenes", "--json")
+    done = python(installed, tmp_path, "-m", "proofroll", "scenes", "--json")
     assert done.returncode == 0, done.stderr
     assert {scene["name"] for scene in json.loads(done.stdout)} >= {"sphere_in_cylinder", "inclined_plane"}
 
@@ -129,7 +129,7 @@ def test_run(installed: Path, tmp_path: Path) -> None:
         "run.nc",
         "--json",
     ]
-    done = python(installed, tmp_path, "-m", "proofroll.cli", *arguments)
+    done = python(installed, tmp_path, "-m", "proofroll", *arguments)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["status"] == "done"
     assert (tmp_path / "run.nc").is_file()

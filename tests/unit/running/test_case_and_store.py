@@ -168,7 +168,7 @@ def test_a_wrong_name_leaves_no_folder(tmp_path: Path, there: bool) -> None:
     out = tmp_path / "new"
     if there:
         out.mkdir()
-    command = [sys.executable, "-m", "proofroll.cli", "ladder", "nosuch", "--out", str(out / "results")]
+    command = [sys.executable, "-m", "proofroll", "ladder", "nosuch", "--out", str(out / "results")]
     assert subprocess.run(command, capture_output=True, check=False).returncode == 2
     assert list(tmp_path.rglob("*")) == [out] * there
 

@@ -49,17 +49,17 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import (
     with_moments,
 )
 from proofroll.elements.mechanism.contact.sequences import groups_of, left_by, ordered, refuse_spread, sequences
-from proofroll.elements.mechanism.contact.slide_rows import slide_row, turning_row
 from proofroll.elements.mechanism.contact.start import TOUCHING, at_start, touches
 from proofroll.elements.mechanism.contact.states import ContactsNow, ContactSolution
 from proofroll.elements.mechanism.contact.touching import Touching, guided, lying
 from proofroll.elements.mechanism.dynamics.analysis import NO_RESPONSE, RANK
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion
 from proofroll.elements.mechanism.dynamics.point_loads import kink_arguments
 from proofroll.elements.mechanism.scene.drives import MODES
 from proofroll.elements.mechanism.scene.kinks import held_sides
 from proofroll.elements.mechanism.scene.model import Mechanism
-from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
+from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis, skew
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, contact_moments, contact_sums, turned_bodies
 from proofroll.elements.mechanism.scene.signal import FUNCTIONS
 
@@ -67,6 +67,28 @@ from proofroll.elements.mechanism.scene.signal import FUNCTIONS
 _NO_IMPULSE = 1e-4
 _ROUNDS = 2  # of the solution for forces: one, and one for its residual
 _ROUND_OFF = 1e-13  # of slides in a sequence of impacts, relative to the largest
+
+
+def turning_row(motion: BodyMotion, bodies: tuple[int, int]) -> tuple[Array, Array, Array]:
+    """Angular velocity of a relative to b at a contact, its derivative by the velocities, its rate at v̇ = 0."""
+    a, b = bodies
+    parts = motion.w_WB, motion.J[:, 3:], motion.bias[:, 3:]
+    turning, J, rate = (part[a] - part[b] for part in parts)
+    return turning, J, rate
+
+
+def slide_row(motion: BodyMotion, bodies: tuple[int, int], touch: Touching) -> tuple[Array, Array]:
+    """Derivative of a contact's slide by the velocities, (3, nv), and rate of the slide at v̇ = 0, (3,); 0: absent."""
+    J, bias = np.zeros((3, motion.J.shape[2])), np.zeros(3)
+    if touch.absent:
+        return J, bias
+    for body, sign in zip(bodies, (1.0, -1.0), strict=True):
+        arm, w = touch.place - motion.p_WB[body], motion.w_WB[body]
+        J += sign * (motion.J[body, :3] - skew(arm) @ motion.J[body, 3:])
+        turning = motion.bias[body, :3] + cross(motion.bias[body, 3:], arm)
+        # the point of contact moves over the body, to places with other velocities
+        bias += sign * (turning + cross(w, touch.place_rate - motion.v_WB[body]))
+    return J, bias
 
 
 class ContactDynamics:

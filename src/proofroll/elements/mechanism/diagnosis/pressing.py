@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.mechanism.contact.slide_rows import slide_row, turning_row
 from proofroll.elements.mechanism.contact.start import touches
 from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.contact.tree_contacts import slide_row, turning_row
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion
 from proofroll.elements.mechanism.run.contacts.observables import SLIDES
 from proofroll.elements.mechanism.scene.model import Mechanism

@@ -1,5 +1,0 @@
-"""``python -m proofroll.cli``."""
-
-from proofroll.cli import main
-
-main()
