@@ -428,7 +428,7 @@ def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Pa
     assert "1 fails." in out
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--until`` and ``--every`` are those of a scene's comparison; a comparison file has its own."""
     command = ["compare", "sphere_in_cylinder", "--engine", "oracle", "--out", str(tmp_path), "--json"]

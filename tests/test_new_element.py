@@ -154,7 +154,7 @@ def test_stability(command_line: Proofroll) -> None:
     assert all(point["sides"]["accurate"]["largest"] for point in study["points"])
 
 
-@pytest.mark.nightly
+@pytest.mark.drill
 def test_ladder(command_line: Proofroll, springs: Path) -> None:
     """Ladder puts the engine on its rung."""
     code, out, err = command_line("ladder", str(springs), "--engine", "sprung", "--until", "0.5", "--json")

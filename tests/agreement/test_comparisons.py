@@ -49,15 +49,15 @@ def held(comparison: Comparison) -> list[Row]:
     return list(first.values())
 
 
-# Comparisons whose rows take longest, ten seconds each and more: they run every night. What switches and what rolls are
-# held in others, which run before each change lands; `make report` runs all.
-NIGHTLY = {"accuracy", "paper", "sled", "slide_to_roll", "stick_slip"}
+# Comparisons whose rows run before a change lands: what switches, a loop, a tree. All others run every night, and
+# `make report` runs all.
+DAILY = {"bouncing_ball", "double_pendulum", "slider_crank"}
 ROWS = [
     pytest.param(
         comparison,
         row,
         id=f"{comparison.name}-{row.engine}",
-        marks=[pytest.mark.nightly] if comparison.name in NIGHTLY else [],
+        marks=[] if comparison.name in DAILY else [pytest.mark.nightly],
     )
     for comparison in map(loaded, comparison_names())
     for row in held(comparison)
@@ -100,6 +100,7 @@ def outcomes(store: Store) -> Callable[[Comparison, Row], Outcome]:
     return outcome
 
 
+@pytest.mark.nightly_of("paper")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", comparison_names())
 def test_each_engine_begins(name: str, tmp_path: Path) -> None:

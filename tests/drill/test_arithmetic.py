@@ -138,7 +138,7 @@ def test_what_follows_a_wrong_event_is_no_decision(found: list[str], kept: list[
     assert until_wrong(found, ["slip", "stick"]) == kept
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_a_comparison_decides_is_recorded(tmp_path: Path) -> None:
     """A run with its verdict, its events and its limits, and the truth that it is held against."""
     row = Row("mujoco[formulation=geoms]", "loose", ladder=[1.0, 0.5, 0.25])

@@ -232,7 +232,7 @@ def test_table_for_a_person() -> None:
     assert "the next run made 1 results instead of 3" in " ".join(" ".join(lines).split())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_site_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a drill its folder is gone, the path is as it was and its engine is unheard of."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, ["somewhere", os.environ.get("PYTHONPATH")])))

@@ -7,6 +7,7 @@ import pytest
 from proofroll_drill.law_faults import FAULTS, SCENES, LawFault, honest, outcome
 
 
+@pytest.mark.nightly_of("motors", "slide", "plate")
 @pytest.mark.drill
 @pytest.mark.parametrize("scene", SCENES)
 def test_scenes_of_faults_hold_all_laws(scene: str) -> None:

@@ -13,7 +13,12 @@ from source_code import nodes
 ROOT = Path(__file__).resolve().parents[2]
 PLUGINS = ROOT / "tests" / "plugins"
 # Packages beside this one, and the folders in which they lie.
-_PACKAGES = {"proofroll_benchmarks": "benchmarks", "proofroll_drill": "tests/drill", "proofroll_fuzz": "fuzz"}
+_PACKAGES = {
+    "proofroll_benchmarks": "benchmarks",
+    "proofroll_drill": "tests/drill",
+    "proofroll_fuzz": "fuzz",
+    "proofroll_throughput": "throughput",
+}
 
 
 def imported(path: Path, seen: set[Path]) -> Iterator[str]:

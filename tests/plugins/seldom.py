@@ -42,9 +42,10 @@ ROOMS = {
     "packages": Room(
         ("tests/packaging", "tests/test_versions.py", "tests/unit/running/test_cluster.py"),
         (*_MECHANICS, "cli", "report", "studies"),
-        (".github", "benchmarks", "comparisons", "docs", "examples", "fuzz", "models", "tests/drill"),
+        (".github", "benchmarks", "comparisons", "docs", "examples", "fuzz", "models", "tests/drill", "throughput"),
     ),
     "fuzz": Room(("tests/unit/fuzz",), (*_MECHANICS, "studies", "vocabulary"), ("fuzz",)),
+    "throughput": Room(("tests/unit/throughput",), (*_MECHANICS, "studies"), ("throughput",)),
     "benchmarks": Room(
         ("tests/unit/benchmarks",), (*_MECHANICS, "cli", "report", "studies"), ("benchmarks", "tests/drill")
     ),

@@ -94,7 +94,7 @@ def test_headings_form_an_outline(unfolded: Visit) -> None:
     assert tree.count("heading ") == len(levels)
 
 
-@pytest.mark.nightly
+@pytest.mark.drill
 def test_everything_that_is_used_has_a_name(unfolded: Visit) -> None:
     """Links, buttons, scrolling regions and figures are announced by a name, not by silence; silence would be found."""
 

@@ -40,7 +40,7 @@ def test_several_comparisons_share_no_name(everything: Any, tmp_path: Path, visi
 
 
 @pytest.mark.nightly_of("900-dark", "400-light")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("width", "scheme"),
     [(1400, "light"), *(pytest.param(*look, marks=pytest.mark.drill) for look in [(900, "dark"), (400, "light")])],

@@ -185,7 +185,7 @@ def test_stops_are_there_when_asked_for(robot):
     assert "ill_posed" not in struck.attrs
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path, monkeypatch):
     """Run, compare, report and stability start from the file alone; engines that are asked are held to the truth."""
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.2)

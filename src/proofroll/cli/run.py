@@ -159,7 +159,7 @@ def _show_matrices(scene: str, engine: str, settings: dict[str, str], as_json: b
     """
     from proofroll.core.errors import InputError
     from proofroll.report.kinds import kind_of
-    from proofroll.report.run.matrices import matrix_lines
+    from proofroll.report.run.last_values import matrix_lines
     from proofroll.running.simulation import build
     from proofroll.studies.cases import scene_of_run
 

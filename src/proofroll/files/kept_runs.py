@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import re
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from proofroll.core.errors import InputError
 
@@ -27,20 +30,27 @@ def run_file(named: str) -> Path:
 
 
 def kept_lines() -> Iterator[str]:
-    """A line for each kept run, the newest first: name, date, scene, engine, and how it ended."""
+    """A line for each kept run, the newest first: name, date, scene, engine, in what it differs, and how it ended.
+
+    Parameters and settings stand where another kept run of the scene has others.
+    """
     from proofroll.files.trajectory_file import read
 
     files = sorted(filter(Path.is_file, _FOLDER.glob("*.nc")), key=lambda file: file.stat().st_mtime, reverse=True)
     if not files:
         yield f"No run is kept in {_FOLDER}; proofroll run … --keep NAME keeps one."
         return
-    widest = max(len(file.stem) for file in files)
+    widest, kept, given = max(len(file.stem) for file in files), dict[Path, Any](), dict[Path, dict[str, Any]]()
     for file in files:
-        date = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.stat().st_mtime))
-        try:
-            attributes = read(file).attrs
-        except (OSError, ValueError, TypeError, KeyError):
-            yield f"{file.stem:{widest}}  {date}  cannot be read"
+        with suppress(OSError, ValueError, TypeError, KeyError):
+            kept[file] = read(file).attrs
+            given[file] = json.loads(kept[file]["parameters"]) | json.loads(kept[file]["settings"])
+    for file in files:
+        line = f"{file.stem:{widest}}  {time.strftime('%Y-%m-%d %H:%M', time.localtime(file.stat().st_mtime))}  "
+        if file not in given:
+            yield f"{line}cannot be read"
             continue
-        scene, engine, status = (str(attributes.get(key, "")) for key in ("scene", "engine", "status"))
-        yield f"{file.stem:{widest}}  {date}  {scene} in {engine}: {status}"
+        scene, engine, status = (kept[file].get(key, "") for key in ("scene", "engine", "status"))
+        others = [given[other] for other in given if kept[other].get("scene") == scene]
+        own = [f"{k}={v}" for k, v in given[file].items() if any(other.get(k, v) != v for other in others)]
+        yield f"{line}{', '.join([f'{scene} in {engine}', *own])}: {status}"

@@ -68,7 +68,7 @@ def test_all_as_expected() -> None:
         pytest.skip("no package of robots is installed: pip install 'proofroll[robots]'")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_what_was_read_before_changes_nothing() -> None:
     """Robots that one process of an engine reads: each is found alike, to the last digit, first or last."""

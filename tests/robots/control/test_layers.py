@@ -84,7 +84,7 @@ def test_implicit_damping_is_no_armature() -> None:
     assert [item.id for item in next(layer for layer in layers if not layer.holds).causes][:1] == ["armature"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_implicit_damping_and_an_armature_are_named_together() -> None:
     """Where no effort is clamped, one step cannot tell implicit kd from an armature h kd: both are named."""
     law = LAW.change(limit=np.full(len(LAW.joints), 100.0))

@@ -110,7 +110,7 @@ def test_what_is_planted_is_named_alone(tmp_path: Path, name: str, integrator: s
     assert max(cause.after for cause in layer.causes) < 1e-7
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_sizes_come_back_to_their_errors(tmp_path: Path) -> None:
     """The size of a torque and of a spring at one joint are told with an error in which they lie."""
     for planted, words in (({"torque": 0.3}, "a constant torque of 0.3"), ({"stiffness": 0.5}, "a spring of 0.5")):

@@ -149,7 +149,15 @@ def test_a_right_record_of_another_program_holds(program: str, digits: str, judg
         assert all(layer.residual is not None and layer.residual < 1e-9 for layer in layers)
 
 
-@pytest.mark.nightly_of("pinocchio-3-dry friction", "pinocchio-single-xyzw", "pinocchio--relative coordinates")
+@pytest.mark.nightly_of(
+    "pinocchio-3-dry friction",
+    "pinocchio-single-xyzw",
+    "pinocchio--relative coordinates",
+    "pinocchio--velocity in the base",
+    "pinocchio--spin at 0.25",
+    "mujoco--rotation back",
+    "mujoco--velocity at 2",
+)
 @pytest.mark.drill_of(
     "mujoco-single-gravity 9.80", "mujoco-3-damping", "pinocchio--no armature", "pinocchio--two instants late"
 )
@@ -160,7 +168,7 @@ def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: 
     require_first(judged(recorded(name, program), digits), layer, cause)
 
 
-@pytest.mark.drill_of("first for last-pinocchio")
+@pytest.mark.nightly_of("first for last-pinocchio", "kd of hips-pinocchio")
 @pytest.mark.parametrize(
     ("name", "program"),
     [
@@ -185,6 +193,7 @@ def test_numbers_of_single_joints_are_named(name: str, program: str, judged: Jud
     assert words in "\n".join(judgement.lines())
 
 
+@pytest.mark.nightly_of("milliseconds", "inverse")
 @pytest.mark.parametrize(
     "name",
     [
@@ -225,7 +234,7 @@ def test_rates_whose_rows_are_told_are_not_left_open(judged: Judged) -> None:
     assert list(judgement.remarks) == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_layer_that_stays_open_tells_no_column(judged: Judged, monkeypatch: pytest.MonkeyPatch) -> None:
     """A base at its centre of mass, which layers alone tell, is not claimed where an observation stays open."""
     monkeypatch.setattr("proofroll.robots.control.judge.SEARCH_TIME", 1.0)  # else all pairs of mistakes are tried
@@ -291,6 +300,7 @@ def test_a_limit_that_is_never_reached_has_a_bound(judged: Judged) -> None:
     assert float(bound[1]) == pytest.approx(largest / 0.8, rel=1e-3)
 
 
+@pytest.mark.nightly_of("rates at 0.05")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", OF_OBSERVATIONS)
 def test_a_mistake_of_an_observation_shows_in_actions(name: str, judged: Judged) -> None:

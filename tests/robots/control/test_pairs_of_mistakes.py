@@ -44,6 +44,7 @@ def judged(tmp_path: Path) -> Judged:
     return judgement
 
 
+@pytest.mark.nightly_of("pair3-pinocchio")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("pair", "program"),
@@ -62,7 +63,7 @@ def test_two_mistakes_at_one_layer_are_named(pair: tuple[str, str], program: str
     assert layer.causes[0].after < 1e-6
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_no_cause_explains_is_told(judged: Judged, monkeypatch: pytest.MonkeyPatch) -> None:
     """A cause beside something that no mistake explains says which part of the difference it leaves."""
     monkeypatch.setattr("proofroll.robots.control.judge.SEARCH_TIME", 10.0)  # else all pairs of mistakes are tried

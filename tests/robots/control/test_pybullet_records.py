@@ -59,7 +59,7 @@ def test_columns_are_explained(name: str) -> None:
     assert named(judgement) == NAMED[name], "\n".join(judgement.lines())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=() if name == "air" else pytest.mark.nightly) for name in NAMED if name != "defaults"],
@@ -84,7 +84,7 @@ def test_degrees_keep_the_frame_of_the_base(tmp_path: Path) -> None:
     assert named(judgement) == [("state", "degrees")], "\n".join(judgement.lines())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_searches_of_a_record_share_one_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """All searches of a record have one time, and one that ended among importers is told."""
     ends: list[float] = []

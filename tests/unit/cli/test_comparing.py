@@ -16,7 +16,7 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.running.time_budget import TimeBudget
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_each_engine_is_started_once(
     tmp_path: Path,
@@ -121,7 +121,7 @@ def test_two_kinds_that_no_engine_has_together(
     assert "needs revolute joints; no formulation of reduced's adapter has that" in row["reason"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_first_look_stays_within_its_budget(
     tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

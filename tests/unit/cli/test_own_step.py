@@ -64,7 +64,7 @@ def test_another_file_is_no_model(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "there is no such file" in err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_rows_of_models_with_options(tmp_path: Path, model: Callable[[str], Path]) -> None:
     """A model is compared with its own options, too, and the row names what it leaves out; a URDF has no such row."""
     rows = default_comparison(str(model("integrator='RK4' timestep='0.004' solver='CG'")), {}).rows

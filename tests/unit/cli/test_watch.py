@@ -73,7 +73,7 @@ def test_a_page_of_another_kind_is_refused(proofroll: Proofroll, tmp_path: Path)
 def test_kept_runs_are_listed_and_shown_together(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run kept by a name is listed; two of one scene share a page, two of several scenes or instants do not."""
+    """A run kept by a name is listed with what differs; two of one scene share a page, two of several do not."""
     monkeypatch.chdir(tmp_path)
     assert [*kept_lines()] == ["No run is kept in out/runs; proofroll run … --keep NAME keeps one."]
     run = ["run", "pendulum", "--until", "0.2"]
@@ -82,7 +82,12 @@ def test_kept_runs_are_listed_and_shown_together(
     assert proofroll(*run, "--engine", "exudyn", "--set", "length=2", "--keep", "c")[0] == 0
     code, out, _ = proofroll("replay")
     assert code == 0
-    assert re.search(r"^a +\d{4}-\d\d-\d\d \d\d:\d\d  pendulum in mujoco: done$", out, re.MULTILINE)
+    lines = {line.split()[0]: line for line in out.splitlines()}
+    assert re.match(r"a +\d{4}-\d\d-\d\d \d\d:\d\d  pendulum in mujoco, length=1.0, ", lines["a"])
+    assert lines["a"].endswith(": done")
+    assert "formulation=joints" in lines["a"]
+    assert "length=2.0" in lines["c"]
+    assert "angle" not in out  # all have the same
     assert proofroll("replay", "a", "b")[0] == 0
     page = Path("out/runs/a-replay.html").read_text(encoding="utf-8")
     assert "MuJoCo joints" in page

@@ -64,6 +64,7 @@ def test_each_engine_has_both_laws(engine: str, law: str, true_spins: dict[str, 
     assert float(np.abs(run - true_spins[other]).max()) > 3.0
 
 
+@pytest.mark.nightly_of("projection[formulation=dependent,rtol=1e-8]-True-4")
 @drill
 @pytest.mark.parametrize(
     ("first", "rate"),
@@ -92,7 +93,7 @@ def test_motion_is_that_over_a_plane_that_turns(engine: str, first: bool, rate: 
     assert apart < 0.02 * float(np.abs(turned - true).max())
 
 
-@pytest.mark.nightly_of("mujoco[formulation=geoms,preset=tuned,dt=5e-4]")
+@pytest.mark.nightly_of("mujoco[formulation=geoms,preset=tuned,dt=5e-4]", "projection[formulation=dependent,rtol=1e-8]")
 @drill
 @pytest.mark.parametrize(
     "engine", [pytest.param(name, marks=pytest.mark.nightly if "impulses" in name else ()) for name in FALLS]

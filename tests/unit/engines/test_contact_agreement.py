@@ -117,7 +117,14 @@ def scene_of(name: str, mechanism: Mechanism) -> Scene:
     return Scene(name, "", (MechanismElement(mechanism),))
 
 
-@pytest.mark.nightly_of("rod-mujoco[formulation=geoms,preset=tuned,dt=2e-4]-0.08-0.001")
+@pytest.mark.nightly_of(
+    "rod-mujoco[formulation=geoms,preset=tuned,dt=2e-4]-0.08-0.001",
+    "block-mujoco[formulation=geoms,preset=tuned,dt=2e-4]-0.08-0.001",
+    "capsule-projection[formulation=dependent]-0.09-1e-09",
+    "two capsules-projection[formulation=dependent]-0.09-1e-09",
+    "cylinder-pinocchio[formulation=impulses,dt=1e-4]-0.09-0.0002",
+    "two capsules-pinocchio[formulation=impulses,dt=1e-4]-0.09-0.0002",
+)
 @pytest.mark.drill_of(
     "box-pinocchio[formulation=impulses,dt=1e-4]-0.09-0.0002",
     "cylinder-mujoco[formulation=geoms,preset=tuned,dt=1e-4]-0.09-0.0002",

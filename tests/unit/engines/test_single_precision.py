@@ -180,7 +180,7 @@ because = "it computes with 24 bits"
 """
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.usefixtures("single")
 def test_a_comparison_tells_precision_and_floor(
     command_line: Callable[..., tuple[int, str, str]], tmp_path: Path

@@ -68,6 +68,9 @@ def test_a_table_turns_under_a_ball(engine: str) -> None:
     assert float(np.abs(run["drive.axle"].to_numpy()).max()) < 5e-3
 
 
+@pytest.mark.nightly_of(
+    "mujoco[formulation=geoms,preset=tuned]-shaken bore-0.0001-0.1", "projection-turntable-1e-07-0.005"
+)
 @pytest.mark.drill
 @pytest.mark.parametrize(("name", "place", "push"), [("turntable", 1e-7, 5e-3), ("shaken bore", 1e-4, 0.1)])
 @pytest.mark.parametrize("engine", [*ENGINES, "projection"])

@@ -74,7 +74,7 @@ def test_an_engine_runs_where_its_name_says(
     assert files[0] != files[1]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_place_is_no_part_of_a_result(old: Path, tmp_path: Path) -> None:
     """The same packages at another path make the same case, so that what is stored is used; other packages do not."""
     other = seeing(tmp_path / "copy", "1.0")
@@ -112,7 +112,7 @@ def test_another_scene_there_is_a_row(old: Path, tmp_path: Path) -> None:
     assert "is another scene where" in result.message
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_worker_that_echoes_another_version_is_no_result(old: Path, tmp_path: Path) -> None:
     """What ran is compared with what had answered, also on this side of the pipe."""
     case = case_in(old)

@@ -53,7 +53,7 @@ OUTCOMES = {
 }
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_each_engine_costs_its_own_case_alone(tmp_path: Path, make_case: MakeCase) -> None:
     """An exception, NaN, an engine that gives up, refuses or is lacking: each costs one case, said in a sentence."""
     cases = {name: make_case(name) for name in OUTCOMES}

@@ -102,7 +102,7 @@ def test_broken_files_give_one_line(tmp_path: Path, text: str, problem: str) -> 
         read_finding(file)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_command_tells_states_and_versions() -> None:
     """The command runs the findings of one engine in an interpreter and tells each with its state and version."""
     options = ["findings", "--engine", "pinocchio", "--python", sys.executable, "--json"]

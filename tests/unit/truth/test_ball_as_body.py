@@ -29,7 +29,15 @@ def named(case: dict[str, Any]) -> str:
     return f"{case['scene']} {' '.join(case['parameters'])}".strip()
 
 
-CASES = [pytest.param(case, marks=pytest.mark.drill if case.get("slow") else (), id=named(case)) for case in FROZEN]
+# Every second case is for the night.
+CASES = [
+    pytest.param(
+        case,
+        marks=pytest.mark.nightly if place % 2 else pytest.mark.drill if case.get("slow") else (),
+        id=named(case),
+    )
+    for place, case in enumerate(FROZEN)
+]
 CLOSED = [case for case in FROZEN if case["scene"] in FORMS and FORMS[case["scene"]][1](case["parameters"])]
 
 

@@ -42,7 +42,7 @@ def test_a_spring_with_two_stiffnesses_swings_through_its_kink(compiled, monkeyp
     assert not found.events
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_laws_with_one_meaning_give_one_motion():
     """abs, max, min and sign write one law in four ways."""
     laws = ("2.5*(L-1) + 1.5*abs(L-1)", "max(4*(L-1), L-1)", "-min(-4*(L-1), 1-L)", "(2.5 + 1.5*sign(L-1))*(L-1)")

@@ -38,6 +38,7 @@ MOTIONS = {entry["scene"] + str(entry.get("parameters", "")): entry for entry in
 LONG = {"sled", "sled_on_slope", "eccentric_sphere", "tilted_disc", "rattleback"}
 
 
+@pytest.mark.nightly_of("rattleback")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.drill) if name in LONG else name for name in MOTIONS]
 )

@@ -27,6 +27,7 @@ def _turned(mechanism: Mechanism, seed: int) -> tuple[Mechanism, np.ndarray]:
     return turned, np.array(level.gravity)
 
 
+@pytest.mark.nightly_of("0")
 @pytest.mark.parametrize("seed", _SEEDS)
 def test_a_can_on_a_shaken_plate_slips_and_sticks(seed: int) -> None:
     """It slips where the plate brakes harder than friction can, and sticks where the plate has its speed again."""

@@ -770,7 +770,7 @@ def test_a_plate_that_turns_on_thirty_two_feet_has_no_determinate_friction() -> 
     assert "carry the load together in more ways than one" in found.reason
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_lands_on_an_edge_tips_on_its_face_and_rests() -> None:
     """Both corners of the edge land, then both of the other edge, and all four share the weight."""
     turned = (float(np.cos(0.15)), 0.0, float(np.sin(0.15)), 0.0)

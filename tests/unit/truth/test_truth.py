@@ -81,7 +81,7 @@ def test_error_bar_covers_a_closed_form_that_had_no_part_in_it(scene):
     assert truth.bars["q_WB"][-1] < 1e-11
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_chosen_rows_that_become_dependent_are_exchanged(scene):
     """A ring whose rows chosen at the start become dependent at a regular pose has a truth beyond, by two routes."""
     pytest.importorskip("heyoka")
@@ -458,6 +458,7 @@ def test_routes_of_a_spinning_body_agree(scene):
     assert max(found.differences["q_WB"], found.differences["points"]) < 2e-10
 
 
+@pytest.mark.nightly_of("False-switching", "True-smooth")
 @pytest.mark.drill
 @pytest.mark.parametrize("route", [find_truth, switched_truth], ids=["smooth", "switching"])
 @pytest.mark.parametrize("compiled", [True, False])

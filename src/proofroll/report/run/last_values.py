@@ -1,13 +1,14 @@
-"""Tables of ``proofroll run`` on the terminal: values at the end, and bounces."""
+"""Tables of ``proofroll run`` on the terminal: values at the end, bounces, matrices of the equations of motion."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
 from proofroll.core.bounces import Bounce
 from proofroll.core.number_format import with_bar
 from proofroll.core.quantity import powers_of
+from proofroll.report.kinds import EquationMatrices
 
 FORCES = ("N", "N m")
 _DIGITS, _FEW_DIGITS = 12, 7
@@ -161,3 +162,24 @@ def _place(unit: str) -> int:
     """Place of a variable in the table by its unit: places and angles, velocities, the rest, forces and moments."""
     order = {"s": 0, "m": 1, "rad": 1, "m/s": 2, "rad/s": 2}
     return 4 if unit in FORCES else order.get(unit, 3)
+
+
+def matrix_lines(content: EquationMatrices) -> Iterator[Any]:
+    """Table of M, h and g with a row for each velocity, and how far they are from the truth's."""
+    from rich.table import Table
+    from rich.text import Text
+
+    yield "M v' + h + g = tau at the start, in the velocities of the joints:"
+    table = Table(box=None, pad_edge=False)
+    table.add_column("velocity")
+    names = [Text(name) for name in content.velocities]
+    for heading in (*names, Text("h"), Text("g")):
+        table.add_column(heading, justify="right")
+    for number, name in enumerate(names):
+        row = [] if content.M is None else content.M[number]
+        ends = (part[number] for part in (content.h, content.g) if part is not None)
+        table.add_row(name, *(f"{value:.8g}" for value in (*row, *ends)))
+    yield table
+    if content.differences:
+        shown = ", ".join(f"{name} {value:.1g}" for name, value in content.differences.items())
+        yield f"differences from the truth's, relative to their largest entries: {shown}"

@@ -42,6 +42,7 @@ def _controlled(change: Callable[[Control], Control]) -> Callable[[Mechanism], M
     return changed
 
 
+@pytest.mark.nightly_of("<lambda>-default-None")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("change", "preset", "said"),

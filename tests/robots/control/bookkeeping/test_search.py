@@ -76,7 +76,7 @@ def test_a_mistake_is_named_from_states_alone(program: str, step: float, name: s
     assert found.explanations[0].after < 1e-3 * found.before
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_sizes_come_back() -> None:
     """An unknown size is fitted to more than three digits."""
     found = _found("mujoco", 2e-3, kp=0.37 * 5.0)

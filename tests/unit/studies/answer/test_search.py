@@ -134,7 +134,7 @@ def test_an_answer_is_true_of_the_engine_and_is_stored(tmp_path: Path) -> None:
     assert float(np.abs(run["p_WB"].values - true["p_WB"].values).max()) <= bound.allowed
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_chaotic_motion_is_judged_before_its_horizon(tmp_path: Path) -> None:
     """Runs that are longer than a motion can be known are judged as far as it is, and the answer says how far."""
     runner = Runner(Store(tmp_path / "cases"), jobs=1, workers=Workers())

@@ -475,7 +475,7 @@ def test_what_holds_on_every_path_is_judged_at_a_stair_edge(tmp_path: Path) -> N
     assert "differs, expected: agrees" in said
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_neighbouring_points_have_truths_of_their_own(
     tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]
 ) -> None:

@@ -39,6 +39,7 @@ def test_the_first_row_is_the_file(robot: tuple[Path, Path]) -> None:
     assert row.short == "the file's own options"
 
 
+@pytest.mark.nightly
 def test_softness_is_what_is_off(
     proofroll: Proofroll, robot: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

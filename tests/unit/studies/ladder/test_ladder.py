@@ -140,7 +140,7 @@ def check_slip(content: dict[str, Any]) -> None:
     assert "No rung is within 1e-30 m/s at its own step." in content["findings"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_ladder(climb: Callable[..., LadderContent], tmp_path: Path) -> None:
     """One climb gives rungs, terms, findings and tables; one that asks for another quantity runs nothing again."""
     content = climb(engines=("laddered", "tiny", "absent"))

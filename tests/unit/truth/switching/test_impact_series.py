@@ -52,7 +52,7 @@ def _angle(high: float, slope: float) -> float:
     return float(angle)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_block_rocks_to_its_rest() -> None:
     """Infinitely many impacts of both corners in turn end when their geometric series says."""
     block = mechanism_named("rocking_block")

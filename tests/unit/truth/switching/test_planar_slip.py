@@ -216,6 +216,7 @@ def test_a_slip_that_stops_in_its_first_instants_ends_there(until: float) -> Non
         assert found.record.v[-1, 0] == pytest.approx(0.0, abs=1e-14)
 
 
+@pytest.mark.nightly_of("0.4", "0.25")
 @pytest.mark.drill
 @pytest.mark.parametrize("until", [0.19, 0.21, 0.25, 0.4])
 def test_a_slip_on_a_shaken_floor_ends_when_the_floor_has_its_speed(until: float) -> None:

@@ -65,7 +65,9 @@ def test_a_balanced_wheel_rests_on_its_stop(sled: bool) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("speed", [(0.3, 0.0, 0.0), (0.2, -0.1, 2.0), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)], ids=str)
-@pytest.mark.parametrize("seed", [None, 1, 2], ids=["upright", "turned", "turned again"])
+@pytest.mark.parametrize(
+    "seed", [None, pytest.param(1, marks=pytest.mark.nightly), 2], ids=["upright", "turned", "turned again"]
+)
 def test_a_ball_slides_on_a_falling_box(seed: int | None, speed: tuple[float, float, float], friction: float) -> None:
     """Nothing presses it, so that it goes on at its speed, and no event happens."""
     turn = Rotation.identity() if seed is None else Rotation.random(random_state=seed)

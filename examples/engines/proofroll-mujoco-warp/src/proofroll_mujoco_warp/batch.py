@@ -57,7 +57,7 @@ class MujocoWarpBatch:
 
     def _state(self, starts: Sequence[mujoco.MjData], host: mujoco.MjModel) -> Any:
         """Data of all copies at time 0."""
-        data = mujoco_warp.put_data(host, starts[0], nworld=len(self._pattern), njmax=max(map(rows_of, starts)))
+        data = mujoco_warp.put_data(host, starts[0], nworld=len(self._pattern), njmax=rows_of(host))
         for name in _STATE:
             values = np.stack([getattr(start, name) for start in starts])
             getattr(data, name).assign(values[self._pattern].astype(np.float32))

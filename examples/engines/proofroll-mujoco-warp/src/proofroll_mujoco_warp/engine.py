@@ -61,7 +61,7 @@ class MujocoWarp:
         self._mechanism, self._dt, self._count = mechanism_of(scene), settings.dt, 0
         host, start = start_of(scene, settings)
         self._arrays = MujocoArrays.of(self._mechanism, host)
-        self._model, rows = mujoco_warp.put_model(host), rows_of(start)
+        self._model, rows = mujoco_warp.put_model(host), rows_of(host)
         mujoco_warp.step(self._model, mujoco_warp.put_data(host, start, njmax=rows))  # compiles
         self._data = mujoco_warp.put_data(host, start, njmax=rows)
         warp.synchronize()

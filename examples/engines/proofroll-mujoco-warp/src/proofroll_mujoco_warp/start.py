@@ -19,6 +19,7 @@ def start_of(scene: Scene, settings: MujocoWarpSettings) -> tuple[mujoco.MjModel
     return host, start
 
 
-def rows_of(start: mujoco.MjData) -> int:
-    """Number of rows of constraints for which a world has room."""
-    return max(256, 4 * start.nefc)
+def rows_of(host: mujoco.MjModel) -> int:
+    """Most rows of constraints that a world can have, without contacts: more room for them slows every step."""
+    equalities, limits = 6 * host.neq, 2 * (host.njnt + host.ntendon)
+    return int(equalities + host.nv + limits)

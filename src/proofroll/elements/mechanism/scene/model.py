@@ -131,35 +131,15 @@ class Mechanism:
     @cached_property
     def connections(self) -> tuple[JointOrLoop, ...]:
         """The joints, then the loops: arrays of forces and moments have this order."""
-        return (
-            *(
-                JointOrLoop(
-                    name=j.name,
-                    kind=j.kind,
-                    a=j.parent,
-                    position_a=j.position,
-                    frame_a=j.parent_frame,
-                    b=j.child,
-                    position_b=j.child_position,
-                    frame_b=j.child_frame,
-                )
-                for j in self.joints
-            ),
-            *(
-                JointOrLoop(
-                    name=k.name,
-                    kind=k.kind,
-                    a=k.body_a,
-                    position_a=k.position_a,
-                    frame_a=k.frame_a,
-                    b=k.body_b,
-                    position_b=k.position_b,
-                    frame_b=k.frame_b,
-                    length=k.length,
-                )
-                for k in self.loops
-            ),
-        )
+        joints = [
+            JointOrLoop(j.name, j.kind, j.parent, j.position, j.parent_frame, j.child, j.child_position, j.child_frame)
+            for j in self.joints
+        ]
+        loops = [
+            JointOrLoop(k.name, k.kind, k.body_a, k.position_a, k.frame_a, k.body_b, k.position_b, k.frame_b, k.length)
+            for k in self.loops
+        ]
+        return (*joints, *loops)
 
     @property
     def has_events(self) -> bool:

@@ -55,8 +55,8 @@ def formula_value(parsed: Any, names: Mapping[str, Any], functions: Mapping[str,
 
 
 @dataclass(frozen=True)
-class Formula:
-    """A formula of the time ``t`` [s]: numbers, parameters, + - * / ^ ( ), ``pi`` and :data:`FUNCTIONS`.
+class WrittenFormula:
+    """A formula of numbers, parameters, + - * / ^ ( ), ``pi`` and :data:`FUNCTIONS`.
 
     Attributes:
         text: the formula, without the sign that opens it in a file.
@@ -65,6 +65,23 @@ class Formula:
 
     text: str
     numbers: tuple[tuple[str, float], ...] = ()
+
+    @cached_property
+    def kinks(self) -> list[str]:
+        """Functions of its kinks, see :func:`.kinks_in`."""
+        return kinks_in(self._parsed)
+
+    @cached_property
+    def _parsed(self) -> Any:
+        return parsed_formula(self.text)
+
+    def __str__(self) -> str:
+        return f"= {self.text}"
+
+
+@dataclass(frozen=True)
+class Formula(WrittenFormula):
+    """A formula of the time ``t`` [s]."""
 
     def __post_init__(self) -> None:
         try:
@@ -78,18 +95,6 @@ class Formula:
     def at(self, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
         """Value at a time [s], which may be an array or a symbol; ``functions`` evaluates the calls for that type."""
         return formula_value(self._parsed, {**dict(self.numbers), TIME: time}, functions_of(self, functions))
-
-    @cached_property
-    def kinks(self) -> list[str]:
-        """Functions of its kinks, see :func:`.kinks_in`."""
-        return kinks_in(self._parsed)
-
-    @cached_property
-    def _parsed(self) -> Any:
-        return parsed_formula(self.text)
-
-    def __str__(self) -> str:
-        return f"= {self.text}"
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 from proofroll.core.errors import InputError, require_known
-from proofroll.core.expressions import parsed_formula
 from proofroll.core.parameters import Parameters
-from proofroll.elements.mechanism.scene.kinks import functions_of, kinks_in
-from proofroll.elements.mechanism.scene.signal import FUNCTIONS, NO_NUMBER, formula_value, names_in
+from proofroll.elements.mechanism.scene.kinks import functions_of
+from proofroll.elements.mechanism.scene.signal import FUNCTIONS, NO_NUMBER, WrittenFormula, formula_value, names_in
 
 LENGTH, RATE = "L", "dL"
 # Units of coefficients that no key of a scene file has.
@@ -20,17 +18,13 @@ _ANYWHERE = 0.7390851332151607  # m, m/s: where no formula of round numbers is s
 
 
 @dataclass(frozen=True)
-class SpringLaw:
+class SpringLaw(WrittenFormula):
     """A formula of the length ``L`` [m] of a spring and its rate ``dL`` [m/s]; positive values pull [N].
 
     Attributes:
-        text: the formula, without the sign that opens it in a file.
-        numbers: the parameters that it names, and their values.
         units: of length, rate and pull in those of the formula, which are 1 in SI units.
     """
 
-    text: str
-    numbers: tuple[tuple[str, float], ...] = ()
     units: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
@@ -56,18 +50,6 @@ class SpringLaw:
         """The same law in units of these sizes in the present ones."""
         metre, second, newton = self.units
         return replace(self, units=(metre * length, second * speed, newton * force))
-
-    @cached_property
-    def kinks(self) -> list[str]:
-        """Functions of its kinks, see :func:`.kinks_in`."""
-        return kinks_in(self._parsed)
-
-    @cached_property
-    def _parsed(self) -> Any:
-        return parsed_formula(self.text)
-
-    def __str__(self) -> str:
-        return f"= {self.text}"
 
 
 def read_spring_law(field: str, entry: Any, numbers: Parameters) -> Any:

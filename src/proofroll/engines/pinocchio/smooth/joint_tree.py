@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
 from proofroll.elements.mechanism.dynamics.analysis import lacks_inertia
 from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
@@ -264,3 +265,13 @@ def _composite(joint_1: Any, *others: Any) -> Any:
     for joint in others:
         composite.addJoint(joint)
     return composite
+
+
+def require_tangent_map() -> None:
+    """Refuses versions of Pinocchio without rates of quaternions.
+
+    Raises:
+        Refused: ``tangentMap`` is missing.
+    """
+    if not hasattr(pin, "tangentMap"):
+        raise Refused(f"the rates of quaternions need tangentMap of pinocchio 4.0, and this is {pin.__version__}")

@@ -16,9 +16,8 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.constraint_dynamics import ConstraintDynamics
-from proofroll.engines.pinocchio.smooth.joint_tree import AXIS_COLUMN, JointTree
+from proofroll.engines.pinocchio.smooth.joint_tree import AXIS_COLUMN, JointTree, require_tangent_map
 from proofroll.engines.pinocchio.smooth.null_space import LoopRows, NullSpace
-from proofroll.engines.pinocchio.smooth.tangent_map import require_tangent_map
 
 
 class MechanismMotion:

@@ -10,7 +10,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import controlled_step, solver_from
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.engines.pinocchio.smooth.tangent_map import require_tangent_map
+from proofroll.engines.pinocchio.smooth.joint_tree import require_tangent_map
 from proofroll.papers.blajer_2006.pinocchio.composite import Composite
 from proofroll.papers.blajer_2006.pinocchio.settings import CompositeSettings
 

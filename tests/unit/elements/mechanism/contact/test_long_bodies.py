@@ -62,6 +62,7 @@ def test_the_nearest_end_is_the_distance_of_the_whole_shape(kind: str, seed: int
     assert least == pytest.approx(min(contact.dist for contact in data.contact), abs=1e-12)
 
 
+@pytest.mark.nightly_of("capsule")
 @pytest.mark.drill
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_long_body_rolls_down_a_slope(kind: str) -> None:

@@ -104,7 +104,7 @@ size = [0.1, 0.1, 0.1]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("corrects", [False, pytest.param(True, marks=pytest.mark.drill)])
+@pytest.mark.parametrize("corrects", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_a_convex_cone_is_named_from_rest_with_a_remedy_that_holds(tmp_path: Path, corrects: bool) -> None:
     """A box that starts to slide rises at μ times its acceleration in MuJoCo; with the remedy it follows the truth."""
     folder = tmp_path / "box"

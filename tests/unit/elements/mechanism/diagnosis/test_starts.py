@@ -32,6 +32,7 @@ def arm(q: Sequence[float], v: Sequence[float]) -> Scene:
     return Scene("arm", "", (MechanismElement(Mechanism(bodies, joints, gravity=(0, -9.81, 0))),))
 
 
+@pytest.mark.nightly_of("q0-v0-it begins at rest, without the velocities of the scene")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("q", "v", "said"),

@@ -195,6 +195,7 @@ def test_every_axis_has_a_unit(study: FigureRuns) -> None:
             assert len(lines) == len(panel.y) * len(panel.runs)
 
 
+@pytest.mark.nightly
 def test_equal_runs_give_equal_files_in_every_form(study: FigureRuns, tmp_path: Path) -> None:
     """SVG, PNG and PDF are what they are called, twice the same, and the JSON names them."""
     small = _small(study)
@@ -219,6 +220,7 @@ def test_figures_of_one_page_share_no_id(study: FigureRuns) -> None:
         assert "http" not in text
 
 
+@pytest.mark.nightly
 def test_past_the_first_slip_by_the_truth(runner: Runner) -> None:
     """Where slip is located its time holds and is marked, and the angles of a ball that slips are judged too."""
     whole = load_figures("paper_figures")

@@ -97,7 +97,7 @@ KNOWN: dict[str, tuple[dict[str, float], float, list[float], float | None]] = {
 }
 
 
-@pytest.mark.nightly_of("paper")
+@pytest.mark.nightly_of("paper", "fast, resisted", "recovers")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", KNOWN)
 def test_known_digits(name: str) -> None:
