@@ -190,6 +190,8 @@ def motion_parts(entry: RobotEntry, motion: str, path: Path, folder: Path, runne
     yield f"**{motion}**: {'; '.join(filter(None, clauses))}.\n"
     if not content.distances:
         yield f"No reference: {point.result.message}.\n"
+    if point.result.cut:
+        yield f"The limit of processor time ended its reference before the finest step: {point.result.message}.\n"
     for item in content.distances:
         if item.horizon:
             yield f"Horizon: {item.horizon}.\n"
@@ -217,7 +219,9 @@ def main(folders: list[str]) -> None:
 def write(kept: dict[str, str]) -> None:
     """Writes the page of these sections, by robot."""
     text = [kept[entry.name].rstrip("\n") + "\n" for entry in entries() if entry.name in kept]
-    PAGE.write_text("\n".join([HEAD.format(rate=RATE), *text]), encoding="utf-8")
+    lacking = ", ".join(entry.name for entry in entries() if entry.name not in kept)
+    head = HEAD.format(rate=RATE) + (f"- Not run yet: {lacking}.\n" if lacking else "")
+    PAGE.write_text("\n".join([head, *text]), encoding="utf-8")
 
 
 if __name__ == "__main__":
