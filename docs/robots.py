@@ -55,13 +55,13 @@ HEAD = """# Robots on their floors
 
 Robots whose files a package index has, on the floors of their files, under two controllers at {rate} Hz: *hold* holds
 the start's pose, and *trot* of four-legged ones swings hips and knees about it, open loop. All start 1 cm above the
-floor with a tilt of 2 degrees, so that feet land one after the other. No policy is among them: these packages bring
-none. Written by `python docs/robots.py` from real runs; do not edit it.
+floor with a tilt of 2 degrees, so that feet land one after the other. No policy is among them yet. Written by
+`python docs/robots.py` from real runs; do not edit it.
 The same for [a robot of your own](control_a_robot.md#the-table-of-your-own-robot) takes two commands.
 
 A cell is the largest distance up to that time of any body from the
 [reference by steps](control_a_robot.md#on-the-ground), in **mm**, and by how much any attitude is off, in **rad**.
-The first line of a table is the reference's own error bar: nothing below it is told apart. s/s: seconds of computing
+The first line of a table is the reference's own error bar: smaller distances are not told apart. s/s: seconds of computing
 for each second of motion, of one run on a busy machine, so to a factor of two.
 
 - `default`: what a MuJoCo model has that says nothing (Euler, 2 ms, soft contacts, pyramidal cone).
