@@ -61,8 +61,8 @@ The same for [a robot of your own](control_a_robot.md#the-table-of-your-own-robo
 
 A cell is the largest distance up to that time of any body from the
 [reference by steps](control_a_robot.md#on-the-ground), in **mm**, and by how much any attitude is off, in **rad**.
-The first line of a table is the reference's own error bar: smaller distances are not told apart. s/s: seconds of computing
-for each second of motion, of one run on a busy machine, so to a factor of two.
+The first line of a table is the reference's own error bar: smaller distances are not told apart.
+s/s: seconds of computing for each second of motion, of one run on a busy machine, so to a factor of two.
 
 - `default`: what a MuJoCo model has that says nothing (Euler, 2 ms, soft contacts, pyramidal cone).
 - `matched`: hard contacts and elliptic cones at 1 ms.
