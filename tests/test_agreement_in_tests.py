@@ -437,7 +437,7 @@ def test_the_command(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "it is a run of pendulum with other numbers" in err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_plug_in_costs_nothing_until_it_is_used(tmp_path: Path) -> None:
     """Pytest starts without loading anything heavy of this package; a test that takes the fixture gets the function."""
     (tmp_path / "test_mine.py").write_text(

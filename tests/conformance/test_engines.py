@@ -46,7 +46,7 @@ OF_BUILDING = ("builds_or_refuses", "builds_only_what_is_required")
 # Of what hangs on a formulation's model or adapter, not on its step, and of what is held against truths, one preset is
 # asked on every scene in every run of the tests; in the drills each scene is asked of one other preset, in turns: of
 # how it moves, or of its certificate and its first steps; an eighth of them before a change lands, another eighth by
-# each check. What is known to fail is asked wherever it is.
+# each check, and that a law acts in other presets at night alone. What is known to fail is asked wherever it is.
 OF_MODELS = (
     "certificate_holds",
     "first_steps_fit_the_scene",
@@ -88,6 +88,8 @@ def marks(engine: Any, check: Check) -> tuple[pytest.MarkDecorator, ...] | None:
         if odd == (name == "moves_as_the_truth"):
             return None
         mark = pytest.mark.nightly if (turn + number) % 8 else mark
+    elif name == "law_acts":
+        mark = pytest.mark.nightly
     return (mark,) if preset == others[turn % len(others)] else None
 
 

@@ -19,6 +19,7 @@ ENDINGS = (".svg", ".png", ".pdf")
 # Colours by number, lines of the formulations of an engine in turn, and signs of its settings.
 _COLOURS = ("#0067b1", "#c8500a", "#00825d", "#b0478a", "#8a6d00", "#3a8fc4", "#5b4bb5", "#6b6b6b")
 _LINES, _SIGNS = ("-", "--", ":", "-."), ("o", "s", "D", "^")
+_BESIDE = (5, -13)  # places of the numbers of copies above and below their points, for lines in turn [points]
 _STYLE = {"font.size": 9, "svg.fonttype": "none"}
 
 
@@ -63,8 +64,8 @@ def drawn(result: Throughput) -> Figure:
     shown = [row for row in result.rows if row.rate and row.worst]
     colours = engine_colours(dict.fromkeys(row.engine.partition("[")[0] for row in shown))
     lines: dict[str, int] = {}
-    for name, group in groupby(shown, key=lambda row: row.name):
-        rows = list(group)
+    for index, (name, group) in enumerate(groupby(shown, key=lambda row: row.name)):
+        rows, beside = list(group), _BESIDE[index % len(_BESIDE)]
         engine = rows[0].engine.partition("[")[0]
         number = lines[engine] = lines.get(engine, -1) + 1
         places = [(row.rate or math.nan, row.worst or math.nan) for row in rows]
@@ -77,9 +78,10 @@ def drawn(result: Throughput) -> Figure:
             label=_label(name, rows),
         )
         for row, place in zip(rows, places, strict=True):
-            axes.annotate(str(row.copies), place, xytext=(0, 5), textcoords="offset points", ha="center")
+            axes.annotate(str(row.copies), place, xytext=(0, beside), textcoords="offset points", ha="center")
     axes.set_xscale("log")
     axes.set_yscale("log")
+    axes.margins(y=0.1)
     axes.set_xlabel("copies × steps in a second of processor time")
     unit = "" if result.unit == "1" else f" [{result.unit}]"
     axes.set_ylabel(f"error of the worst copy in {result.quantity}{unit}")

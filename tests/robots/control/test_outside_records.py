@@ -55,7 +55,8 @@ QUICK = {
 }
 _DRILL = (pytest.mark.drill, pytest.mark.slow)
 CLOSED = ("damping", "dry friction", "payload")  # named with what they close, too, by a test of their own
-# A mistake of each cause that QUICK lacks is judged before a change lands, the first of the table.
+# Of each cause that QUICK lacks the first mistake of the table is judged before a change lands; those that take longest
+# wait for the night.
 _KNOWN = {MISTAKES[name][0] for _, _, name in QUICK}
 FIRST = {cause: name for name, (cause, *_) in reversed(MISTAKES.items()) if cause not in _KNOWN}
 
@@ -157,10 +158,12 @@ def test_a_right_record_of_another_program_holds(program: str, digits: str, judg
     "pinocchio--spin at 0.25",
     "mujoco--rotation back",
     "mujoco--velocity at 2",
+    "pinocchio--no armature",
+    "mujoco-3-damping",
+    "pinocchio--half kd",
+    "mujoco--rates at 0.05",
 )
-@pytest.mark.drill_of(
-    "mujoco-single-gravity 9.80", "mujoco-3-damping", "pinocchio--no armature", "pinocchio--two instants late"
-)
+@pytest.mark.drill_of("mujoco-single-gravity 9.80", "pinocchio--two instants late")
 @pytest.mark.parametrize(("program", "digits", "name"), ALL)
 def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: str, judged: Judged) -> None:
     """A mistake in a loop around another program stops at its layer and is named; a limit is that of the URDF."""

@@ -62,7 +62,7 @@ def mixed(tmp_path: Path) -> Path:
     return folder
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_scene_of_two_kinds_is_compared(
     tmp_path: Path, mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -108,7 +108,7 @@ def test_friction_in_a_loop_is_a_drive_against_the_motion():
     np.testing.assert_allclose(one.sample().v_WB, two.sample().v_WB, atol=1e-10)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_loop_with_friction_turns_when_it_should():
     """A crank drive whose shaft rubs has the true motion, through the turn of its friction."""
     made = runs.model("slider_crank")
