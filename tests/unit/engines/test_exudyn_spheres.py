@@ -106,3 +106,12 @@ def test_a_run_that_begins_anew_is_at_its_time():
     run.integration = again
     run.advance(0.02)
     assert again.solver.it.currentTime == pytest.approx(0.02)
+
+
+def test_a_contact_that_newton_does_not_solve_has_two_remedies():
+    """A contact may be too sharp for any step: its friction zone is named, where there is one."""
+    spheres = EXUDYN.build(sled(), MATCHED).integration
+    smooth = EXUDYN.build(mechanism_named("double_pendulum"), EXUDYN.presets["tree"]["matched"]).integration
+    for integration, named in ((spheres, True), (smooth, False)):
+        integration.solver.conv.newtonConverged = False
+        assert ("or a larger friction_zone" in integration._reason()) is named

@@ -98,6 +98,7 @@ class Integration:
             system, settings, at=t, dependent=dependent, mass=mass, moved=moved
         )
         self.dt = settings.dt
+        self._cure = "use a smaller dt" + " or a larger friction_zone" * (settings.friction_zone is not None)
         self.system = system
         self.options = simulation_settings(settings, dependent=dependent, mass=mass)
         self.options.timeIntegration.startTime, self.options.timeIntegration.endTime = at, at + settings.dt
@@ -162,7 +163,7 @@ class Integration:
         if convergence.linearSolverFailed or convergence.massMatrixNotInvertible:
             return "the system matrix is singular"
         if convergence.newtonSolutionDiverged or not convergence.newtonConverged:
-            return "Newton's method did not converge; use a smaller dt"
+            return f"Newton's method did not converge; {self._cure}"
         return _sentence(self.solver.GetErrorString()) or "it gives no reason"
 
 

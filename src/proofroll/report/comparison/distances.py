@@ -81,9 +81,8 @@ def distance_cells(item: Distances, rows: Sequence[ReportedRow], runs: Sequence[
     """Name, distances in mm and rad up to each time, and cost in s/s of each row; the reference's bars come first."""
     there = [run for run in runs if run.point == item.point]
     costs = {run.row: run.rough_cost if run.seconds_per_second is None else run.seconds_per_second for run in there}
-    of_rows = names(rows)
     for line in item.lines:
         pairs = zip(line.places, line.turns, strict=True)
         cells = ["–" if place is None else f"{error(1e3 * place)} {error(turn)}" for place, turn in pairs]
-        name, cost = ("known to", "") if line.row is None else (of_rows[line.row], number(costs.get(line.row)))
+        name, cost = ("known to", "") if line.row is None else (names(rows)[line.row], number(costs.get(line.row)))
         yield [name, *cells, cost]
