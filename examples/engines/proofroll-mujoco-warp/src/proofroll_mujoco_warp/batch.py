@@ -49,7 +49,8 @@ class MujocoWarpBatch:
                 arrays = [value.numpy() for value in values]
                 if all(np.array_equal(array, arrays[0]) for array in arrays[1:]):
                     continue
-                if getattr(item.type, "shape", ())[:1] != ("*",):
+                alike = len({array.shape for array in arrays}) == 1
+                if not alike or getattr(item.type, "shape", ())[:1] != ("*",):
                     raise Refused(f"the worlds of MuJoCo Warp share {item.name}, in which these scenes differ")
                 copies = np.concatenate(arrays)[self._pattern]
                 changes[item.name] = warp.array(copies, dtype=values[0].dtype, device=values[0].device)
