@@ -17,9 +17,12 @@ from proofroll.studies.answer.setting_search import State
 # What a sign of the matrix means.
 CHOICE_MEANINGS = {
     "agrees": "held",
+    "unconfirmed": "held at one step, its limit not confirmed",
     "incomplete": "motion not told whole",
     "converges": "finer steps come closer",
     "differs": "another limit or none",
+    "ill-posed": "ill-posed",
+    "another-scene": "of another scene",
     "not-judged": "not judged",
     "refused": "refused",
     "failed": "no result",
