@@ -24,13 +24,7 @@ from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, ST
 from proofroll.elements.mechanism.scene.rotations import Array, carried, frame_of_axis
 from proofroll.engines.pinocchio.contact.blocks import Block, BlockSolver
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
-from proofroll.engines.pinocchio.contact.step_terms import (
-    LARGEST_FRICTION,
-    Impulses,
-    SolverParts,
-    StepTerms,
-    solver_of,
-)
+from proofroll.engines.pinocchio.contact.step_terms import LARGEST_FRICTION, Impulses, SolverParts, StepTerms, solver_of
 from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningImpulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
