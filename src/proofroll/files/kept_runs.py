@@ -51,6 +51,6 @@ def kept_lines() -> Iterator[str]:
             yield f"{line}cannot be read"
             continue
         scene, engine, status = (kept[file].get(key, "") for key in ("scene", "engine", "status"))
-        others = [given[other] for other in given if kept[other].get("scene") == scene]
-        own = [f"{k}={v}" for k, v in given[file].items() if any(other.get(k, v) != v for other in others)]
-        yield f"{line}{', '.join([f'{scene} in {engine}', *own])}: {status}"
+        runs = [given[run] for run in given if kept[run].get("scene") == scene]
+        differences = [f"{k}={v}" for k, v in given[file].items() if any(run.get(k, v) != v for run in runs)]
+        yield f"{line}{', '.join([f'{scene} in {engine}', *differences])}: {status}"

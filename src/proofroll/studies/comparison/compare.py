@@ -147,14 +147,16 @@ def run_plan(
 
 def _without_ladder(planned: Plan, results: Mapping[str, Result]) -> dict[str, Result]:
     """Results of the further steps of rows whose own step has no result: the same, for they judge nothing then."""
-    own = [(run.ladder.values(), results.get(run.ladder[1.0].key)) for run in planned.runs if run.ladder]
+    ladders = [(run.ladder.values(), results.get(run.ladder[1.0].key)) for run in planned.runs if run.ladder]
     lost, awaited = dict[str, Result](), {*results}
-    for cases, result in own:
+    for cases, result in ladders:
         keys = [case.key for case in cases]
         if result is None or result.status in {Status.DONE, Status.LEFT_OUT}:
             awaited |= {*keys}
         else:
-            lost |= dict.fromkeys(keys, Result(result.status, f"not run, as its own step was not: {result.message}"))
+            lost |= dict.fromkeys(
+                keys, Result(result.status, f"not run, as the own step gave nothing: {result.message}")
+            )
     return {key: result for key, result in lost.items() if key not in awaited}
 
 

@@ -188,8 +188,8 @@ class MechanismKind:
         plain = load_scene(_PLAIN)
         hinges = the_mechanism(plain).mechanism.joints
         fast = tuple(replace(joint, v0=(_OVERFLOWING,)) for joint in hinges)
-        other = load_scene(_PLAIN, angle=0.7, mass=1.6)
-        return {_PLAIN: (plain, other, _changed(plain, f"{_PLAIN}-overflowing", joints=fast))}
+        variant = load_scene(_PLAIN, angle=0.7, mass=1.6)
+        return {_PLAIN: (plain, variant, _changed(plain, f"{_PLAIN}-overflowing", joints=fast))}
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:
