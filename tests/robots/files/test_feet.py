@@ -157,6 +157,73 @@ def test_meshes_that_collide_are_told(stood: Callable[..., Scene]) -> None:
     assert "collision meshes of trunk" in stood(text).omitted
 
 
+# A foot of three corners and one above them, with points of no meaning: on a face, on an edge and within.
+CORNERS = ((-0.02, -0.01, -0.2), (0.03, -0.01, -0.2), (0.0, 0.02, -0.2), (0.0, 0.0, -0.17))
+WITHIN = ((0.0, 0.0, -0.2), (0.005, -0.01, -0.2), (0.0, 0.0, -0.19))
+HOOF = FOOT.replace('type="sphere" size=".02" pos="0 0 -.2"', 'type="mesh" mesh="hoof"')
+
+
+def hoof(points: Any = CORNERS + WITHIN) -> str:
+    """Asset of a mesh of these points."""
+    return f'<asset><mesh name="hoof" vertex="{" ".join(str(x) for point in points for x in point)}"/></asset>'
+
+
+def test_a_mesh_stands_on_the_corners_of_its_hull(stood: Callable[..., Scene]) -> None:
+    """Each corner is a vertex on the link, and what lies within the hull or on its faces is none."""
+    scene = stood(robot(HOOF, after=hoof()))
+    assert "3 shapes on a floor, friction 0.4" in scene.title
+    assert "mesh" not in scene.omitted
+    assert set(_pairs(scene)) == {f"{name}_foot corner {k} on floor" for name in PLACES for k in range(1, 5)}
+    mechanism = scene.elements[0].mechanism  # type: ignore[attr-defined]
+    for name in PLACES:
+        places = [shape.position for shape in mechanism.geometries if shape.name.startswith(name)]
+        apart = np.linalg.norm(np.array(places)[:, None] - np.array(CORNERS), axis=-1)
+        assert apart.min(axis=0).max() < 1e-8  # MuJoCo's are of 32 bits
+    assert {shape.radius for shape in mechanism.geometries if shape.kind == "sphere"} == {0.0}
+
+
+def test_a_margin_around_a_mesh_is_a_radius_of_its_corners(stood: Callable[..., Scene]) -> None:
+    """Its corners press from the margin on."""
+    scene = stood(robot(HOOF.replace("mesh=", 'margin=".005" mesh='), after=hoof()))
+    shapes = scene.elements[0].mechanism.geometries  # type: ignore[attr-defined]
+    assert {shape.radius for shape in shapes if shape.kind == "sphere"} == {0.005}
+
+
+def test_a_mesh_in_a_file_stands_as_one_in_the_text(stood: Callable[..., Scene], tmp_path: Path) -> None:
+    """Its file is read from the folder that the compiler names, where it collides."""
+    (tmp_path / "parts").mkdir()
+    points = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
+    (tmp_path / "parts" / "hoof.obj").write_text(points + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    named = '<compiler meshdir="parts"/><asset><mesh name="hoof" file="hoof.obj"/></asset>'
+    assert set(_pairs(stood(robot(HOOF, after=named)))) == set(_pairs(stood(robot(HOOF, after=hoof()))))
+    looks = stood(robot(FOOT + HOOF.replace('name="{name}_foot"', 'contype="0" conaffinity="0"'), after=named))
+    assert len(_pairs(looks)) == 3
+    assert "mesh" not in looks.omitted
+
+
+def test_a_mesh_of_very_many_corners_is_refused_by_its_number(stood: Callable[..., Scene]) -> None:
+    """A hull of more corners than the bound is named, with the number and with balls in its place."""
+    turn = np.linspace(0, 2 * np.pi, 66, endpoint=False)
+    wide = [*np.stack([0.03 * np.cos(turn), 0.03 * np.sin(turn), 0 * turn - 0.2], axis=1).tolist(), CORNERS[-1]]
+    with pytest.raises(InputError) as caught:
+        stood(robot(HOOF, after=hoof(wide)))
+    for text in ("left_foot and floor", "a mesh whose convex hull has 67 corners; at most 64", "[ground] feet"):
+        assert text in str(caught.value)
+
+
+@pytest.mark.parametrize(("gap", "touches"), [(0.01, False), (-0.01, True)])
+def test_a_mesh_on_another_shape_has_no_contact(stood: Callable[..., Scene], gap: float, touches: bool) -> None:
+    """Where it touches one that is no plane, both are named with the pair; where it comes near, they are left out."""
+    wall = f'<geom name="wall" type="box" size=".1 .3 .1" pos="{0.15 + 0.03 + 0.1 + gap} 0 0"/>'
+    text = robot(HOOF, after=hoof(), trunk=FOOT.format(name="trunk")).replace("</worldbody>", f"{wall}</worldbody>")
+    control = CONTROL.replace("left_hip = 0.1", "left_hip = 0")
+    if touches:
+        with pytest.raises(InputError, match=r"no contact of left_foot and wall \(mesh on box\) and 1 other pair;"):
+            stood(text, control)
+        return
+    assert any("left_foot and wall, " in words and "(mesh on box)" in words for words in stood(text, control).omitted)
+
+
 URDF = """<robot name="stool"><link name="trunk"><inertial><mass value="3"/>
 <inertia ixx=".02" iyy=".03" izz=".04" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><origin xyz="0 0 -.1"/><geometry><box size=".4 .2 .1"/></geometry></collision>
@@ -174,19 +241,21 @@ def test_a_urdf_stands_on_a_plane(stood: Callable[..., Scene]) -> None:
     assert [pair.friction for pair in _pairs(rough).values()] == [0.3]
 
 
-def test_a_scene_moves_as_the_file_in_plain_mujoco(stood: Callable[..., Scene]) -> None:
+@pytest.mark.parametrize("text", [robot(), robot(HOOF, after=hoof())], ids=["balls", "meshes"])
+def test_a_scene_moves_as_the_file_in_plain_mujoco(stood: Callable[..., Scene], text: str) -> None:
     """The file itself in MuJoCo, with the settings of matched, lands and stands as its scene does there."""
     import mujoco
 
-    scene = stood(robot(), CONTROL + "[start]\nbase = [0, 0, 0.24, 0.9998, 0.015, 0.0132287566, 0]\n")
+    scene = stood(text, CONTROL + "[start]\nbase = [0, 0, 0.24, 0.9998, 0.015, 0.0132287566, 0]\n")
     step, until = 1e-3, 0.3
     ours = simulate(scene, "mujoco[formulation=geoms,preset=matched,damping_armature=false]", dt=step, until=until)
-    model = mujoco.MjModel.from_xml_string(robot())
+    model = mujoco.MjModel.from_xml_string(text)
     model.opt.timestep, model.opt.cone, model.opt.integrator = step, 1, 0
     for name in ("geom_solref", "dof_solref", "pair_solref"):
         getattr(model, name)[:] = 2 * step, 1
     for name in ("geom_solimp", "dof_solimp", "pair_solimp"):
         getattr(model, name)[:] = 0.9999, 0.9999, 1e-3, 0.5, 2
+    model.geom("floor").margin = 1e-9  # as the adapter gives each pair
     data = mujoco.MjData(model)
     for joint in scene.elements[0].mechanism.joints:  # type: ignore[attr-defined]
         place = int(model.joint(joint.name).qposadr[0])
@@ -199,7 +268,7 @@ def test_a_scene_moves_as_the_file_in_plain_mujoco(stood: Callable[..., Scene]) 
         places.append(data.qpos[:3].copy())
     moved = float(np.abs(np.diff(places, axis=0)).max())
     assert moved > 1e-3
-    assert np.abs(ours["p_WB"].values[:, 0] - places).max() < 1e-8
+    assert np.abs(ours["p_WB"].values[:, 0] - places).max() < 1e-9
 
 
 @pytest.mark.parametrize(("lowest", "drop", "way"), [(-0.02, None, 0.03), (0.02, None, 0.0), (0.02, 0.01, -0.01)])

@@ -6,6 +6,7 @@ of who touches whom needs no rules of ours. Of a URDF the pairs with a floor cou
 
 from __future__ import annotations
 
+import itertools
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -39,14 +40,15 @@ _NAMED = 4  # links in a clause
 _FRICTION = 1.0  # of shapes of a URDF, which has none
 _ANOTHER_WAY = "give [ground] feet = {LINK = radius}, or take --ground none"
 # Pairs of shapes that have a rule of contact in a scene.
-_RULED = {frozenset(("plane", kind)) for kind in ("sphere", "capsule", "box", "cylinder", "ellipsoid")} | {
+_RULED = {frozenset(("plane", kind)) for kind in ("sphere", "capsule", "box", "cylinder", "ellipsoid", "mesh")} | {
     frozenset(("sphere", "capsule")),
     frozenset(("sphere", "box")),
     frozenset(("sphere", "cylinder")),
     frozenset(("capsule", "box")),
     *(frozenset((kind,)) for kind in ("sphere", "capsule", "box")),
 }
-_ROUND = ("sphere", "capsule")  # a margin around these is a larger radius
+_ROUND = ("sphere", "capsule", "mesh")  # a margin around these, or around the corners of a mesh, is a larger radius
+_MOST_CORNERS = 64  # of the convex hull of a mesh; each is a contact
 _THIN = 1e-3  # m: margin around other shapes that is left out
 _REBOUNDS = 0.5  # damping ratio of a soft contact below which it visibly rebounds
 _SLIDES, _SPINS, _ROLLS = 1, 4, 6  # dimensions of MuJoCo's contacts without friction, and with more than sticking
@@ -131,7 +133,15 @@ def ground_tables(
 
 
 class _Shape(NamedTuple):
-    """A shape of the file: unique name, body of the scene and its link, MuJoCo's kind and size, pose in the body."""
+    """A shape of the file.
+
+    Attributes:
+        name: unique.
+        body, link: body of the scene, and link.
+        kind, size: MuJoCo's.
+        p, R: pose in the body.
+        corners: of a mesh, in its axes [m].
+    """
 
     name: str
     body: str
@@ -140,9 +150,21 @@ class _Shape(NamedTuple):
     size: Sequence[float]
     p: Array
     R: Array
+    corners: Sequence[Sequence[float]] = ()
+
+    def tables(self, margin: float) -> list[dict[str, Any]]:
+        """Tables of the geometry, of each corner of a mesh, with a margin added around it."""
+        if self.kind != "mesh":
+            return [self.table(margin)]
+        places = self.p + np.array(self.corners) @ self.R.T
+        points = (
+            self._replace(name=f"{self.name} corner {number}", kind="sphere", size=(0.0,), p=place)
+            for number, place in enumerate(places, 1)
+        )
+        return [point.table(margin) for point in points]
 
     def table(self, margin: float) -> dict[str, Any]:
-        """Table of the geometry, with a margin added around it."""
+        """Table of the geometry, which is no mesh, with a margin added around it."""
         grown = f"{self.name} and {margin:g} m" if margin else self.name
         row: dict[str, Any] = {"name": grown, "body": self.body, "kind": self.kind, "position": self.p.tolist()}
         size, axis = list(self.size), self.R[:, 2].tolist()
@@ -203,7 +225,10 @@ class _NearPair:
             yield "friction of another size along another direction"
         if self.dim >= _ROLLS and self.friction[3] != self.friction[4]:
             yield "rolling friction of another size about another axis"
-        several = {"capsule", "cylinder", "box"} & set(kinds) and "sphere" not in kinds
+        most = max(len(shape.corners) for shape in self.shapes)
+        if most > _MOST_CORNERS:
+            yield f"a mesh whose convex hull has {most} corners; at most {_MOST_CORNERS} are taken"
+        several = {"capsule", "cylinder", "box", "mesh"} & set(kinds) and "sphere" not in kinds
         if several and (self.table(None).keys() & {"spinning_friction", "rolling_resistance"}):
             yield f"{' on '.join(kinds)} with friction against turning"
         if self.margin > _THIN and self.grown is None:
@@ -230,6 +255,7 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
     """
     geometries: dict[str, dict[str, Any]] = {}
     rows, left_out, wrong = list[dict[str, Any]](), list(lost), list[str]()
+    stands, others = list[tuple[str, float]](), 0
     for pair in pairs:
         names = " and ".join(shape.name for shape in pair.shapes)
         if reasons := list(pair.reasons()):
@@ -238,10 +264,14 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
             else:
                 wrong.append(f"{names} ({reasons[0]})")
             continue
-        ends = [shape.table(pair.margin if place == pair.grown else 0.0) for place, shape in enumerate(pair.shapes)]
-        geometries |= {end["name"]: end for end in ends}
-        rows.append({"name": f"{ends[0]['name']} on {ends[1]['name']}", "geometries": [end["name"] for end in ends]})
-        rows[-1] |= pair.table(friction)
+        laws = pair.table(friction)
+        stands += [(pair.shapes[0].name, laws["friction"])] if pair.on_floor else []
+        others += not pair.on_floor
+        ends = [shape.tables(pair.margin if place == pair.grown else 0.0) for place, shape in enumerate(pair.shapes)]
+        for end, other in itertools.product(*ends):
+            geometries |= {end["name"]: end, other["name"]: other}
+            both = [end["name"], other["name"]]
+            rows.append({"name": " on ".join(both), "geometries": both} | laws)
     if wrong:
         more = f" and {counted(len(wrong) - 1, 'other pairs')}" if len(wrong) > 1 else ""
         raise InputError("ground", file.path, f"a scene has no contact of {wrong[0]}{more}; {_ANOTHER_WAY}")
@@ -250,7 +280,7 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
             "no shape of it comes near a floor or another shape within a second; give [ground] feet = {LINK = radius}"
         )
         raise InputError("ground", file.path, f"{advice}, or take --ground plane")
-    return GroundTables(list(geometries.values()), rows, _about(geometries, rows), left_out)
+    return GroundTables(list(geometries.values()), rows, _about(stands, others), left_out)
 
 
 def _balls(standing: StandingRobot, feet: Mapping[str, float], friction: float) -> GroundTables:
@@ -266,20 +296,18 @@ def _balls(standing: StandingRobot, feet: Mapping[str, float], friction: float) 
         shape = _Shape(name=link, body=body, link=link, kind="sphere", size=(radius,), p=p, R=R)
         geometries[link] = shape.table(0.0)
     rows = [{"name": link, "geometries": [link, FLOOR], "friction": friction} for link in geometries]
+    about = _about([(link, friction) for link in geometries], 0)
     geometries[FLOOR] = {"name": FLOOR, "body": WORLD, "kind": "plane"}
-    return GroundTables(list(geometries.values()), rows, _about(geometries, rows), ["shapes of the file"])
+    return GroundTables(list(geometries.values()), rows, about, ["shapes of the file"])
 
 
-def _about(geometries: Mapping[str, Mapping[str, Any]], pairs: Sequence[Mapping[str, Any]]) -> str:
-    """Clause on what stands on what."""
-    floors = {name for name, row in geometries.items() if row["kind"] == "plane" and row["body"] == WORLD}
-    on_floor = [pair for pair in pairs if floors & set(pair["geometries"])]
-    feet = {name for pair in on_floor for name in pair["geometries"]} - floors
-    least, *_, most = sorted(f"{pair['friction']:g}" for pair in on_floor) * 2 or [""] * 2
+def _about(stands: Sequence[tuple[str, float]], others: int) -> str:
+    """Clause on what stands on what: shapes and frictions of the pairs with a floor, and the number of other pairs."""
+    feet = {name for name, _ in stands}
+    least, *_, most = sorted(f"{friction:g}" for _, friction in stands) * 2 or [""] * 2
     rough = f"friction {least}" if least == most else f"friction {least} to {most}"
-    stands = f"{counted(len(feet), 'shapes')} on a floor, {rough}" if on_floor else "no floor"
-    others = len(pairs) - len(on_floor)
-    return f"{stands}; {counted(others, 'other pairs')}" if others else stands
+    words = f"{counted(len(feet), 'shapes')} on a floor, {rough}" if stands else "no floor"
+    return f"{words}; {counted(others, 'other pairs')}" if others else words
 
 
 def _shape(standing: StandingRobot, row: Mapping[str, Any]) -> _Shape:
@@ -294,6 +322,7 @@ def _shape(standing: StandingRobot, row: Mapping[str, Any]) -> _Shape:
         size=row["size"],
         p=p + R @ np.array(row["position"]),
         R=R @ np.array(row["rotation"]),
+        corners=row["corners"],
     )
 
 

@@ -159,16 +159,31 @@ def _gap_widens() -> bool:
 
 
 def _shape(model: Any, geom: int) -> dict[str, Any]:
-    """A shape: name (empty: it has none), body (empty: the world), kind, MuJoCo's size, place and axes in the body."""
+    """A shape: name (empty: it has none), body (empty: the world), kind, MuJoCo's size, place and axes in the body.
+
+    Of a mesh also ``corners`` of its convex hull, in its axes [m], of which there are none without a hull.
+    """
     axes = np.zeros(9)
     mujoco.mju_quat2Mat(axes, model.geom_quat[geom])
-    body = int(model.geom_bodyid[geom])
+    body, kind = int(model.geom_bodyid[geom]), _KINDS[int(model.geom_type[geom])]
     return {
         "name": model.geom(geom).name,
         "number": geom - int(model.body_geomadr[body]),
         "body": model.body(body).name if body else "",
-        "kind": _KINDS[int(model.geom_type[geom])],
+        "kind": kind,
         "size": model.geom_size[geom].tolist(),
+        "corners": _corners(model, int(model.geom_dataid[geom])) if kind == "mesh" else [],
         "position": model.geom_pos[geom].tolist(),
         "rotation": axes.reshape(3, 3).tolist(),
     }
+
+
+def _corners(model: Any, mesh: int) -> list[list[float]]:
+    """Corners of the convex hull of a mesh, by which MuJoCo lets it touch."""
+    first, vertices = int(model.mesh_graphadr[mesh]), model.mesh_vert[int(model.mesh_vertadr[mesh]) :]
+    if first < 0:
+        return []
+    count = int(model.mesh_graph[first])  # it is followed by that of faces, places of edges, and numbers of corners
+    numbers = model.mesh_graph[first + 2 + count : first + 2 + 2 * count]
+    corners: list[list[float]] = vertices[numbers].astype(float).tolist()
+    return corners
