@@ -21,7 +21,7 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.number_format import counted
 from proofroll.elements.mechanism import WORLD
-from proofroll.elements.mechanism.scene.rotations import to_rpy
+from proofroll.elements.mechanism.scene.rotations import frame_of_axis, to_rpy
 from proofroll.files.json_data import plain
 from proofroll.robots.files import reading
 from proofroll.robots.files.meaning import by_definer, opened
@@ -35,8 +35,8 @@ from proofroll.robots.states import RobotStates
 # What a robot stands on: the number of each in the parameter ``ground`` of a scene.
 NO_GROUND, OF_FILE, ON_A_PLANE = "none", "file", "plane"
 GROUNDS = (NO_GROUND, OF_FILE, ON_A_PLANE)
-FLOOR = "floor"
-_NAMED = 4  # links in a clause
+FLOOR, NO_FLOOR = "floor", "no floor"
+_NAMED = 4  # links or shapes in a clause
 _FRICTION = 1.0  # of shapes of a URDF, which has none
 _ANOTHER_WAY = "give [ground] feet = {LINK = radius}, or take --ground none"
 # Pairs of shapes that have a rule of contact in a scene.
@@ -47,6 +47,8 @@ _RULED = {frozenset(("plane", kind)) for kind in ("sphere", "capsule", "box", "c
     frozenset(("capsule", "box")),
     *(frozenset((kind,)) for kind in ("sphere", "capsule", "box")),
 }
+# Shapes without a rule on a box that have one on its face, as on a plane.
+_ON_FACES = ("cylinder", "ellipsoid", "mesh")
 _ROUND = ("sphere", "capsule", "mesh")  # a margin around these, or around the corners of a mesh, is a larger radius
 _MOST_CORNERS = 64  # of the convex hull of a mesh; each is a contact
 _THIN = 1e-3  # m: margin around other shapes that is left out
@@ -152,6 +154,12 @@ class _Shape(NamedTuple):
     R: Array
     corners: Sequence[Sequence[float]] = ()
 
+    def face(self, axis: int, side: int) -> _Shape:
+        """Plane in which a face of a box lies."""
+        normal = side * self.R[:, axis]
+        name = f"{self.name} face {'-+'[side > 0]}{'xyz'[axis]}"
+        return self._replace(name=name, kind="plane", p=self.p + self.size[axis] * normal, R=frame_of_axis(normal))
+
     def tables(self, margin: float) -> list[dict[str, Any]]:
         """Tables of the geometry, of each corner of a mesh, with a margin added around it."""
         if self.kind != "mesh":
@@ -169,7 +177,7 @@ class _Shape(NamedTuple):
         row: dict[str, Any] = {"name": grown, "body": self.body, "kind": self.kind, "position": self.p.tolist()}
         size, axis = list(self.size), self.R[:, 2].tolist()
         if self.kind == "plane":
-            return row | {"normal": axis}
+            return row | {"position": (self.p + margin * self.R[:, 2]).tolist(), "normal": axis}
         if self.kind == "sphere":
             return row | {"radius": size[0] + margin}
         if self.kind in {"capsule", "cylinder"}:
@@ -188,6 +196,7 @@ class _NearPair:
         softness: time constant [s] and damping ratio, or two negative numbers.
         margin: distance from which it presses [m].
         distance: the least one that was seen [m].
+        face: axis and side of the face of a box of the world within whose borders they met; empty: there is none.
     """
 
     shapes: tuple[_Shape, ...]
@@ -196,9 +205,18 @@ class _NearPair:
     softness: Sequence[float]
     margin: float
     distance: float
+    face: Sequence[int] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "shapes", tuple(sorted(self.shapes, key=lambda shape: shape.body == WORLD)))
+        moving, other = sorted(self.shapes, key=lambda shape: shape.body == WORLD)
+        if self.face and self.touches and other.kind == "box" and moving.kind in _ON_FACES:
+            other = other.face(*self.face)
+        object.__setattr__(self, "shapes", (moving, other))
+
+    @property
+    def touches(self) -> bool:
+        """True if they pressed each other."""
+        return self.distance <= max(self.margin, 0.0)
 
     @property
     def moves(self) -> bool:
@@ -207,14 +225,21 @@ class _NearPair:
 
     @property
     def on_floor(self) -> bool:
-        """True if one shape is a plane of the world."""
-        return self.shapes[1].kind == "plane" and self.shapes[1].body == WORLD
+        """True if one shape is a plane of the world, and no face of a box."""
+        return self.shapes[1].kind == "plane" and self.shapes[1].body == WORLD and not self.face
 
     @property
-    def grown(self) -> int | None:
-        """Number of the shape to which the margin is added; None: there is no margin, or no round shape."""
-        rounds = [place for place, shape in enumerate(self.shapes) if shape.kind in _ROUND]
-        return rounds[0] if self.margin > 0 and rounds else None
+    def on_face(self) -> bool:
+        """True if one shape is the plane of a box's face."""
+        return self.shapes[1].kind == "plane" and bool(self.face)
+
+    @property
+    def grown(self) -> tuple[float, float]:
+        """Margins around both shapes [m], of which a round one has some: MuJoCo presses in the middle between them."""
+        rounds = [shape.kind in _ROUND for shape in self.shapes]
+        takes = [item or shape.kind == "plane" for item, shape in zip(rounds, self.shapes, strict=True)]
+        share = self.margin / sum(takes) if self.margin > 0 and any(rounds) else 0.0
+        return share * takes[0], share * takes[1]
 
     def reasons(self) -> Iterator[str]:
         """Reasons that a scene has no such pair."""
@@ -231,7 +256,7 @@ class _NearPair:
         several = {"capsule", "cylinder", "box", "mesh"} & set(kinds) and "sphere" not in kinds
         if several and (self.table(None).keys() & {"spinning_friction", "rolling_resistance"}):
             yield f"{' on '.join(kinds)} with friction against turning"
-        if self.margin > _THIN and self.grown is None:
+        if self.margin > _THIN and not any(self.grown):
             yield f"a margin of {self.margin:g} m around {kinds[0]}"
         if self.softness[0] > 0 and self.softness[1] < _REBOUNDS:
             yield "a contact that rebounds by its softness"
@@ -255,19 +280,21 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
     """
     geometries: dict[str, dict[str, Any]] = {}
     rows, left_out, wrong = list[dict[str, Any]](), list(lost), list[str]()
-    stands, others = list[tuple[str, float]](), 0
+    stands, others, endless = list[tuple[str, float]](), 0, dict[str, list[str]]()
     for pair in pairs:
         names = " and ".join(shape.name for shape in pair.shapes)
         if reasons := list(pair.reasons()):
-            if pair.distance > max(pair.margin, 0.0):
-                left_out.append(f"contact of {names}, {1e3 * pair.distance:.0f} mm apart ({reasons[0]})")
-            else:
+            if pair.touches:
                 wrong.append(f"{names} ({reasons[0]})")
+            else:
+                left_out.append(f"contact of {names}, {1e3 * pair.distance:.0f} mm apart ({reasons[0]})")
             continue
+        if pair.on_face:
+            endless.setdefault(pair.shapes[1].name, []).append(pair.shapes[0].name)
         laws = pair.table(friction)
         stands += [(pair.shapes[0].name, laws["friction"])] if pair.on_floor else []
         others += not pair.on_floor
-        ends = [shape.tables(pair.margin if place == pair.grown else 0.0) for place, shape in enumerate(pair.shapes)]
+        ends = [shape.tables(margin) for shape, margin in zip(pair.shapes, pair.grown, strict=True)]
         for end, other in itertools.product(*ends):
             geometries |= {end["name"]: end, other["name"]: other}
             both = [end["name"], other["name"]]
@@ -276,10 +303,12 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
         more = f" and {counted(len(wrong) - 1, 'other pairs')}" if len(wrong) > 1 else ""
         raise InputError("ground", file.path, f"a scene has no contact of {wrong[0]}{more}; {_ANOTHER_WAY}")
     if not rows:
-        advice = (
-            "no shape of it comes near a floor or another shape within a second; give [ground] feet = {LINK = radius}"
-        )
-        raise InputError("ground", file.path, f"{advice}, or take --ground plane")
+        near = "no shape of it comes near a floor or another shape within a second"
+        if pairs:
+            near = f"no shapes that come near each other within a second have a rule or touch: {left_out[-1]}"
+        advice = "give [ground] feet = {LINK = radius}, or take --ground plane or none"
+        raise InputError("ground", file.path, f"{near}; {advice}")
+    left_out += [f"edges of {face}, which is endless for {_listed(shapes)}" for face, shapes in endless.items()]
     return GroundTables(list(geometries.values()), rows, _about(stands, others), left_out)
 
 
@@ -306,7 +335,7 @@ def _about(stands: Sequence[tuple[str, float]], others: int) -> str:
     feet = {name for name, _ in stands}
     least, *_, most = sorted(f"{friction:g}" for _, friction in stands) * 2 or [""] * 2
     rough = f"friction {least}" if least == most else f"friction {least} to {most}"
-    words = f"{counted(len(feet), 'shapes')} on a floor, {rough}" if stands else "no floor"
+    words = f"{counted(len(feet), 'shapes')} on a floor, {rough}" if stands else NO_FLOOR
     return f"{words}; {counted(others, 'other pairs')}" if others else words
 
 
@@ -351,10 +380,13 @@ def _with_contacts(file: RobotFile) -> tuple[bytes, list[str]]:
 
 def _meshes(links: Sequence[str]) -> list[str]:
     """Clause on the meshes of links that collide in a file."""
-    if not links:
-        return []
-    named = ", ".join(links[:_NAMED]) + (f" and {counted(len(links) - _NAMED, 'others')}" if links[_NAMED:] else "")
-    return [f"collision meshes of {named}"]
+    return [f"collision meshes of {_listed(links)}"] if links else []
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The first names, and the number of the others."""
+    others = counted(len(names) - _NAMED, "others")
+    return ", ".join(names[:_NAMED]) + (f" and {others}" if names[_NAMED:] else "")
 
 
 def _near(path: Path, kind: str, content: bytes, asked: dict[str, Any]) -> dict[str, Any]:

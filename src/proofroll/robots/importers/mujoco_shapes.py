@@ -16,6 +16,9 @@ from proofroll.robots.protocol import lift
 _NEAR, _HIGH = 0.02, 10.0
 # Duration of the run [s], and its largest number of steps times velocities.
 _SECONDS, _MOST = 1.0, 2e5
+# Cosine between the normals of a contact and of a face from which on the contact is one of this face (MuJoCo may give
+# that of the other face of almost parallel ones), and way of its place from the border of the face [m].
+_UPRIGHT, _WITHIN = 0.99, 1e-3
 _KINDS = {
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")): name.lower().replace("hfield", "height field")
     for name in ("plane", "sphere", "capsule", "box", "cylinder", "ellipsoid", "mesh", "hfield", "sdf")
@@ -43,8 +46,8 @@ def near_shapes(
         drop: height of the lowest shape over the floor [m]; None: as it is, or 1 cm where it overlaps the floor.
 
     Returns:
-        ``shapes`` as by :func:`_shape`; ``pairs`` with the numbers of two ``shapes``, their laws and the least
-        ``distance`` [m].
+        ``shapes`` as by :func:`_shape`; ``pairs`` with the numbers of two ``shapes``, their laws, the least
+        ``distance`` [m], and the ``face`` of a box by :func:`_face`.
     """
     model = _compiled(path, base_joint, floor=floor)
     data = mujoco.MjData(model)
@@ -59,8 +62,10 @@ def near_shapes(
             break
         for contact in data.contact[: data.ncon]:
             first, second = sorted(contact.geom.tolist())
-            laws = found.setdefault((first, second), _laws(contact))
+            face = _face(model, data, contact)
+            laws = found.setdefault((first, second), _laws(contact) | {"face": face})
             laws["distance"] = min(laws["distance"], float(contact.dist))
+            laws["face"] = face if laws["face"] == face else []
     geoms = sorted({geom for pair in found for geom in pair})
     pairs = [{"shapes": [geoms.index(geom) for geom in pair]} | laws for pair, laws in sorted(found.items())]
     return {"shapes": [_shape(model, geom) for geom in geoms], "pairs": pairs}
@@ -75,6 +80,22 @@ def _laws(contact: Any) -> dict[str, Any]:
         "margin": float(contact.includemargin),
         "distance": float(contact.dist),
     }
+
+
+def _face(model: Any, data: Any, contact: Any) -> list[int]:
+    """Axis and side of the face of a box of the world that another shape meets within its borders; empty: it does not.
+
+    The normal of such a contact is that of the face.
+    """
+    for geom, sign in zip(contact.geom.tolist(), (1, -1), strict=True):
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX and not model.body_weldid[model.geom_bodyid[geom]]:
+            axes, half = data.geom_xmat[geom].reshape(3, 3), model.geom_size[geom]
+            normal, place = sign * contact.frame[:3] @ axes, (contact.pos - data.geom_xpos[geom]) @ axes
+            axis = int(np.argmax(np.abs(normal)))
+            beyond = np.delete(np.abs(place) - half, axis).max()
+            if abs(normal[axis]) > _UPRIGHT and beyond < -_WITHIN:
+                return [axis, int(np.sign(normal[axis]))]
+    return []
 
 
 def _compiled(path: Path, base_joint: str, *, floor: bool) -> Any:
