@@ -51,6 +51,7 @@ _RULED = {frozenset(("plane", kind)) for kind in ("sphere", "capsule", "box", "c
 _ON_FACES = ("cylinder", "ellipsoid", "mesh")
 _ROUND = ("sphere", "capsule", "mesh")  # a margin around these, or around the corners of a mesh, is a larger radius
 _MOST_CORNERS = 64  # of the convex hull of a mesh; each is a contact
+_OVERLAP = 1e-6  # m: at the start, of shapes out of which no robot is lifted
 _THIN = 1e-3  # m: margin around other shapes that is left out
 _REBOUNDS = 0.5  # damping ratio of a soft contact below which it visibly rebounds
 _SLIDES, _SPINS, _ROLLS = 1, 4, 6  # dimensions of MuJoCo's contacts without friction, and with more than sticking
@@ -195,7 +196,7 @@ class _NearPair:
         friction: coefficients along two directions [1], of spin [m], of rolling about two axes [m].
         softness: time constant [s] and damping ratio, or two negative numbers.
         margin: distance from which it presses [m].
-        distance: the least one that was seen [m].
+        distance, start: the least one that was seen, and that at the start [m].
         face: axis and side of the face of a box of the world within whose borders they met; empty: there is none.
     """
 
@@ -205,7 +206,8 @@ class _NearPair:
     softness: Sequence[float]
     margin: float
     distance: float
-    face: Sequence[int] = ()
+    start: float
+    face: Sequence[int]
 
     def __post_init__(self) -> None:
         moving, other = sorted(self.shapes, key=lambda shape: shape.body == WORLD)
@@ -255,11 +257,14 @@ class _NearPair:
             yield f"a mesh whose convex hull has {most} corners; at most {_MOST_CORNERS} are taken"
         several = {"capsule", "cylinder", "box", "mesh"} & set(kinds) and "sphere" not in kinds
         if several and (self.table(None).keys() & {"spinning_friction", "rolling_resistance"}):
-            yield f"{' on '.join(kinds)} with friction against turning"
+            yield f"{' on '.join(kinds)} with friction against turning: of condim 4 or 6, 3 is taken"
         if self.margin > _THIN and not any(self.grown):
             yield f"a margin of {self.margin:g} m around {kinds[0]}"
         if self.softness[0] > 0 and self.softness[1] < _REBOUNDS:
             yield "a contact that rebounds by its softness"
+        if self.margin - self.start > _OVERLAP and self.shapes[1].kind != "plane":
+            by = f"they overlap by {1e3 * (self.margin - self.start):.3g} mm at the start"
+            yield f"{by}: begin elsewhere by [start], or exclude the pair in the file"
 
     def table(self, friction: float | None) -> dict[str, Any]:
         """Table of the pair's laws; ``friction``: in place of the file's."""

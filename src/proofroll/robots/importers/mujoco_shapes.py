@@ -47,7 +47,7 @@ def near_shapes(
 
     Returns:
         ``shapes`` as by :func:`_shape`; ``pairs`` with the numbers of two ``shapes``, their laws, the least
-        ``distance`` [m], and the ``face`` of a box by :func:`_face`.
+        ``distance`` [m] and that at the ``start``, and the ``face`` of a box by :func:`_face`.
     """
     model = _compiled(path, base_joint, floor=floor)
     data = mujoco.MjData(model)
@@ -56,16 +56,17 @@ def near_shapes(
     found: dict[tuple[int, int], dict[str, Any]] = {}
     _widen(model.geom_gap, model.geom_margin, _NEAR / 2 if _gap_widens() else _NEAR)
     _widen(model.pair_gap, model.pair_margin, _NEAR)
-    for _ in range(min(int(_SECONDS / model.opt.timestep), int(_MOST / max(model.nv, 1)))):
+    for step in range(min(int(_SECONDS / model.opt.timestep), int(_MOST / max(model.nv, 1)))):
         mujoco.mj_step(model, data)
         if not np.isfinite(data.qacc).all() or data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number:
             break
         for contact in data.contact[: data.ncon]:
             first, second = sorted(contact.geom.tolist())
             face = _face(model, data, contact)
-            laws = found.setdefault((first, second), _laws(contact) | {"face": face})
+            laws = found.setdefault((first, second), _laws(contact) | {"face": face, "start": _NEAR})
             laws["distance"] = min(laws["distance"], float(contact.dist))
             laws["face"] = face if laws["face"] == face else []
+            laws["start"] = laws["start"] if step else min(laws["start"], float(contact.dist))
     geoms = sorted({geom for pair in found for geom in pair})
     pairs = [{"shapes": [geoms.index(geom) for geom in pair]} | laws for pair, laws in sorted(found.items())]
     return {"shapes": [_shape(model, geom) for geom in geoms], "pairs": pairs}
