@@ -59,7 +59,7 @@ def test_the_workflow_of_platforms_asks_for_what_there_is() -> None:
     assert "://" not in text
 
 
-@pytest.mark.parametrize("folder", ["fuzz", "throughput"])
+@pytest.mark.parametrize("folder", ["cluster", "fuzz", "throughput"])
 def test_a_package_with_a_command_fits_the_suite(folder: str) -> None:
     """It has the version and the Pythons of the suite, and asks for that version: it uses more than public names."""
     package = tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]

@@ -40,9 +40,9 @@ ROOMS = {
     "pages": Room(("tests/report",), (*_MECHANICS, "cli", "report", "studies"), ("comparisons", "docs", "models")),
     "papers": Room(("tests/unit/papers",), (*_MECHANICS, "conformance", "report"), ("models", "tests/drill")),
     "packages": Room(
-        ("tests/packaging", "tests/test_versions.py", "tests/unit/running/test_cluster.py"),
+        ("tests/packaging", "tests/test_versions.py", "tests/unit/cluster"),
         (*_MECHANICS, "cli", "report", "studies"),
-        (".github", "benchmarks", "comparisons", "docs", "examples", "fuzz", "models", "tests/drill", "throughput"),
+        (".github", "benchmarks", "cluster", "comparisons", "docs", "examples", "fuzz", "models", "tests/drill", "throughput"),
     ),
     "fuzz": Room(("tests/unit/fuzz",), (*_MECHANICS, "studies", "vocabulary"), ("fuzz",)),
     "throughput": Room(("tests/unit/throughput",), (*_MECHANICS, "studies"), ("throughput",)),
