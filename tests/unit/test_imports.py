@@ -239,7 +239,11 @@ def test_one_place_makes_cases() -> None:
 def test_modules_are_short_enough_to_be_read_at_once() -> None:
     """No module has more than 500 lines: below, it is cut by subject, not by length."""
     repository = ROOT.parents[1]
-    files = [file for folder in (ROOT, repository / "fuzz", repository / "throughput", repository / "cluster") for file in folder.rglob("*.py")]
+    files = [
+        file
+        for folder in (ROOT, repository / "fuzz", repository / "throughput", repository / "cluster")
+        for file in folder.rglob("*.py")
+    ]
     long = [str(file.relative_to(repository)) for file in files if len(file.read_text().splitlines()) > 500]
     assert long == []
 

@@ -10,7 +10,7 @@ from proofroll.running import cluster
 
 def test_a_package_that_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no package brings clusters, an address is answered with how to install one."""
-    monkeypatch.setattr(cluster, "loaded", lambda group: [])
+    monkeypatch.setattr(cluster, "loaded", lambda _: [])
     with pytest.raises(Missing, match="pip install proofroll-cluster"):
         cluster.connected("local")
 
