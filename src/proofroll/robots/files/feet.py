@@ -237,7 +237,7 @@ class _NearPair:
 
     @property
     def grown(self) -> tuple[float, float]:
-        """Margins around both shapes [m], of which a round one has some: MuJoCo presses in the middle between them."""
+        """Margins around both shapes [m], if one is round; MuJoCo presses in the middle between them."""
         rounds = [shape.kind in _ROUND for shape in self.shapes]
         takes = [item or shape.kind == "plane" for item, shape in zip(rounds, self.shapes, strict=True)]
         share = self.margin / sum(takes) if self.margin > 0 and any(rounds) else 0.0

@@ -183,7 +183,7 @@ def _gap_widens() -> bool:
 def _shape(model: Any, geom: int) -> dict[str, Any]:
     """A shape: name (empty: it has none), body (empty: the world), kind, MuJoCo's size, place and axes in the body.
 
-    Of a mesh also ``corners`` of its convex hull, in its axes [m], of which there are none without a hull.
+    ``corners``: those of the convex hull of a mesh, in its axes [m].
     """
     axes = np.zeros(9)
     mujoco.mju_quat2Mat(axes, model.geom_quat[geom])

@@ -26,7 +26,7 @@ def remove_meshes(
     Args:
         root: content of the file.
         shapes: its geoms.
-        solid: those that stay where their mesh exists, as they collide.
+        solid: geoms that collide and stay, if their mesh exists.
         folder: folder of the file, to which paths are relative.
         inside: folder in which all files must lie.
 
