@@ -326,6 +326,17 @@ def test_shapes_that_come_near_without_a_rule_are_told(stood: Callable[..., Scen
         stood(held.replace(' .09"', ' .065"'), BARE)
 
 
+def test_an_overlap_is_lifted_out_or_told(stood: Callable[..., Scene]) -> None:
+    """A body that floats starts 1 cm above its table; of one that does not the overlap is named, with what helps."""
+    sunk = table("cylinder", turn="1 0 0 0").replace(' .09"', ' .055"')
+    scene = stood(sunk, BARE)
+    assert _height(scene) == pytest.approx(0.07, abs=1e-9)
+    assert "no floor; 1 other pair; moved up by 15 mm, as its start overlaps what it stands on" in scene.title
+    held = sunk.replace('<freejoint name="root"/>', '<joint type="slide" axis="1 0 0"/>')
+    with pytest.raises(InputError, match=r"\(they overlap by 5 mm at the start: begin elsewhere by \[start\], or excl"):
+        stood(held, BARE)
+
+
 FLOORED = robot(HOOF, after=hoof())
 
 
