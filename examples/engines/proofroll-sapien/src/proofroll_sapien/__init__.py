@@ -44,7 +44,8 @@ _CAPABILITY = MechanismCapability
 _PROVIDES = frozenset(
     {
         _CAPABILITY.FREE, _CAPABILITY.PLANAR, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION,
-        _CAPABILITY.CONTACT_REBOUNDS,
+        _CAPABILITY.CONTACT_REBOUNDS, _CAPABILITY.VERTICES, _CAPABILITY.SPHERES, _CAPABILITY.CAPSULES,
+        _CAPABILITY.BOXES, _CAPABILITY.PLANES,
     }
 )  # fmt: skip
 _ALONE = "this adapter's bodies are not joined: they are free, or move in a plane"
