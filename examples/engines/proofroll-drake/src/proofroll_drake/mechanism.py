@@ -61,7 +61,10 @@ _NOWHERE = {
 LACKING: Mapping[str, Mapping[str, str]] = {
     "continuous": dict.fromkeys(DISCRETE - CONTINUOUS, _LOOPS) | _NOWHERE,
     "contact": dict.fromkeys(DISCRETE - CONTINUOUS, _BESIDE)
-    | {_CAPABILITY.CONTACT_REBOUNDS: "Drake's points of contact only dissipate"},
+    | {
+        _CAPABILITY.CONTACT_REBOUNDS: "Drake's points of contact only dissipate",
+        _CAPABILITY.VERTICES: "Drake's spheres have a radius",
+    },
     "discrete": _NOWHERE,
 }
 _SOFT = "Drake's SAP solver makes constraints as stiff as its step can carry, and no stiffer; the first step shows it"

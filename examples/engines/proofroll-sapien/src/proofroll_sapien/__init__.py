@@ -155,7 +155,7 @@ class Sapien:
                 frame = np.roll(frame_of_axis(shape.normal), 1, axis=1)  # PhysX's normal is x
                 found[shape].local_pose = sapien.Pose(shape.point, to_quaternion(frame))
             else:
-                raise Refused("only spheres, boxes, and planes of the world are built")
+                raise Refused("sides of capsules, and planes that move, are not built")
             found[shape].set_collision_groups(groups[shape])
         return found
 
