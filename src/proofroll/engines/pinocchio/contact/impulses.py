@@ -17,7 +17,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import AT_REST, ONE_POINT, Moving, Touching, touch
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, ALL_SHAPES, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK
@@ -33,6 +33,7 @@ _CAPABILITY = MechanismCapability
 PROVIDES: frozenset[str] = (
     ALL_JOINTS
     | FORCES
+    | ALL_SHAPES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
     | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
     | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
