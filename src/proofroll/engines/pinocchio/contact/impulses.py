@@ -416,8 +416,10 @@ class ImpulseSteps:
         """Impulses as by :meth:`_found`, or by blocks, which go first from where Pinocchio's ADMM stopped.
 
         Raises:
-            Diverged: neither finds them.
+            Diverged: neither finds them, or a velocity is not finite.
         """
+        if not (np.isfinite(g).all() and np.isfinite(G).all()):
+            raise Diverged(f"the state is not finite at t = {self.t:.6g} s")
         if not self.blocks.solved:
             try:
                 return self._found(which, G, g, terms, span, convex=convex)
