@@ -236,7 +236,7 @@ class ImpulseSteps:
         contact_rows = [self._posed(all_of, k, *placed) for k, placed in enumerate(zip(touching, frames, strict=True))]
         rows = np.concatenate([*contact_rows, self.joints.J])
         J = rows[: 3 * len(frames)].reshape(-1, 3, model.nv)
-        return StepTerms(rows=rows, J=J, free=free, inverse=inverse, touching=touching, frames=frames)
+        return StepTerms(rows=rows, J=J, free=free, inverse=inverse, touching=touching, frames=frames, responses={})
 
     def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
         """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
@@ -396,7 +396,7 @@ class ImpulseSteps:
 
     def _solved(self, terms: StepTerms, shifts: Sequence[float], span: float, *, convex: bool) -> Impulses:
         """Impulses of dry friction and of all contacts and stops that would close, also due to other impulses."""
-        rows, free, inverse, frames = terms.rows, terms.free, terms.inverse, terms.frames
+        rows, free, frames = terms.rows, terms.free, terms.frames
         count, v, own_rows, added = len(frames), free, self._rows, np.array(shifts)
         rubs = count + len(self.joints.friction)
         gaps = [k for k in (*self._all, *range(rubs, len(own_rows))) if math.isfinite(shifts[own_rows[k][-1]])]
@@ -424,11 +424,12 @@ class ImpulseSteps:
                 return Impulses(v=v, impulse=impulse, states=seen, moment=moment, along=along_rows, driving=driving)
             which, grown = tuple(sorted(closing.union(which))), False
             parts = self._solver(which)
-            chosen = rows[parts.rows]
-            to_joints = inverse @ chosen.T
-            got = self._by_any(
-                which, chosen @ to_joints, at_free[parts.rows] + added[parts.rows], terms, span, convex=convex
-            )
+            if which not in terms.responses:
+                chosen = rows[parts.rows]
+                to_joints = terms.inverse @ chosen.T
+                terms.responses[which] = chosen, to_joints, chosen @ to_joints
+            chosen, to_joints, G = terms.responses[which]
+            got = self._by_any(which, G, at_free[parts.rows] + added[parts.rows], terms, span, convex=convex)
             v, pushed = free + to_joints @ got, chosen.T @ got if alone.size else pushed
             speeds, sizes = (rows @ v).tolist(), got.tolist()
             impulse[:], along_rows[:] = 0.0, 0.0
@@ -508,13 +509,13 @@ class ImpulseSteps:
                     f"Pinocchio's {self._settings.solver} solver did not reach "
                     f"solver_tolerance={self._settings.solver_tolerance:g} at {self.t:g} s; a larger one may do"
                 )
-            impulses = np.array(solver.result.retrieveConstraintImpulses())
+            impulses = solver.result.retrieveConstraintImpulses()
             sizes, narrow = impulses.tolist(), []
             for point, end, mu in points:
                 bound = point.getFriction() * sizes[end - 1]
                 if point.getFriction() < mu and math.hypot(*sizes[end - 3 : end - 1]) + least >= bound > least:
                     narrow.append((point, mu))
             if not narrow:
-                return unit * impulses
+                return np.asarray(unit * impulses)
             for point, mu in narrow:
                 point.setFriction(min(_WIDER * point.getFriction(), mu))

@@ -48,6 +48,7 @@ class StepTerms(NamedTuple):
         inverse: of the mass matrix, (nv, nv).
         touching: geometry of the contacts.
         frames: of their normals.
+        responses: of rows that were held: these, joint velocities by their unit impulses, their Delassus matrix.
     """
 
     rows: Array
@@ -56,6 +57,7 @@ class StepTerms(NamedTuple):
     inverse: Array
     touching: list[Touching]
     frames: list[Array]
+    responses: dict[tuple[int, ...], tuple[Array, Array, Array]]
 
 
 class MovingBodies:
