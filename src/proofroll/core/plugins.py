@@ -36,8 +36,8 @@ def place_of(name: str) -> str:
     return name.partition("@")[2]
 
 
-# Engine -> its title for readers, as processes in which engines run have told.
-TOLD_TITLES: dict[str, str] = {}
+# Engine -> its title for readers, from the answers of processes in which engines run.
+KNOWN_TITLES: dict[str, str] = {}
 
 
 def load_engine(name: str) -> Any:

@@ -68,7 +68,7 @@ class TurningFriction:
         """Resisted part of angular velocities, (3,) or (3, velocities); 0 where it is round-off of the whole."""
         projection = normal[:, None] * normal
         part = (projection if self.spins else _UNIT - projection) @ turning
-        return part if part.dtype == object else _without_round_off(part, _lengths(turning))
+        return part if part.dtype == object else _without_round_off(part, np.sqrt((turning * turning).sum(axis=0)))
 
     def opposed(self, normal: Array, turning: Array, slide: Array) -> Array:
         """Angular velocity that the moment opposes [rad/s], (3,), at those of a relative to b and a slide [m/s].
@@ -98,12 +98,7 @@ class TurningFriction:
 
 def _without_round_off(part: Array, size: Any) -> Array:
     """A part of vectors of a size, (3,) or (3, vectors), without vectors that are round-off."""
-    return np.where(_lengths(part) > ROUND_OFF * size, part, 0.0)
-
-
-def _lengths(vectors: Array) -> Any:
-    """Lengths of vectors, (3,) or (3, vectors)."""
-    return np.sqrt((vectors * vectors).sum(axis=0))
+    return np.where(np.sqrt((part * part).sum(axis=0)) > ROUND_OFF * size, part, 0.0)
 
 
 def largest_response(free: Array, into: Array, held: Array) -> float:

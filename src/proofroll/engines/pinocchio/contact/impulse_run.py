@@ -57,7 +57,7 @@ class ImpulseRun(MechanismRun):
 
     def _renew(self) -> None:
         """Keeps the stepper, which evaluates all forces anew."""
-        self.steps.renew()
+        self.steps.coming = None
 
     def _kick(self) -> Impulses:
         """Joint accelerations v̇, forces and moments of contacts [N, N m], of joint rows and motions, in the next step.
@@ -66,7 +66,8 @@ class ImpulseRun(MechanismRun):
         """
         steps = self.steps
         if steps.t:
-            kick, span = steps.coming(), self._dt
+            steps.coming = steps.coming or steps.kick(steps.q, steps.v)
+            kick, span = steps.coming, self._dt
         else:
             span = _PART * self._dt
             kick = steps.beginning(span, convex=self._settings.convex)
@@ -76,7 +77,7 @@ class ImpulseRun(MechanismRun):
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, accelerations, joint forces in the next step, and empty loop forces."""
         q, v, kick = self.steps.q, self.steps.v, self._kick()
-        touching = self.steps.touching()
+        touching = self.steps.touched(self.steps.ahead, q, v, [None] * len(self.steps.contacts))
         self.tree.now, self.dynamics.on_motions = self.steps.t, kick.driving
         data = self._placed(kick.v)
         forces = self.tree.pulls(data)

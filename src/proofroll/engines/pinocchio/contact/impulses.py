@@ -62,7 +62,7 @@ _NEAR = 2.0
 _SMALL = 1e-9
 # Ratio of friction to its bound above which an impulse lies on the cone.
 _INSIDE = 1 - 1e-6
-_NO_CHANGE = (0.0, 0.0, 0.0)  # of slip and gap velocities
+_NO_CHANGE: Sequence[float] = (0.0, 0.0, 0.0)  # of slip and gap velocities
 # Ratio of the contact's mobility in two directions of the surface above which PGS returns a wrong impulse.
 _UNEQUAL = 2.0
 # Largest coefficient of the first cone, and factor on it while an impulse lies on it. Narrower cones than needed cost
@@ -84,6 +84,8 @@ class ImpulseSteps:
         events: of the contacts.
         joints: joint rows, numbered after the contacts.
         blocks: solver that goes on where Pinocchio's ADMM stops.
+        ahead: bodies later in a step, or in a sample.
+        coming: impulses of the next step, where a sample has found them.
     """
 
     def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
@@ -94,7 +96,9 @@ class ImpulseSteps:
         """
         bodies = {body for contact in tree.mechanism.contacts for body in (contact.body_a, contact.body_b)}
         self._tree, self._model, self._bodies = tree, tree.model, MovingBodies(tree, bodies)
-        self._data, self._ahead = self._bodies.data, MovingBodies(tree, bodies)  # the others are later in a step
+        self._data, self.ahead = self._bodies.data, MovingBodies(tree, bodies)
+        self._placed = [self._data.oMi[joint] for joint in range(tree.model.njoints)]  # where they are at any time
+        self.coming: Impulses | None = None
         self._settings, self._dt = settings, float(settings.dt or 0.0)
         self._midpoint = settings.integrator == "midpoint"
         mechanism = tree.mechanism
@@ -115,7 +119,6 @@ class ImpulseSteps:
         nv, self._all = tree.model.nv, tuple(range(len(self.contacts)))
         ends = list(accumulate([3] * len(self.contacts) + [1] * len(self.joints.J), initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
-        self._coming: Impulses | None = None  # of the next step, if known
         self._upper = np.triu(np.ones((nv, nv), dtype=bool))
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
@@ -149,8 +152,7 @@ class ImpulseSteps:
         Raises:
             Diverged: Pinocchio's solver does not find the impulses.
         """
-        kick = self.coming()
-        self.renew()
+        kick, self.coming = self.coming or self.kick(self.q, self.v), None
         if self.events:
             self.events.observe(self.t + self._dt, kick.states)
         if self._midpoint:
@@ -159,20 +161,6 @@ class ImpulseSteps:
         else:
             self.q = pin.integrate(self._model, self.q, self._dt * kick.v)
         self.v = kick.v
-
-    def renew(self) -> None:
-        """Lets the next step be computed anew, as of another state or with other targets."""
-        self._coming = None
-
-    def coming(self) -> Impulses:
-        """Impulses of the next step, which a sample and that step share."""
-        if self._coming is None:
-            self._coming = self.kick(self.q, self.v)
-        return self._coming
-
-    def touching(self) -> list[Touching]:
-        """Geometry of the contacts in the present state."""
-        return self._touched(self._ahead, self.q, self.v, [None] * len(self.contacts))
 
     def kick(self, q: Array, v: Array) -> Impulses:
         """Impulses of the step from a state; changes nothing but scratch data."""
@@ -221,7 +209,7 @@ class ImpulseSteps:
     def terms(self, q: Array, v: Array, span: float, late: float = 0.0) -> StepTerms:
         """Terms of a step of length ``span`` [s]; ``q`` belongs to the time ``late`` [s] after its start."""
         tree, model, data = self._tree, self._model, self._data
-        touching = self._touched(self._bodies, q, v, [None] * len(self.contacts))
+        touching = self.touched(self._bodies, q, v, [None] * len(self.contacts))
         tree.now = self.t + late
         pulls = tree.pulls(data) if tree.pushed else None
         tau = tree.drives(q, v)
@@ -236,7 +224,7 @@ class ImpulseSteps:
         contact_rows = [self._posed(all_of, k, *placed) for k, placed in enumerate(zip(touching, frames, strict=True))]
         rows = np.concatenate([*contact_rows, self.joints.J])
         J = rows[: 3 * len(frames)].reshape(-1, 3, model.nv)
-        return StepTerms(rows=rows, J=J, free=free, inverse=inverse, touching=touching, frames=frames, responses={})
+        return StepTerms(rows=rows, J=J, free=free, inverse=inverse, touching=touching, frames=frames)
 
     def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
         """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
@@ -264,7 +252,7 @@ class ImpulseSteps:
         changes: Array = speed * ways[ease > 0] / ease[ease > 0, None]
         return changes
 
-    def _touched(self, bodies: MovingBodies, q: Array, v: Array, features: Sequence[int | None]) -> list[Touching]:
+    def touched(self, bodies: MovingBodies, q: Array, v: Array, features: Sequence[int | None]) -> list[Touching]:
         """Geometry of the contacts in a state, each with the features that touch; None: the nearest."""
         moving = bodies.at(q, v)
         return [
@@ -275,7 +263,7 @@ class ImpulseSteps:
     def _turning(self, q: Array, v: Array, terms: StepTerms, span: float) -> list[Sequence[float]]:
         """Changes of slip and gap velocities within a ``span`` [s] in which joint velocities are constant (J̇v)."""
         later = pin.integrate(self._model, q, span * v)
-        touching_later = self._touched(self._ahead, later, v, [contact.feature for contact in terms.touching])
+        touching_later = self.touched(self.ahead, later, v, [contact.feature for contact in terms.touching])
         return [
             (frame.T @ (carried(later_point.slide, later_point.normal, point.normal) - point.slide)).tolist()
             for frame, point, later_point in zip(terms.frames, terms.touching, touching_later, strict=True)
@@ -284,9 +272,8 @@ class ImpulseSteps:
     def _posed(self, solver: SolverParts, number: int, contact_point: Touching, frame: Array) -> Array:
         """Poses the ``number``-th point of a solver and returns its rows, shape (3, nv)."""
         point, place = solver.points[number], pin.SE3(frame, contact_point.place)
-        (joint_1, pose_1), (joint_2, pose_2) = solver.placed[number]
-        point.joint1_placement = pose_1.actInv(place) if joint_1 else place
-        point.joint2_placement = pose_2.actInv(place) if joint_2 else place
+        point.joint1_placement = self._placed[point.joint1_id].actInv(place)
+        point.joint2_placement = self._placed[point.joint2_id].actInv(place)
         point.calc(self._model, self._data, solver.point_datas[number])
         rows: Array = point.jacobian(self._model, self._data, solver.point_datas[number])
         return rows.reshape(3, -1)  # of a model of one velocity Pinocchio gives a vector
@@ -306,22 +293,16 @@ class ImpulseSteps:
                     models.append(rows[k - count].model)
                 datas.append(models[len(models) - 1].createData())
             points = [models[i].extract() for i in range(len(which))]
-            settings, size = self._settings, sum(3 if k < count else 1 for k in which)
-            solve, options, result = solver_of(settings.solver or "admm", float(settings.solver_tolerance or 0.0), size)
+            tolerance, kind = float(self._settings.solver_tolerance or 0.0), self._settings.solver or "admm"
             chosen = [row for k in which for row in self._rows[k]]
-            together = chosen == [*range(chosen[0], chosen[-1] + 1)] if chosen else False
-            joints = [(point.joint1_id, point.joint2_id) for k, point in zip(which, points, strict=True) if k < count]
             self._solvers[which] = SolverParts(
                 points=points,
                 point_datas=[datas[i].extract() for i in range(len(which))],
-                placed=[tuple((joint, self._data.oMi[joint]) for joint in pair) for pair in joints],
                 ends=list(accumulate(len(self._rows[k]) for k in which)),
-                rows=slice(chosen[0], chosen[-1] + 1) if together else chosen,
+                rows=slice(None) if len(which) == len(self._rows) else chosen,
                 models=models,
                 datas=datas,
-                solve=solve,
-                options=options,
-                result=result,
+                solver=solver_of(kind, tolerance, len(chosen)),
             )
         return self._solvers[which]
 
@@ -424,12 +405,9 @@ class ImpulseSteps:
                 return Impulses(v=v, impulse=impulse, states=seen, moment=moment, along=along_rows, driving=driving)
             which, grown = tuple(sorted(closing.union(which))), False
             parts = self._solver(which)
-            if which not in terms.responses:
-                chosen = rows[parts.rows]
-                to_joints = terms.inverse @ chosen.T
-                terms.responses[which] = chosen, to_joints, chosen @ to_joints
-            chosen, to_joints, G = terms.responses[which]
-            got = self._by_any(which, G, at_free[parts.rows] + added[parts.rows], terms, span, convex=convex)
+            chosen, g = rows[parts.rows], (at_free + added)[parts.rows]
+            to_joints = terms.inverse @ chosen.T
+            got = self._by_any(which, chosen @ to_joints, g, terms, span, convex=convex)
             v, pushed = free + to_joints @ got, chosen.T @ got if alone.size else pushed
             speeds, sizes = (rows @ v).tolist(), got.tolist()
             impulse[:], along_rows[:] = 0.0, 0.0
@@ -496,20 +474,21 @@ class ImpulseSteps:
             elif k < count + len(self.joints.friction):
                 solver.points[row].setTimeStep(span / unit)  # bounds are forces; the default step would be 1 s
                 solver.points[row].calc(self._model, self._data, solver.point_datas[row])
-        solver.options.solve_ncp = not convex
+        solve, options, result = solver.solver
+        options.solve_ncp = not convex
         tolerance = float(self._settings.solver_tolerance or 0.0)
         # a product of impulses and velocities, which both have the tolerance; velocities are 1 along normals
         least = tolerance * max(1.0, fastest / speed)
-        solver.options.absolute_complementarity_tol = least
+        options.absolute_complementarity_tol = least
         operator, in_units = pin.DelassusOperatorDense(G * (unit / speed)), g / speed
         while True:
-            solver.result.reset()
-            if not solver.solve.solve(operator, in_units, solver.models, solver.datas, solver.options, solver.result):
+            result.reset()
+            if not solve.solve(operator, in_units, solver.models, solver.datas, options, result):
                 raise Diverged(
                     f"Pinocchio's {self._settings.solver} solver did not reach "
                     f"solver_tolerance={self._settings.solver_tolerance:g} at {self.t:g} s; a larger one may do"
                 )
-            impulses = solver.result.retrieveConstraintImpulses()
+            impulses = result.retrieveConstraintImpulses()
             sizes, narrow = impulses.tolist(), []
             for point, end, mu in points:
                 bound = point.getFriction() * sizes[end - 1]

@@ -42,13 +42,11 @@ class StepTerms(NamedTuple):
 
     Attributes:
         rows: of contacts and joints, (rows, nv).
-        J: those of contacts, (contacts, 3, nv): slip velocities along the normal's :func:`frame_of_axis`, the normal
-            last.
+        J: contact rows, (contacts, 3, nv): slip velocities along the normal's :func:`frame_of_axis`, the normal last.
         free: velocity after the step without impulses, (nv,).
         inverse: of the mass matrix, (nv, nv).
         touching: geometry of the contacts.
         frames: of their normals.
-        responses: of rows that were held: these, joint velocities by their unit impulses, their Delassus matrix.
     """
 
     rows: Array
@@ -57,7 +55,6 @@ class StepTerms(NamedTuple):
     inverse: Array
     touching: list[Touching]
     frames: list[Array]
-    responses: dict[tuple[int, ...], tuple[Array, Array, Array]]
 
 
 class MovingBodies:
@@ -83,24 +80,20 @@ class MovingBodies:
 
 
 class SolverParts(NamedTuple):
-    """Pinocchio's objects for a subset of contacts and joint rows: constraints, solver, its options and result.
+    """Pinocchio's objects for a subset of contacts and joint rows: constraints, and what :func:`solver_of` gives.
 
     Attributes:
-        placed: number of the joint, and its place at any time, on both sides of each point.
         ends: end of each contact and joint row among the rows of the subset.
         rows: these among all rows.
     """
 
     points: list[Any]
     point_datas: list[Any]
-    placed: list[tuple[tuple[int, Any], ...]]
     ends: list[int]
-    rows: slice | list[int]
+    rows: list[int] | slice
     models: Any
     datas: Any
-    solve: Any
-    options: Any
-    result: Any
+    solver: tuple[Any, Any, Any]
 
 
 def solver_of(kind: str, tolerance: float, size: int = 3) -> tuple[Any, Any, Any]:

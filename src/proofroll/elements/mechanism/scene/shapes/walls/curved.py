@@ -51,10 +51,9 @@ class CurvedWall:
         return frame_of_axis(self.axis)
 
     @cached_property
-    def axes(self) -> list[list[float]]:
+    def axes(self) -> Any:
         """Rows of :attr:`frame` in plain floats."""
-        rows: list[list[float]] = self.frame.tolist()
-        return rows
+        return self.frame.tolist()
 
     def seen(self, x: float, y: float, z: float) -> Seen:
         """The wall as seen from a place, in floats or symbols; its normal is zero where several points are nearest."""
