@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +27,14 @@ from proofroll.robots.control.air_rows import (
     motion_of,
     rms,
 )
-from proofroll.robots.control.air_several import several_causes
+from proofroll.robots.control.air_several import may_be_explained, several_causes
 from proofroll.robots.control.bookkeeping.air import AirRobot, HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import ControlRecord, LayerCause
 from proofroll.robots.model import Array
 
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
+_FEW = 150  # equations by which a scheme that is rare is looked at first
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
 
 
@@ -87,6 +89,7 @@ def acceleration_fit(
     if isinstance(motion, str):
         return motion
     states, moving = motion
+    few = max(FEWEST_ROWS, -(-_FEW // robot.mechanism.nv))
     table = AirTable(record, law, robot, states, efforts, held.links)
     trials: list[tuple[StepScheme, AirRows]] = []
     every = [StepScheme(*item) for item in itertools.product((False, True), (False, True))]
@@ -100,10 +103,14 @@ def acceleration_fit(
                 rows = rows[usable[rows] & usable[rows - central]]
             if len(rows) < FEWEST_ROWS:
                 continue
-            rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(_MOST_ROWS, len(rows))).astype(int))]
+            rows = _spread(rows, _MOST_ROWS)
             for scheme in (*schemes, *([] if central else rarer)):
                 if scheme in rarer and any(item.exact for _, item in trials):
                     break
+                if scheme in rarer and not _promising(
+                    table.rows(_spread(rows, few), rated, scheme, central=central), law
+                ):
+                    continue
                 trials.append((scheme, table.rows(rows, rated, scheme, central=central)))
                 if trials[-1][1].exact and not any(scheme):
                     return AirFit(
@@ -114,6 +121,16 @@ def acceleration_fit(
     if not trials:
         return "too few rows are left"
     return _judged(trials, law, robot, together=together)
+
+
+def _spread(rows: Any, most: int) -> Any:
+    """Some of the rows at equal intervals."""
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
+
+
+def _promising(rows: AirRows, law: ControlLaw) -> bool:
+    """True if a scheme may explain a record by what it leaves at a few rows, with or without a cause."""
+    return rows.exact or bool(_causes(rows, law)) or may_be_explained(rows, law.joints)
 
 
 def _judged(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -47,10 +48,9 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         joints: driven joints.
         right: number -> its right value, for those that are parts of the right ones.
     """
-    if rows.slow.any() and not rows.slow.all():  # near rest dry friction is none that a sign tells
-        rows = rows.without(rows.slow)
-    groups = [*_groups(rows, joints)]
-    screen = _Screen(groups, rows.left)
+    rows, groups, screen = _screened(rows, joints)
+    if not screen.may_close(range(len(groups))):  # nor do some of them
+        return []
     sets = [*((k,) for k in range(len(groups))), *itertools.combinations(range(len(groups)), 2)]
     carried: list[LayerCause] | None = None
     for numbers in sorted(sets, key=lambda item: sum(groups[k].columns.shape[1] for k in item)):
@@ -58,13 +58,26 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         count = sum(group.columns.shape[1] for group in chosen)
         if count > _OF_A_POINT and carried is None and (carried := _carried(rows)):
             return carried
-        if count > _MOST * len(rows.left) or screen.left(numbers) > max(SAFETY * rows.rounding, _SCREENED * rows.off):
+        if count > _MOST * len(rows.left) or not screen.may_close(numbers):
             continue
         columns = np.concatenate([group.columns for group in chosen], axis=1)
         values, remainder = _solved(columns, rows.left)
         if rms(remainder) <= SAFETY * rows.rounding:
             return [*_told(rows, chosen, columns, values, right)]
     return []
+
+
+def may_be_explained(rows: AirRows, joints: Sequence[str]) -> bool:
+    """True if all numbers together leave no more than rounding."""
+    _, groups, screen = _screened(rows, joints)
+    return screen.may_close(range(len(groups)))
+
+
+def _screened(rows: AirRows, joints: Sequence[str]) -> tuple[AirRows, list[_Group], _Screen]:
+    """Rows without those at which dry friction is none that a sign tells, near rest, with their groups of numbers."""
+    rows = rows.without(rows.slow) if rows.slow.any() and not rows.slow.all() else rows
+    groups = [*_groups(rows, joints)]
+    return rows, groups, _Screen(groups, rows)
 
 
 def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
@@ -83,18 +96,19 @@ def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
 class _Screen:
     """Remainders of groups of columns, from products of all columns: quick, and exact to half the digits."""
 
-    def __init__(self, groups: Sequence[_Group], left: Array) -> None:
+    def __init__(self, groups: Sequence[_Group], rows: AirRows) -> None:
+        left, self._most = rows.left, max(SAFETY * rows.rounding, _SCREENED * rows.off)
         scaled, _ = _scaled(np.concatenate([group.columns for group in groups], axis=1))
         self._products, self._along, self._left = scaled.T @ scaled, scaled.T @ left, left
         ends = np.cumsum([0, *(group.columns.shape[1] for group in groups)])
         self._places = [np.arange(begin, end) for begin, end in itertools.pairwise(ends.tolist())]
 
-    def left(self, numbers: Sequence[int]) -> float:
-        """Root mean square of what some groups leave."""
+    def may_close(self, numbers: Sequence[int]) -> bool:
+        """True if some groups leave no more than rounding, as far as the quick look tells."""
         place = np.concatenate([self._places[k] for k in numbers])
         values = np.linalg.lstsq(self._products[np.ix_(place, place)], self._along[place], rcond=ROUND_OFF)[0]
         square = float(self._left @ self._left - values @ self._along[place])
-        return float(np.sqrt(max(square, 0.0) / len(self._left)))
+        return math.sqrt(max(square, 0.0) / len(self._left)) <= self._most
 
 
 def _scaled(columns: Array) -> tuple[Array, Array]:

@@ -251,9 +251,13 @@ def _best_reading(
         return min([*judged, *(item for item in silent if not _open_layers(item[1]))], key=_rank)
 
     def try_rivals(rivals: Iterable[StateReading]) -> None:
-        """Adds readings that look at every layer that is open without them."""
-        trials = [(rival, layers_of(rival, time)) for rival in rivals]
-        silent.extend(item for item in trials if _open_layers(plain[1]) <= _looked_at(item[1]))
+        """Adds readings that look at every layer that is open without them; searches where forces are explained."""
+        for rival in rivals:
+            layers = layers_of(rival, SearchTime(0.0))
+            if _open_layers(layers) - {"acceleration"} and "acceleration" not in _open_layers(layers):
+                layers = layers_of(rival, time)
+            if _open_layers(plain[1]) <= _looked_at(layers):
+                silent.append((rival, layers))
 
     if any(_open(plain)):
         in_degrees = [_beside(item, lambda record: filter(None, [reading_in_degrees(record)])) for item, _ in judged]

@@ -91,13 +91,17 @@ def record_layers(
     evidence = _Evidence(record, law, mechanism, in_air or InAir(HeldRobot.of(mechanism)))
     layers: list[Layer] = []
     time = time or SearchTime()
+    known = evidence.in_air.layers
     for name in names:
-        layer = _layer(name, evidence)
-        if not layer.holds:
-            skipped = {item.name for item in layers if item.residual is None}
-            layer = dataclasses.replace(layer, **_explained(layer, skipped, evidence, time))
-            if name == "observation" or (name == "action" and not layer.causes):
+        if name in known:
+            layer, record = known[name]
+            evidence = dataclasses.replace(evidence, record=record)
+        else:
+            layer = _layer(name, evidence, {item.name for item in layers if item.residual is None}, time)
+            if not layer.holds and (name == "observation" or (name == "action" and not layer.causes)):
                 layer, evidence = _of_columns(layer, evidence)
+            if layer.holds or not time.over:
+                known[name] = layer, evidence.record
         layers.append(layer)
     record = evidence.record
     if grounded:
@@ -122,6 +126,7 @@ class InAir:
         ranges: joint -> its limits [rad or m].
         assumed: clause on rows that are steps if the program has its usual ones; empty: they are not, or it is known.
         fits: of records to robots that were compared before, by their identities.
+        layers: that were judged before, each with the record without the mistakes of columns found so far.
     """
 
     held: HeldRobot
@@ -131,6 +136,7 @@ class InAir:
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: str = ""
     fits: dict[tuple[int, int], tuple[ControlRecord, StandingFit]] = field(default_factory=dict)
+    layers: dict[str, tuple[Layer, ControlRecord]] = field(default_factory=dict)
 
     def fit(self, record: ControlRecord, law: ControlLaw, robot: HeldRobot, efforts: Array) -> StandingFit:
         """Fit of a record to one of the robots, computed once: it hangs on no search."""
@@ -160,7 +166,8 @@ class _Evidence:
         return np.array(np.nan) if isinstance(compared, str) else (compared.difference / compared.sizes).ravel()
 
 
-def _layer(name: str, evidence: _Evidence) -> Layer:
+def _layer(name: str, evidence: _Evidence, skipped: Collection[str], time: SearchTime) -> Layer:
+    """A layer, with the mistakes that explain it if it does not hold; ``skipped``: those not looked at before it."""
     compared = evidence.difference(name)
     if not isinstance(compared, str) and not len(compared.time):
         compared = "no row that counts lies at an instant of the controller"
@@ -169,13 +176,15 @@ def _layer(name: str, evidence: _Evidence) -> Layer:
     bars = _bars(name, evidence, compared)
     parts = np.abs(compared.difference) / bars
     row, column = np.unravel_index(int(np.argmax(parts)), parts.shape)
-    return Layer(
+    layer = Layer(
         name=name,
         residual=abs(float(compared.difference[row, column])),
         bar=float(bars[column]),
         column=compared.columns[column],
         time=float(compared.time[row]),
     )
+    causes = {} if layer.holds else _explained(name, compared, bars, skipped, evidence, time)
+    return dataclasses.replace(layer, **causes)
 
 
 def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, stepwise: bool) -> Layer:
@@ -286,47 +295,51 @@ def _bars(name: str, evidence: _Evidence, compared: LayerDifferences) -> Array:
     return np.asarray(_SAFETY * np.max(changes, axis=0) + ROUND_OFF * compared.sizes)
 
 
-def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time: SearchTime) -> dict[str, Any]:
+def _explained(
+    name: str, compared: LayerDifferences, bars: Array, skipped: Collection[str], evidence: _Evidence, time: SearchTime
+) -> dict[str, Any]:
     """Mistakes that leave a small part of a layer's residual, the best first, and how many were tried.
 
     Mistakes of the layers before it count where the record does not show these; ``skipped``: their names.
     """
-    compared = evidence.difference(layer.name)
-    assert not isinstance(compared, str)  # the layer was looked at
     order = list(LAYERS)
-    shown = [*(name for name in order[: order.index(layer.name)] if name in skipped), layer.name]
-    distance = _norm(evidence, layer.name, evidence.law)
-    rounding = float((_bars(layer.name, evidence, compared) / compared.sizes).max())
+    shown = [*(item for item in order[: order.index(name)] if item in skipped), name]
+    distance = _norm(evidence, name, evidence.law)
+    rounding = float((bars / compared.sizes).max())
     most = max(_HELPS * distance, min(rounding, 0.5 * distance))
 
+    right = evidence.left(name, evidence.law)
+
     def explanation(mistake: Mistake) -> MistakeExplanation | None:
-        left, size = best_size(mistake, evidence.law, partial(evidence.left, layer.name))
+        begun = (evidence.left(name, mistake.changed(evidence.law, size)) for size in mistake.starts)
+        if mistake.sized and all(left.shape == right.shape and largest(right[left == right]) > most for left in begun):
+            return None  # it does not change what is off
+        left, size = best_size(mistake, evidence.law, partial(evidence.left, name))
         if left > most:
             return None
 
         def left_by(size: float) -> float:
-            return _norm(evidence, layer.name, mistake.changed(evidence.law, size))
+            return _norm(evidence, name, mistake.changed(evidence.law, size))
 
         return bounded(MistakeExplanation(mistake, size, left), left_by, max(2 * left, rounding))
 
     candidates = [item for item in mistakes(evidence.law) if _shows(item, shown)]
     several, tried = explanations(candidates, explanation, time)
     ranked = [(item.rank, item.cause) for item in several]
-    if "target" in shown and not isinstance(offset := _offset(evidence, layer.name), str):
+    if "target" in shown and not isinstance(offset := _offset(evidence, name), str):
         ranked.append((2 * offset.after, offset))  # a pose has many numbers: a mistake with fewer goes before
     if all(item.after > rounding for item in several):
         ranked += [
-            ((1 + numbers) * cause.after, cause)
-            for numbers, cause in _fitted_causes(layer.name, compared, evidence, most)
+            ((1 + numbers) * cause.after, cause) for numbers, cause in _fitted_causes(name, compared, evidence, most)
         ]
     by_words: dict[str, LayerCause] = {}
     for _, cause in sorted(ranked, key=lambda item: item[0]):
         by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
     causes = [*by_words.values()]
-    if layer.name == "instants":
+    if name == "instants":
         causes = causes or [*_missed(evidence)]
     elif all(cause.after > rounding for cause in causes):
-        trials = _trials(layer.name, evidence, _bars(layer.name, evidence, compared))
+        trials = _trials(name, evidence, bars)
         together = mistakes_together(candidates, evidence.law, trials, time)
         causes = causes if together is None else [together]
     closing = [cause for cause in causes if cause.after <= rounding]
