@@ -48,9 +48,10 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         joints: driven joints.
         right: number -> its right value, for those that are parts of the right ones.
     """
-    rows, groups, screen = _screened(rows, joints)
-    if not screen.may_close(range(len(groups))):  # nor do some of them
+    rows, groups = _moving(rows, joints)
+    if not _close(groups, rows):  # nor do some of them
         return []
+    screen = _Screen(groups, rows.left)
     sets = [*((k,) for k in range(len(groups))), *itertools.combinations(range(len(groups)), 2)]
     carried: list[LayerCause] | None = None
     for numbers in sorted(sets, key=lambda item: sum(groups[k].columns.shape[1] for k in item)):
@@ -58,7 +59,7 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         count = sum(group.columns.shape[1] for group in chosen)
         if count > _OF_A_POINT and carried is None and (carried := _carried(rows)):
             return carried
-        if count > _MOST * len(rows.left) or not screen.may_close(numbers):
+        if count > _MOST * len(rows.left) or screen.left(numbers) > max(SAFETY * rows.rounding, _SCREENED * rows.off):
             continue
         columns = np.concatenate([group.columns for group in chosen], axis=1)
         values, remainder = _solved(columns, rows.left)
@@ -69,15 +70,22 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
 
 def may_be_explained(rows: AirRows, joints: Sequence[str]) -> bool:
     """True if all numbers together leave no more than rounding."""
-    _, groups, screen = _screened(rows, joints)
-    return screen.may_close(range(len(groups)))
+    rows, groups = _moving(rows, joints)
+    return _close(groups, rows)
 
 
-def _screened(rows: AirRows, joints: Sequence[str]) -> tuple[AirRows, list[_Group], _Screen]:
-    """Rows without those at which dry friction is none that a sign tells, near rest, with their groups of numbers."""
+def _moving(rows: AirRows, joints: Sequence[str]) -> tuple[AirRows, list[_Group]]:
+    """Rows without those near rest, at which dry friction is none that a sign tells, with their groups of numbers."""
     rows = rows.without(rows.slow) if rows.slow.any() and not rows.slow.all() else rows
-    groups = [*_groups(rows, joints)]
-    return rows, groups, _Screen(groups, rows)
+    return rows, [*_groups(rows, joints)]
+
+
+def _close(groups: Sequence[_Group], rows: AirRows) -> bool:
+    """True if groups of numbers, all together, leave no more than rounding; every second equation tells that."""
+    columns = np.concatenate([group.columns for group in groups], axis=1)
+    every = 2 if len(rows.left) > 4 * columns.shape[1] else 1
+    _, remainder = _solved(columns[::every], rows.left[::every])
+    return rms(remainder) <= math.sqrt(every) * SAFETY * rows.rounding
 
 
 def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
@@ -96,19 +104,18 @@ def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
 class _Screen:
     """Remainders of groups of columns, from products of all columns: quick, and exact to half the digits."""
 
-    def __init__(self, groups: Sequence[_Group], rows: AirRows) -> None:
-        left, self._most = rows.left, max(SAFETY * rows.rounding, _SCREENED * rows.off)
+    def __init__(self, groups: Sequence[_Group], left: Array) -> None:
         scaled, _ = _scaled(np.concatenate([group.columns for group in groups], axis=1))
         self._products, self._along, self._left = scaled.T @ scaled, scaled.T @ left, left
         ends = np.cumsum([0, *(group.columns.shape[1] for group in groups)])
         self._places = [np.arange(begin, end) for begin, end in itertools.pairwise(ends.tolist())]
 
-    def may_close(self, numbers: Sequence[int]) -> bool:
-        """True if some groups leave no more than rounding, as far as the quick look tells."""
+    def left(self, numbers: Sequence[int]) -> float:
+        """Root mean square of what some groups leave."""
         place = np.concatenate([self._places[k] for k in numbers])
         values = np.linalg.lstsq(self._products[np.ix_(place, place)], self._along[place], rcond=ROUND_OFF)[0]
         square = float(self._left @ self._left - values @ self._along[place])
-        return math.sqrt(max(square, 0.0) / len(self._left)) <= self._most
+        return float(np.sqrt(max(square, 0.0) / len(self._left)))
 
 
 def _scaled(columns: Array) -> tuple[Array, Array]:
@@ -156,7 +163,9 @@ def _carried(rows: AirRows) -> list[LayerCause]:
         sizes = np.linalg.norm(columns, axis=0)
         if sizes[0] <= ROUND_OFF * sizes.max():  # about a fixed axis no mass shows
             continue
-        values, _ = _solved(columns, rows.left)
+        values, remainder = _solved(columns, rows.left)
+        if rms(remainder) > SAFETY * rows.rounding:
+            continue
         start = np.array([abs(values[0]) or 1.0, *values[1:4]])
 
         def left(numbers: Array, columns: Array = columns) -> Array:

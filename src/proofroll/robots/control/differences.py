@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -58,15 +59,20 @@ def _changes(record: ControlRecord, names: Sequence[str]) -> int:
 
 def instant_rows(record: ControlRecord, law: ControlLaw) -> Any:
     """Rows at which a record's action or target changes, and the first row if an instant can lie there."""
+    return _instant_rows(record, law.rate)
+
+
+@lru_cache(maxsize=16)
+def _instant_rows(record: ControlRecord, rate: float) -> Any:
     names = _of_instants(record)
     if not names:
-        near = np.abs(record.time * law.rate - np.round(record.time * law.rate)) < SAME_TIME
+        near = np.abs(record.time * rate - np.round(record.time * rate)) < SAME_TIME
         return np.flatnonzero(near)
     values = np.stack([record.columns[name] for name in names], axis=1)
     changes = np.any(np.abs(np.diff(values, axis=0)) > 0, axis=1)
     later = 1 + np.flatnonzero(changes)
     if record.time[0] != 0 and len(later):  # a record may begin between two instants
-        periods = (record.time[later[0]] - record.time[0]) * law.rate
+        periods = (record.time[later[0]] - record.time[0]) * rate
         if abs(periods - np.round(periods)) > SAME_TIME:
             return later
     return np.concatenate([[0], later])
@@ -112,11 +118,16 @@ def _instants(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
 
 def at_instants(record: ControlRecord, law: ControlLaw) -> ControlRecord:
     """Rows of a record at instants, with the state that the policy sees there."""
-    rows = instant_rows(record, law)
+    return _at_instants(record, law.rate, law.observed_lag)
+
+
+@lru_cache(maxsize=16)
+def _at_instants(record: ControlRecord, rate: float, lag: int) -> ControlRecord:
+    rows = _instant_rows(record, rate)
     part = record.part(rows)
-    if not law.observed_lag:
+    if not lag:
         return part
-    states = record.part(np.maximum(rows - law.observed_lag, 0))
+    states = record.part(np.maximum(rows - lag, 0))
     kinds = ("q.", "v.", *(f"{name}." for name in BASE))
     columns = {name: (states if name.startswith(kinds) else part).columns[name] for name in part.columns}
     return ControlRecord(record.path, columns, part.rounding, part.time)

@@ -34,11 +34,13 @@ from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
 from proofroll.robots.control.imported import MOST
 from proofroll.robots.control.layers import InAir, record_layers
-from proofroll.robots.control.record import FITTED, ControlRecord, Layer, read_record, record_of
+from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
 _Judged = tuple[StateReading, list[Layer]]
 _LAGS = ("late", "early")  # ids of rates at other rows
+_OF_JOINTS = {"instants", "target", "effort"}  # layers that are computed without the base, where actions are recorded
+_BASE = {name[:4] for name in BASE}
 _SAME_STEP = 1e-3  # part of the interval between rows by which the step of the program may differ from it
 
 
@@ -251,10 +253,14 @@ def _best_reading(
         return min([*judged, *(item for item in silent if not _open_layers(item[1]))], key=_rank)
 
     def try_rivals(rivals: Iterable[StateReading]) -> None:
-        """Adds readings that look at every layer that is open without them; searches where forces are explained."""
-        for rival in rivals:
+        """Adds readings that look at every layer that is open without them.
+
+        Mistakes are searched for where forces are explained, and no layer is open that the readings leave as it is.
+        """
+        for rival in itertools.takewhile(lambda _: not time.over, rivals):
             layers = layers_of(rival, SearchTime(0.0))
-            if _open_layers(layers) - {"acceleration"} and "acceleration" not in _open_layers(layers):
+            same = _OF_JOINTS if _differs_in_base(rival.record, plain[0].record) else set[str]()
+            if not _open_layers(layers) & ({"acceleration"} | (_open_layers(plain[1]) & same)):
                 layers = layers_of(rival, time)
             if _open_layers(plain[1]) <= _looked_at(layers):
                 silent.append((rival, layers))
@@ -275,6 +281,11 @@ def _best_reading(
         silent.extend(item for item in trials if id(item[0]) not in by_state)
         judged = [*(item for item in trials if id(item[0]) in by_state), *judged]
     return best()
+
+
+def _differs_in_base(record: ControlRecord, rival: ControlRecord) -> bool:
+    """True if two records have the same columns but for those of the base."""
+    return all(rival.columns.get(name) is item for name, item in record.columns.items() if name[:4] not in _BASE)
 
 
 def _of_importers(

@@ -34,7 +34,7 @@ from proofroll.robots.control.bookkeeping.search import (
     explanations,
     largest,
 )
-from proofroll.robots.control.bookkeeping.together import LayerTrials, mistakes_together
+from proofroll.robots.control.bookkeeping.together import LayerTrials, may_close, mistakes_together
 from proofroll.robots.control.columns import action_mistakes
 from proofroll.robots.control.differences import (
     DIFFERENCES,
@@ -62,6 +62,7 @@ _DAMPED = "damping of joints acts at the velocity after the step, or they have a
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
 _HELPS = 0.1
+_FIRST = 12  # instants of a long record at which mistakes are tried before all of it
 _INSTANTS = 4  # least number of rows from which a pose is fitted beside another mistake
 
 
@@ -339,8 +340,7 @@ def _explained(
     if name == "instants":
         causes = causes or [*_missed(evidence)]
     elif all(cause.after > rounding for cause in causes):
-        trials = _trials(name, evidence, bars)
-        together = mistakes_together(candidates, evidence.law, trials, time)
+        together = _together(name, candidates, evidence, bars, time)
         causes = causes if together is None else [together]
     closing = [cause for cause in causes if cause.after <= rounding]
     causes = closing or [_with_rest(cause, cause.after / distance) for cause in causes]
@@ -351,6 +351,20 @@ def _with_rest(cause: LayerCause, part: float) -> LayerCause:
     """A cause that says which part of the difference it leaves."""
     rest = f"{cause.sentence}; a cause is missing: {part:.2g} of the difference is left"
     return dataclasses.replace(cause, sentence=rest)
+
+
+def _together(
+    name: str, candidates: Sequence[Mistake], evidence: _Evidence, bars: Array, time: SearchTime
+) -> LayerCause | None:
+    """Cause that names mistakes which close a layer together; its first instants are looked at before the whole."""
+    law, trials, rows = evidence.law, _trials(name, evidence, bars), instant_rows(evidence.record, evidence.law)
+    if len(rows) > _FIRST:
+        begun = dataclasses.replace(evidence, record=evidence.record.part(np.arange(rows[_FIRST])))
+        first = _trials(name, begun, bars)
+        same = np.array_equal(first.parts(law) > 1, trials.parts(law) > 1)
+        if same and not may_close(candidates, law, first, time):
+            return None
+    return mistakes_together(candidates, law, trials, time)
 
 
 def _trials(name: str, evidence: _Evidence, bars: Array) -> LayerTrials:

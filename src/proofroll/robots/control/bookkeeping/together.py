@@ -64,6 +64,11 @@ def mistakes_together(
     return LayerCause(" + ".join(item.mistake.id for item in several), sentence, None, residual)
 
 
+def may_close(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, time: SearchTime) -> bool:
+    """True if one mistake or more close every column."""
+    return bool(_one_by_one(candidates, law, trials, time) or _pair(candidates, law, trials, time)) or time.over
+
+
 def _one_by_one(
     candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, time: SearchTime
 ) -> Sequence[_Told]:
@@ -93,6 +98,7 @@ def _pair(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, t
     """Two mistakes that close every column, with the fewest fitted numbers; empty where none are found."""
     best: list[_Told] = []
     wrong, changed = trials.parts(law) > 1, _changed(candidates, law, trials)
+    candidates = [item for item in candidates if changed[item.words].any()]
     for first in _known(candidates, law):
         if not np.all(trials.parts(first.law)[~wrong] <= 1):
             continue
