@@ -217,6 +217,8 @@ class AirTable:
         self.targets = record.stacked("target", law.joints)
         self.rated = _largest(record, ("v.", "v_WB.", "w_WB."))
         self.placed, self.forced = _largest(record, ("q.", "q_WB.")), _largest(record, ("effort.",))
+        speeds = np.abs([v[robot.driven[:, 1]] for _, v in states])
+        self.slow = np.any(speeds < _SLOW * speeds.max(axis=0), axis=1)  # rows at which a joint is about to turn back
         self._forces: dict[int, AirForces] = {}
         self._stepped: dict[tuple[int, bool], Array] = {}
 
@@ -342,7 +344,6 @@ class AirTable:
         of_joints |= {"stiffness": -q[:, robot.driven[:, 0]], "armature": -rate[:, driven]}
         bodies = -np.moveaxis(self._of_bodies(forces, rate), 1, 0)
         size = rms(whitened(masses - inner))
-        slow = np.any(np.abs(at_v) < _SLOW * np.abs(rated[:, driven]).max(axis=0), axis=1)
         return AirRows(
             left=whitened(acting),
             columns={name: whitened(values) for name, values in columns.items()},
@@ -354,7 +355,7 @@ class AirTable:
             rounding=rms(noise),
             late=whitened(np.einsum("tij,tj->ti", M, following - rate) / 2),
             size=size if size > ROUND_OFF * rms(whitened(weight)) else 1.0,
-            slow=np.repeat(slow, into.shape[1]),
+            slow=np.repeat(self.slow[rows], into.shape[1]),
         )
 
     def _drag(self, forces: Sequence[AirForces], v: Array) -> Array:

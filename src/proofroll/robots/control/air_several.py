@@ -49,10 +49,7 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         right: number -> its right value, for those that are parts of the right ones.
     """
     rows, groups = _moving(rows, joints)
-    if not _close(groups, rows):  # nor do some of them
-        return []
-    screen = _Screen(groups, rows.left)
-    sets = [*((k,) for k in range(len(groups))), *itertools.combinations(range(len(groups)), 2)]
+    sets, screen = _sets(groups, rows), _Screen(groups, rows.left)
     carried: list[LayerCause] | None = None
     for numbers in sorted(sets, key=lambda item: sum(groups[k].columns.shape[1] for k in item)):
         chosen = [groups[k] for k in numbers]
@@ -69,15 +66,27 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
 
 
 def may_be_explained(rows: AirRows, joints: Sequence[str]) -> bool:
-    """True if all numbers together leave no more than rounding."""
+    """True if two groups of numbers may leave no more than rounding."""
     rows, groups = _moving(rows, joints)
-    return _close(groups, rows)
+    return any(_close([groups[k] for k in item], rows) for item in _sets(groups, rows))
 
 
 def _moving(rows: AirRows, joints: Sequence[str]) -> tuple[AirRows, list[_Group]]:
     """Rows without those near rest, at which dry friction is none that a sign tells, with their groups of numbers."""
     rows = rows.without(rows.slow) if rows.slow.any() and not rows.slow.all() else rows
     return rows, [*_groups(rows, joints)]
+
+
+def _sets(groups: Sequence[_Group], rows: AirRows) -> list[tuple[int, ...]]:
+    """Indices of one group or two that may leave no more than rounding.
+
+    All groups but the scale of efforts leave least; with it, all of them together are the equations themselves.
+    """
+    sets = [*((k,) for k in range(len(groups))), *itertools.combinations(range(len(groups)), 2)]
+    scaled = {k for k, group in enumerate(groups) if group.kind == "effort"}
+    if _close([group for group in groups if group.kind != "effort"], rows):
+        return sets
+    return [item for item in sets if scaled & {*item}]
 
 
 def _close(groups: Sequence[_Group], rows: AirRows) -> bool:
