@@ -69,6 +69,8 @@ Under each picture are the engines that hold the motion to 1e-4 of the path.
 UNCOMPARED = "without a comparison"
 # Part of the path that the matrix asks for.
 TOLERANCE = 1e-4
+# From the best to the worst; a formulation is refused only if each of its settings is.
+BEST_FIRST = [*(item for item in Verdict if item is not Verdict.REFUSED), Verdict.REFUSED]
 # Line of a page with the hash of all that decides it.
 MADE = "<!-- made from {} -->\n"
 # Line of a page that the matrix is made from: what each formulation is at that tolerance, by group of scenes.
@@ -135,7 +137,7 @@ def truth(outcome: Outcome, laws_alone: bool) -> str:
 
 def standings(outcome: Outcome) -> str:
     """What each formulation is at the tolerance of the matrix, as a line that no reader sees."""
-    order, content = list(Verdict), outcome_content(outcome)
+    order, content = BEST_FIRST, outcome_content(outcome)
     held = {(run[0].engine, run[0].formulation) for run in runs_of(lines_of(outcome)) if holds(run)}
     found: dict[str, Verdict] = {}
     for row in content.rows:

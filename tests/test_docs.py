@@ -70,7 +70,7 @@ SHORTER = {
 }
 
 
-# What these commands do on a cluster is run by tests/unit/running/test_cluster.py and tests/test_versions.py.
+# What these commands do on a cluster is run by tests/unit/cluster/test_cluster.py and tests/test_versions.py.
 ON_A_CLUSTER = ["--scheduler", "local:1"]
 
 

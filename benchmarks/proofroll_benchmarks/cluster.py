@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.running.cluster import Cluster
-from proofroll.running.cluster_task import Asked
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
+from proofroll_cluster.cluster import Cluster
+from proofroll_cluster.task import Asked
 
 MB = 1e6
 

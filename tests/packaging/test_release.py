@@ -59,13 +59,17 @@ def test_the_workflow_of_platforms_asks_for_what_there_is() -> None:
     assert "://" not in text
 
 
-@pytest.mark.parametrize("folder", ["fuzz", "throughput"])
+# What a package brings besides, each with its row on the page about licences.
+BROUGHT = {"distributed>=2025.1": "`proofroll-cluster`"}
+
+
+@pytest.mark.parametrize("folder", ["cluster", "fuzz", "throughput"])
 def test_a_package_with_a_command_fits_the_suite(folder: str) -> None:
     """It has the version and the Pythons of the suite, and asks for that version: it uses more than public names."""
     package = tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert (package["version"], package["requires-python"]) == (PROJECT["version"], PROJECT["requires-python"])
     assert f"proofroll=={PROJECT['version']}" in package["dependencies"]
-    assert {*package["dependencies"]} - {f"proofroll=={PROJECT['version']}"} <= {*PROJECT["dependencies"]}
+    assert {*package["dependencies"]} - {f"proofroll=={PROJECT['version']}"} <= {*PROJECT["dependencies"], *BROUGHT}
 
 
 @pytest.mark.parametrize("name", ["release", "every_night"])
@@ -77,11 +81,10 @@ def test_files_that_a_page_names_are_there(name: str) -> None:
 
 
 def test_the_page_about_licences_has_every_package_that_is_installed() -> None:
-    """Each package that the wheel or an extra for users asks for has a row, beside the extra it comes with."""
+    """Each package that a wheel or an extra for users asks for has a row, beside what it comes with."""
     extras = PROJECT["optional-dependencies"]
-    asked = {"proofroll": PROJECT["dependencies"]} | {
-        f"`[{name}]`": packages for name, packages in extras.items() if name not in {"all", "dev"}
-    }
+    asked = {package: [item] for item, package in BROUGHT.items()} | {"proofroll": PROJECT["dependencies"]}
+    asked |= {f"`[{name}]`": packages for name, packages in extras.items() if name not in {"all", "dev"}}
     text = (ROOT / "docs" / "licences.md").read_text(encoding="utf-8")
     rows = [tuple(cell.strip() for cell in row.strip("|").split("|")) for row in re.findall(r"^\|.*\|$", text, re.M)]
     known = {(package.split(" (")[0], row[1]) for row in rows[2:] for package in row[0].split(", ")}

@@ -143,6 +143,7 @@ def test_entry_points(installed: Path) -> None:
         assert name in text
     assert "fuzz" not in text
     assert "throughput" not in text
+    assert "cluster" not in text
 
 
 def test_types_are_announced(wheel: Path) -> None:

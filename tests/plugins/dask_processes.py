@@ -12,7 +12,7 @@ import sys
 
 from distributed.cli import dask_scheduler, dask_worker
 
-import proofroll.running.cluster_task  # noqa: F401 -- what workers of tests import as soon as they run anything
+import proofroll_cluster.task  # noqa: F401 -- what workers of tests import as soon as they run anything
 
 MAIN = {"scheduler": dask_scheduler.main, "worker": dask_worker.main}
 

@@ -12,7 +12,17 @@ from source_code import statements, tree
 
 pytestmark = pytest.mark.usefixtures("parsed_sources")
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ("src", "fuzz", "throughput", "benchmarks", "papers", "tests/drill", "tests/plugins", "examples/engines")
+FOLDERS = (
+    "src",
+    "fuzz",
+    "throughput",
+    "cluster",
+    "benchmarks",
+    "papers",
+    "tests/drill",
+    "tests/plugins",
+    "examples/engines",
+)
 # A clause or a phrase that hangs on a word which is not there.
 _OPENERS = (
     r"all (?:that|who)|as|at(?! least)|because|by|every(?:thing|body) (?:that|who)|everything|for|from|how|if|in|is|it|"

@@ -58,7 +58,7 @@ PLUGIN_PARTS = {"report"}
 
 
 # Packages that stand on this one: it imports none of them.
-OUTSIDE = ("proofroll_benchmarks", "proofroll_drill", "proofroll_fuzz", "proofroll_throughput")
+OUTSIDE = ("proofroll_benchmarks", "proofroll_cluster", "proofroll_drill", "proofroll_fuzz", "proofroll_throughput")
 # A module by its name in a text, as ``import_module`` takes it, and an import in a program that is written.
 _BY_NAME = re.compile(rf"(proofroll\.\w+\.|({'|'.join(OUTSIDE)})\b)")
 _WRITTEN = re.compile(rf"(?:from|import) (proofroll\.\w+|{'|'.join(OUTSIDE)})")
@@ -239,7 +239,11 @@ def test_one_place_makes_cases() -> None:
 def test_modules_are_short_enough_to_be_read_at_once() -> None:
     """No module has more than 500 lines: below, it is cut by subject, not by length."""
     repository = ROOT.parents[1]
-    files = [file for folder in (ROOT, repository / "fuzz", repository / "throughput") for file in folder.rglob("*.py")]
+    files = [
+        file
+        for folder in (ROOT, repository / "fuzz", repository / "throughput", repository / "cluster")
+        for file in folder.rglob("*.py")
+    ]
     long = [str(file.relative_to(repository)) for file in files if len(file.read_text().splitlines()) > 500]
     assert long == []
 

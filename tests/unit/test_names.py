@@ -14,6 +14,7 @@ PACKAGES = (
     ROOT / "src" / "proofroll",
     ROOT / "fuzz" / "proofroll_fuzz",
     ROOT / "throughput" / "proofroll_throughput",
+    ROOT / "cluster" / "proofroll_cluster",
 )
 # Determiners, adverbs and participles that hide what a name holds.
 BARE = frozenset({

@@ -193,12 +193,12 @@ def new_runner(
 
 
 def new_cluster(scheduler: str | None) -> Cluster | None:
-    """Dask cluster of ``--scheduler``, or None if the option is not given."""
+    """Cluster of ``--scheduler``, or None if the option is not given."""
     if scheduler is None:
         return None
-    from proofroll.running.cluster import Cluster
+    from proofroll.running.cluster import connected
 
-    return Cluster(scheduler)
+    return connected(scheduler)
 
 
 @contextmanager

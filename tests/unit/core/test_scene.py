@@ -22,9 +22,6 @@ from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.model import ROLLS
-from proofroll.running.case import EngineFacts
-from proofroll.running.cluster import _files
-from proofroll.studies.cases import case_of
 
 
 def test_paper_ball() -> None:
@@ -198,17 +195,13 @@ def test_code_of_another_package_is_in_the_digest(tmp_path: Path, monkeypatch: p
 
 
 def test_what_lies_beside_a_scene_and_is_no_model_is_no_matter(tmp_path: Path) -> None:
-    """What lies beside a scene changes no digest and goes to no cluster; a file that the scene names does both."""
+    """What lies beside a scene changes no digest; a file that the scene names does."""
     folder = tmp_path / "own"
     shutil.copytree(data_folder("models") / "sphere_in_cylinder", folder)
     before = load_scene(str(folder)).digest
     (folder / "run.nc").write_bytes(b"x" * 1000)
     (folder / "other.xml").write_text("<mujoco/>")
     (folder / "out").mkdir()
-    scene = load_scene(str(folder))
-    assert scene.digest == before
-    engine = EngineFacts("projection", "1", "code", {})
-    sent = _files(case_of(str(folder), scene, (), engine, 1.0, 0.1))
-    assert sorted(sent) == ["mujoco_chart.xml", "scene.toml"]
+    assert load_scene(str(folder)).digest == before
     (folder / "mujoco_chart.xml").write_text("<mujoco/>")
     assert load_scene(str(folder)).digest != before

@@ -299,7 +299,7 @@ class AnswerCheck:
     def sentence(self) -> str:
         """Clause on the samples that hold all laws."""
         laws = sum(law in self.residuals.largest for law in LAWS)
-        middles = f" and in the middle of {self.between} stretches" if self.between else ""
+        middles = f" and in the middle of {self.between} stretch{'es' * (self.between != 1)}" if self.between else ""
         return f"what is published holds {laws} laws at {self.held} of {self.samples} samples{middles}"
 
     def _times(self, time: Array, asked: Array, end: float) -> None:

@@ -157,7 +157,7 @@ class LawResiduals:
             return ""
         law, (part, time, _) = max(self.largest.items(), key=lambda item: item[1][0], default=("", (0.0, 0.0, "")))
         points = [f"at {self.points:,} points"] * bool(self.points)
-        events = [f"on both sides of {self.events} events"] * bool(self.events)
+        events = [f"on both sides of {self.events} event{'s' * (self.events != 1)}"] * bool(self.events)
         return (
             f"holds {len(self.largest)} laws {' and '.join(points + events)}; "
             f"largest residual {part:.2g} of its allowance ({law}, {time:.3g} s)"

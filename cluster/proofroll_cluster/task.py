@@ -143,11 +143,11 @@ def _workers_of(asked: Asked) -> Workers:
     with _lock:
         is_running = asked.command in _workers
     if not is_running:
-        here = installed()
-        differing = [name for name in {**asked.installed, **here} if asked.installed.get(name) != here.get(name)]
+        present = installed()
+        differing = [name for name in {**asked.installed, **present} if asked.installed.get(name) != present.get(name)]
         if differing:
-            both = ({name: versions.get(name, "absent") for name in differing} for versions in (asked.installed, here))
-            raise unfit(*both)
+            sides = (asked.installed, present)
+            raise unfit(*({name: versions.get(name, "absent") for name in differing} for versions in sides))
     with _lock:
         workers = _workers.setdefault(asked.command, Workers(asked.memory, _ENGINES))
         _workers.move_to_end(asked.command)
@@ -164,25 +164,24 @@ def _check(asked: Asked, case: Case, workers: Workers) -> None:
     if key not in _same:
         (facts,) = resolve([(engine.name, engine.settings)], workers)
         if isinstance(facts, EngineFacts):
-            there = {engine.name: f"{facts.version} (code {facts.code})"}
+            worker_versions = {engine.name: f"{facts.version} (code {facts.code})"}
         elif isinstance(facts, WorkerDied):
             return  # a crash of the engine becomes its result, as in a local run
         else:
-            there = {engine.name: f"none ({facts})"}
-        here = {engine.name: f"{engine.version} (code {engine.code})"}
-        if here != there:
-            raise unfit(here, there)
+            worker_versions = {engine.name: f"none ({facts})"}
+        command_versions = {engine.name: f"{engine.version} (code {engine.code})"}
+        if command_versions != worker_versions:
+            raise unfit(command_versions, worker_versions)
         _same.add(key)
     digest = load_scene(case.scene, asks=case.asks, **case.parameters).digest
     if digest != case.scene_digest:
         raise unfit({f"scene {case.scene}": case.scene_digest}, {f"scene {case.scene}": digest})
 
 
-def unfit(here: Mapping[str, str], there: Mapping[str, str]) -> Unfit:
-    """Error that names the differing versions: ``here`` on the command's machine, ``there`` on this one."""
-    here_text, there_text = (
-        ", ".join(f"{name} {value}" for name, value in versions.items()) for versions in (here, there)
-    )
+def unfit(command_versions: Mapping[str, str], worker_versions: Mapping[str, str]) -> Unfit:
+    """Error that names the differing versions, of the command's machine and of this one."""
+    sides = command_versions, worker_versions
+    here_text, there_text = (", ".join(f"{name} {value}" for name, value in side.items()) for side in sides)
     fault = (
         f"a worker of the cluster, on {socket.gethostname()}, has other versions: here {here_text}; there {there_text}"
     )

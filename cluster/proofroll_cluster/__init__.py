@@ -1,0 +1,1 @@
+"""Cases of proofroll on a Dask cluster, behind the option ``--scheduler`` of its commands."""
