@@ -144,6 +144,7 @@ def judge_record(
     Raises:
         InputError: a file is wrong, or they do not fit.
     """
+    time = SearchTime(SEARCH_TIME)
     scenes = ControlledScenes(control)
     law_of = ControlLaw.of if control else ControlLaw.of_efforts
     stepwise, assumed = False, ""
@@ -157,10 +158,10 @@ def judge_record(
         driven = law_of(model.mechanism).joints
         if control and LAYOUTS[layout].from_refs and model.refs:
             _refuse_refs(control, model.refs)
-        time, columns = columns_of(record, arrays, layout, model.mechanism, driven, model.refs)
+        times, columns = columns_of(record, arrays, layout, model.mechanism, driven, model.refs)
         eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
         digits = max(eps, default=0.0) / 2
-        read = record_of(time, columns, record, digits=digits)
+        read = record_of(times, columns, record, digits=digits)
         usual = LAYOUTS[layout].step
         if "sim_dt" in arrays:
             stepwise = _are_steps(read, _step_of(record, arrays["sim_dt"]))
@@ -179,7 +180,7 @@ def judge_record(
 
     robots: dict[int, tuple[StateReading, InAir]] = {}  # by the identity of a reading, which they keep
 
-    def layers_of(reading: StateReading, time: SearchTime, imported: int = 0) -> list[Layer]:
+    def layers_of(reading: StateReading, within: SearchTime, imported: int = 0) -> list[Layer]:
         state_layers = [] if reading.layer is None else [reading.layer]
         if id(reading) not in robots:
             robots[id(reading)] = (
@@ -203,14 +204,16 @@ def judge_record(
                 names=names_of_layers,
                 stepwise=stepwise,
                 in_air=held,
-                time=time,
+                time=within,
             ),
         ]
 
     inertial = bool(layout) and LAYOUTS[layout].inertial and free
     frames = model.base_frames
     readings = framed_readings(read, law, frames) if inertial else state_readings(read, law)
-    reading, layers = _best_reading(readings, layers_of, () if inertial else frames, controlled=control is not None)
+    reading, layers = _best_reading(
+        readings, layers_of, () if inertial else frames, time, controlled=control is not None
+    )
     read = reading.record
     return RecordJudgement(
         record=str(record),
@@ -229,6 +232,7 @@ def _best_reading(
     readings: Sequence[StateReading],
     layers_of: Callable[..., list[Layer]],
     frames: Sequence[BaseFrame],
+    time: SearchTime,
     *,
     controlled: bool,
 ) -> _Judged:
@@ -241,9 +245,9 @@ def _best_reading(
         readings: by the state.
         layers_of: layers of a reading, for a time of the search.
         frames: frames that the record may have for its base.
+        time: of all searches.
         controlled: True if a controller's law tells the efforts.
     """
-    time = SearchTime(SEARCH_TIME)
     judged = _searched(readings, layers_of, time)
     plain = min(judged, key=_rank)
     silent: list[_Judged] = []
@@ -277,7 +281,7 @@ def _best_reading(
     if _unexplained_forces(best()[1]) or _open(best())[2]:
         candidates = sorted((rival for rival, _ in (*judged, *silent)), key=_count)
         by_state = {id(rival) for rival, _ in judged}
-        trials = _of_importers(candidates, partial(layers_of, time=time), time)
+        trials = _of_importers(candidates, partial(layers_of, within=time), time)
         silent.extend(item for item in trials if id(item[0]) not in by_state)
         judged = [*(item for item in trials if id(item[0]) in by_state), *judged]
     return best()

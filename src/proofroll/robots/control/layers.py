@@ -338,7 +338,8 @@ def _explained(
         by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
     causes = [*by_words.values()]
     if name == "instants":
-        causes = causes or [*_missed(evidence)]
+        closing = [cause for cause in causes if cause.after <= rounding]
+        causes = closing or [*_missed(evidence, candidates)] or causes
     elif all(cause.after > rounding for cause in causes):
         together = _together(name, candidates, evidence, bars, time)
         causes = causes if together is None else [together]
@@ -463,20 +464,23 @@ def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:
     return dataclasses.replace(tried, causes=(cause,)), evidence
 
 
-def _missed(evidence: _Evidence) -> Iterator[LayerCause]:
-    """Instants at which the action before acts again, where all others have one."""
-    record, law = evidence.record, evidence.law
-    changes, due = instant_rows(record, law), due_rows(record, law)
-    period, times = 1 / law.rate, record.time
-    others = times[changes] * law.rate
-    if not len(due) or np.abs(others - np.round(others)).max() > SAME_TIME:
-        return
-    missed = [row for row in due.tolist() if np.abs(times[changes] - times[row]).min() > 0.5 * period]
-    if missed:
-        words = (
-            f"at {counted(len(missed), 'instants')}, first at {times[missed[0]]:.4g} s, the action before acts again"
-        )
-        yield LayerCause("repeated", words, None, 0.0)
+def _missed(evidence: _Evidence, candidates: Iterable[Mistake]) -> Iterator[LayerCause]:
+    """Instants at which the action before acts again, where all others have one, at the rate that misses fewest."""
+    record, times, trials = evidence.record, evidence.record.time, list[tuple[int, LayerCause]]()
+    rates = [
+        (item.id, f"{item.words}; and ", item.changed(evidence.law, 1.0)) for item in candidates if item.id == "rate"
+    ]
+    for name, words, law in [("", "", evidence.law), *rates]:
+        changes, due = instant_rows(record, law), due_rows(record, law)
+        others = times[changes] * law.rate
+        missed = [row for row in due.tolist() if np.abs(times[changes] - times[row]).min() > 0.5 / law.rate]
+        if missed and np.abs(others - np.round(others)).max() <= SAME_TIME:
+            when = f"at {counted(len(missed), 'instants')}, first at {times[missed[0]]:.4g} s"
+            cause = LayerCause(
+                " + ".join(filter(None, [name, "repeated"])), f"{words}{when}, the action before acts again", None, 0.0
+            )
+            trials.append((len(missed) + bool(name), cause))
+    yield from (cause for _, cause in sorted(trials, key=lambda item: item[0])[:1])
 
 
 def _offset(evidence: _Evidence, name: str) -> LayerCause | str:
