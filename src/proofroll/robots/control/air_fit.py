@@ -70,6 +70,11 @@ class AirFit:
     tried: int = 0
     between: bool = False
 
+    @property
+    def left(self) -> float:
+        """Part of the forces that the best cause leaves, or the right numbers where there is none."""
+        return min((cause.after for cause in self.causes), default=self.off)
+
 
 def acceleration_fit(
     record: ControlRecord,

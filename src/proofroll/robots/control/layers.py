@@ -197,7 +197,7 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     fit, off_stops, remark = evidence.in_air.fit(record, law, evidence.in_air.held, efforts)
     if evidence.in_air.stepped is not None and not isinstance(fit, str) and fit.off > fit.bar:
         rival = evidence.in_air.fit(evidence.record, law, evidence.in_air.stepped, efforts)
-        if not isinstance(rival.fit, str) and rival.fit.off < fit.off:
+        if not isinstance(rival.fit, str) and rival.fit.left < fit.left:
             fit, off_stops, remark = rival
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
@@ -266,7 +266,7 @@ def _of_another_robot(
             continue
         if trial.off > trial.bar and not trial.causes:
             continue
-        left = min((cause.after for cause in trial.causes), default=trial.off)
+        left = trial.left
         if left > max(trial.bar, _HELPS * fit.off):  # a robot far from this one may be helped by anything
             continue
         further = bool(trial.causes)  # several of them are alternatives
