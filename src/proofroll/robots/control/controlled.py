@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, error_location
 from proofroll.core.parameters import Parameters
@@ -22,9 +21,8 @@ from proofroll.elements.mechanism.scene.control import TARGET, Control
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import TOGETHER
 from proofroll.elements.mechanism.scene.policy import PolicySource
-from proofroll.robots.control.base_frames import BaseFrame, base_frames
+from proofroll.elements.mechanism.scene.rotations import from_quaternion
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
-from proofroll.robots.control.imported import imported_robots
 from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.feet import GROUNDS, NO_FLOOR, NO_GROUND, OF_FILE, StandingRobot, ground_tables
 from proofroll.robots.files.robot_file import RobotFile
@@ -44,6 +42,7 @@ from proofroll.robots.protocol import lift
 from proofroll.robots.states import RobotStates
 
 if TYPE_CHECKING:
+    from proofroll.robots.control.base_frames import BaseFrame
     from proofroll.robots.control.bookkeeping.air import HeldRobot
 
 _DURATION = 0.1  # s: what is wrong with the bookkeeping of a controller shows in the air within it
@@ -130,6 +129,9 @@ class ControlledScenes:
         Raises:
             InputError: the controller has no rate, does not fit the robot, or the robot cannot be moved.
         """
+        from proofroll.robots.control.base_frames import base_frames
+        from proofroll.robots.control.imported import imported_robots
+
         controller = read_controller(self._path) if self._controlled else Controller(rate=1.0)
         if controller.rate is None:
             advice = "mistakes of bookkeeping are found at a controller's instants; give the rate in Hz"
@@ -341,7 +343,7 @@ def start_of(file: RobotFile, robot: Robot, controller: Controller, *, placed: b
             rates = home.velocity[joint.name][0]
         if joint.kind == JointKind.FREE and not position and (home is None or start.base is not None):
             if start.base is not None:
-                R = np.asarray(Rotation.from_quat(start.base[3:], scalar_first=True).as_matrix())
+                R = from_quaternion(start.base[3:])
                 p = np.array(start.base[:3])
             spin = R @ np.array(start.base_velocity[3:])
             rates = np.concatenate([start.base_velocity[:3], spin])

@@ -15,14 +15,13 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import fromstring, tostring
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.number_format import counted
 from proofroll.elements.mechanism import WORLD
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.elements.mechanism.scene.rotations import frame_of_axis, to_rpy
+from proofroll.elements.mechanism.scene.rotations import frame_of_axis, to_quaternion, to_rpy
 from proofroll.files.json_data import plain
 from proofroll.robots.files import reading
 from proofroll.robots.files.meaning import by_definer, opened
@@ -373,7 +372,7 @@ def _coordinates(start: RobotStates) -> dict[str, list[float]]:
     """Joint -> coordinates of a start, as :func:`proofroll.robots.importers.mujoco_shapes.near_shapes` takes them."""
     rows: dict[str, list[float]] = {name: values[:1].tolist() for name, values in start.angle.items()}
     for name, matrices in start.rotation.items():
-        turned = Rotation.from_matrix(matrices[0]).as_quat(scalar_first=True).tolist()
+        turned = to_quaternion(matrices[0]).tolist()
         rows[name] = [*start.position[name][0].tolist(), *turned] if name in start.position else turned
     return rows
 
