@@ -337,6 +337,16 @@ def test_an_overlap_is_lifted_out_or_told(stood: Callable[..., Scene]) -> None:
         stood(held, BARE)
 
 
+def test_the_first_of_two_bodies_that_float_is_lifted_by_its_own_shapes(stood: Callable[..., Scene]) -> None:
+    """The second one starts where the file says, and the first one no higher for it."""
+    ball = '<body name="{0}" pos="{1} 0 {2}"><freejoint/><geom type="sphere" size=".1"/></body>'
+    balls = ball.format("one", 0, 0.09) + ball.format("two", 1, 0.15)
+    floor = '<geom name="floor" type="plane" size="0 0 1"/>'
+    scene = stood(f"<mujoco><worldbody>{floor}{balls}</worldbody></mujoco>", BARE)
+    heights = [joint.q0[2] for joint in scene.elements[0].mechanism.joints]  # type: ignore[attr-defined]
+    assert heights == pytest.approx([0.11, 0.15], abs=1e-9)
+
+
 FLOORED = robot(HOOF, after=hoof())
 
 
