@@ -326,6 +326,27 @@ def test_shapes_that_come_near_without_a_rule_are_told(stood: Callable[..., Scen
         stood(held.replace(' .09"', ' .065"'), BARE)
 
 
+def test_an_overlap_is_lifted_out_or_told(stood: Callable[..., Scene]) -> None:
+    """A body that floats starts 1 cm above its table; of one that does not the overlap is named, with what helps."""
+    sunk = table("cylinder", turn="1 0 0 0").replace(' .09"', ' .055"')
+    scene = stood(sunk, BARE)
+    assert _height(scene) == pytest.approx(0.07, abs=1e-9)
+    assert "no floor; 1 other pair; moved up by 15 mm, as its start overlaps what it stands on" in scene.title
+    held = sunk.replace('<freejoint name="root"/>', '<joint type="slide" axis="1 0 0"/>')
+    with pytest.raises(InputError, match=r"\(they overlap by 5 mm at the start: begin elsewhere by \[start\], or excl"):
+        stood(held, BARE)
+
+
+def test_the_first_of_two_bodies_that_float_is_lifted_by_its_own_shapes(stood: Callable[..., Scene]) -> None:
+    """The second one starts where the file says, and the first one no higher for it."""
+    ball = '<body name="{0}" pos="{1} 0 {2}"><freejoint/><geom type="sphere" size=".1"/></body>'
+    balls = ball.format("one", 0, 0.09) + ball.format("two", 1, 0.15)
+    floor = '<geom name="floor" type="plane" size="0 0 1"/>'
+    scene = stood(f"<mujoco><worldbody>{floor}{balls}</worldbody></mujoco>", BARE)
+    heights = [joint.q0[2] for joint in scene.elements[0].mechanism.joints]  # type: ignore[attr-defined]
+    assert heights == pytest.approx([0.11, 0.15], abs=1e-9)
+
+
 FLOORED = robot(HOOF, after=hoof())
 
 

@@ -294,9 +294,12 @@ def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> floa
     touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))
     ends = {pair.name: pair.geometries[1] for pair in mechanism.pairs}
     heights = []
+    lifted = {next(row["child"] for row in tables["joints"] if row["kind"] == JointKind.FREE)}
+    for joint in mechanism.joints:  # sorted: the parent comes first
+        lifted |= {joint.child} if joint.parent in lifted else set()
     for contact, touch in zip(mechanism.contacts, touching, strict=True):
         slope = floors.get(ends[contact.pair])
-        if slope is not None:
+        if slope is not None and contact.body_a in lifted:
             heights.append(touch.gap / slope - _ABOVE)
     return lift(min(heights), drop) if heights else 0.0
 

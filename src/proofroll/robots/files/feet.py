@@ -20,6 +20,7 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.number_format import counted
 from proofroll.elements.mechanism import WORLD
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import frame_of_axis, to_quaternion, to_rpy
 from proofroll.files.json_data import plain
 from proofroll.robots.files import reading
@@ -131,7 +132,8 @@ def ground_tables(
     shapes = [_shape(standing, row) for row in rows["shapes"]]
     pairs = [_NearPair(**row | {"shapes": tuple(shapes[k] for k in row["shapes"])}) for row in rows["pairs"]]
     pairs = [pair for pair in pairs if pair.moves and (pair.on_floor or not of_urdf)]
-    return _tables(file, pairs, friction, lost)
+    lifted = any(joint.kind == JointKind.FREE for joint in standing.robot.moving)
+    return _tables(file, pairs, friction, lost, lifted=lifted and any(pair.on_plane for pair in pairs))
 
 
 class _Shape(NamedTuple):
@@ -225,14 +227,19 @@ class _NearPair:
         return self.shapes[0].body != self.shapes[1].body
 
     @property
+    def on_plane(self) -> bool:
+        """True if one shape is a plane of the world, a floor or a face of a box."""
+        return self.shapes[1].kind == "plane" and self.shapes[1].body == WORLD
+
+    @property
     def on_floor(self) -> bool:
         """True if one shape is a plane of the world, and no face of a box."""
-        return self.shapes[1].kind == "plane" and self.shapes[1].body == WORLD and not self.face
+        return self.on_plane and not self.face
 
     @property
     def on_face(self) -> bool:
         """True if one shape is the plane of a box's face."""
-        return self.shapes[1].kind == "plane" and bool(self.face)
+        return self.on_plane and bool(self.face)
 
     @property
     def grown(self) -> tuple[float, float]:
@@ -242,8 +249,8 @@ class _NearPair:
         share = self.margin / sum(takes) if self.margin > 0 and any(rounds) else 0.0
         return share * takes[0], share * takes[1]
 
-    def reasons(self) -> Iterator[str]:
-        """Reasons that a scene has no such pair."""
+    def reasons(self, *, lifted: bool) -> Iterator[str]:
+        """Reasons that a scene has no such pair; ``lifted``: the robot is lifted out of what stands below it."""
         kinds = [shape.kind for shape in self.shapes]
         if frozenset(kinds) not in _RULED:
             yield " on ".join(kinds)
@@ -261,7 +268,7 @@ class _NearPair:
             yield f"a margin of {self.margin:g} m around {kinds[0]}"
         if self.softness[0] > 0 and self.softness[1] < _REBOUNDS:
             yield "a contact that rebounds by its softness"
-        if self.margin - self.start > _OVERLAP and self.shapes[1].kind != "plane":
+        if self.margin - self.start > _OVERLAP and not (lifted and self.shapes[1].body == WORLD):
             by = f"they overlap by {1e3 * (self.margin - self.start):.3g} mm at the start"
             yield f"{by}: begin elsewhere by [start], or exclude the pair in the file"
 
@@ -276,7 +283,9 @@ class _NearPair:
         return rows
 
 
-def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None, lost: list[str]) -> GroundTables:
+def _tables(
+    file: RobotFile, pairs: Sequence[_NearPair], friction: float | None, lost: list[str], *, lifted: bool
+) -> GroundTables:
     """Tables of pairs that a scene has; those that do not touch are left out where it has not.
 
     Raises:
@@ -287,7 +296,7 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
     stands, others, endless = list[tuple[str, float]](), 0, dict[str, list[str]]()
     for pair in pairs:
         names = " and ".join(shape.name for shape in pair.shapes)
-        if reasons := list(pair.reasons()):
+        if reasons := list(pair.reasons(lifted=lifted)):
             if pair.touches:
                 wrong.append(f"{names} ({reasons[0]})")
             else:

@@ -78,8 +78,10 @@ class BlockSolver:
             otherwise: another solver, for rows whose sweeps do not reach the tolerance.
 
         Raises:
-            Diverged: neither finds them.
+            Diverged: neither finds them, or a velocity is not finite.
         """
+        if not (np.isfinite(g).all() and np.isfinite(G).all()):
+            raise Diverged("the state is not finite")
         guess = np.zeros(len(g))
         for number, block in blocks.items():
             guess[block.rows] = self._last.get(number, 0.0)

@@ -102,8 +102,7 @@ class ImpulseSteps:
         self.coming: Impulses | None = None
         self._settings, self._dt = settings, float(settings.dt or 0.0)
         self._midpoint = settings.integrator == "midpoint"
-        mechanism = tree.mechanism
-        self.contacts = mechanism.contacts
+        mechanism, self.contacts = tree.mechanism, tree.mechanism.contacts
         self.events = step_events.StepEvents(self.contacts, self._dt)
         self.q, self.v, self.t, self._gravity = tree.q0, tree.v0, 0.0, float(np.linalg.norm(mechanism.gravity))
         held = step_events.least_slip(mechanism.gravity, self._dt)
@@ -426,10 +425,8 @@ class ImpulseSteps:
         """Impulses as by :meth:`_found`, or by blocks, which go first from where Pinocchio's ADMM stopped.
 
         Raises:
-            Diverged: neither finds them, or a velocity is not finite.
+            Diverged: neither finds them.
         """
-        if not (np.isfinite(g).all() and np.isfinite(G).all()):
-            raise Diverged(f"the state is not finite at t = {self.t:.6g} s")
         if not self.blocks.solved:
             try:
                 return self._found(which, G, g, terms, span, convex=convex)
