@@ -246,4 +246,6 @@ def _header(version: tuple[int, int], text: bytes) -> tuple[tuple[int, ...], boo
     """Shape, order by columns, and type of an array, by its header in a version of numpy's format."""
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, by_columns, kind = read(io.BytesIO(text))
+    if kind.hasobject:
+        raise ValueError("it holds objects, which only Python could load")
     return shape, by_columns, kind
