@@ -51,7 +51,7 @@ def test_an_engine_that_agrees_says_what_was_found() -> None:
     assert compared.judgement.error < 1e-3
     assert 0 < compared.judgement.truth_error_bar < 1e-9
     assert str(found).startswith(
-        "agrees with the truth of pendulum (tolerance: a first look)\n  ok positions is off by"
+        "agrees with the truth of pendulum (tolerance: a first look)\n  ok positions are off by"
     )
 
 

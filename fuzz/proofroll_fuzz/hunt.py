@@ -118,7 +118,7 @@ def families_for(engine: str, names: tuple[str, ...], workers: Workers) -> dict[
     spec = parse_engine(engine)
     if spec.name == TRUTH:
         return chosen
-    require_engine(spec.name)
+    require_engine(spec.name, TRUTH)
     provides = describe(spec.name, workers).provides
     formulations = [spec.options["formulation"]] if "formulation" in spec.options else [*provides]
     provided = {capability for name in formulations for capability in provides.get(name, ())}

@@ -70,3 +70,8 @@ def counted(count: int, many: str) -> str:
     """A count with its noun; ``many`` is the plural: ``1 velocity``, ``2 velocities``."""
     singular = f"{many.removesuffix('ies')}y" if many.endswith("ies") else many.removesuffix("s")
     return f"{count} {singular if count == 1 else many}"
+
+
+def be(quantity: str) -> str:
+    """The verb of a quantity's name: ``gap is``, ``across is``, ``positions are``."""
+    return "are" if quantity.endswith("s") and not quantity.endswith("ss") else "is"

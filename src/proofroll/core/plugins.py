@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Collection, Mapping, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, PackageNotFoundError, version
@@ -158,20 +158,25 @@ def installed_steps(requires: Set[str]) -> list[str]:
     return stepped(declared, requires)
 
 
-def require_engine(name: str) -> None:
+def require_engine(name: str, *besides: str) -> None:
     """Raises InputError unless an installed package announces an engine of this name; loads none.
 
     Engines of other interpreters are not checked.
+
+    Args:
+        name: of the engine.
+        besides: further names that may stand in its place, which the error offers, too.
     """
     if not place_of(name):
-        _entry_point(name)
+        _entry_point(name, besides)
 
 
-def _entry_point(name: str) -> EntryPoint:
+def _entry_point(name: str, besides: Sequence[str] = ("truth",)) -> EntryPoint:
     for point in announced(GROUP):
         if point.name == name:
             return point
-    require_known("engine", name, ["truth", *engine_names()], "there is no such engine; choose one of")
+    if name != "truth":
+        require_known("engine", name, [*besides, *engine_names()], "there is no such engine; choose one of")
     raise InputError("engine", name, "engines are held against it; name an engine")
 
 

@@ -22,6 +22,7 @@ PAIRS = [
     ("low pass", "pose missing"),
     ("half kd", "held efforts"),
     ("clipped actions", "no last action"),
+    ("half the rate", "an action repeated"),
 ]
 
 

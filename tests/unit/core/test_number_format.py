@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proofroll.core.number_format import with_bar
+from proofroll.core.number_format import be, with_bar
 
 
 @pytest.mark.parametrize(
@@ -34,3 +34,9 @@ def test_the_texts_contain_the_interval(value: float, bar: float, digits: int) -
     middle, half = map(Decimal, with_bar(value, bar, digits))
     assert middle - half <= Decimal(value) - Decimal(bar)
     assert Decimal(value) + Decimal(bar) <= middle + half
+
+
+@pytest.mark.parametrize(("quantity", "verb"), [("gap", "is"), ("across", "is"), ("positions", "are"), ("v_x", "is")])
+def test_a_quantity_has_its_verb(quantity: str, verb: str) -> None:
+    """Names of several values are in the plural."""
+    assert be(quantity) == verb

@@ -12,7 +12,14 @@ import pytest
 from annotated_types import Gt
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
-from proofroll.core.plugins import EngineSpec, engine_names, load_engine, parse_engine, resolve_settings
+from proofroll.core.plugins import (
+    EngineSpec,
+    engine_names,
+    load_engine,
+    parse_engine,
+    require_engine,
+    resolve_settings,
+)
 from proofroll.files.scene_file import load_scene
 
 
@@ -165,6 +172,14 @@ def test_unknown_engine() -> None:
         InputError, match=r"engine = 'adams': there is no such engine; choose one of truth, .*projection"
     ):
         load_engine("adams")
+
+
+def test_the_truth_is_offered_where_it_may_stand() -> None:
+    """Where engines alone may stand the truth is not offered; where it may, too, it is."""
+    with pytest.raises(InputError, match=r"choose one of (?!.*truth).*projection"):
+        require_engine("adams")
+    with pytest.raises(InputError, match=r"choose one of truth, .*projection"):
+        require_engine("adams", "truth")
 
 
 def test_missing_engine_says_what_is_missing(install_engines: Callable[[Mapping[str, str]], None]) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_format import counted, error, number, spaced
+from proofroll.core.number_format import be, counted, error, number, spaced
 from proofroll.core.verdict import SEVERITY, LimitResult, Verdict
 from proofroll.report.answer.sentences import measure
 from proofroll.report.comparison.closing import closing_notes
@@ -160,7 +160,7 @@ def _off(row: ReportedRow) -> str:
     if not math.isfinite(worst.error):
         return f"{symbol(worst.observable)}: {worst.reason.partition(';')[0]}"
     at_every_step = ", at every step" if worst.limit is LimitResult.ANOTHER else ""
-    return f"{symbol(worst.observable)} is off by {measure(worst.error, worst.unit)}{at_every_step}"
+    return f"{symbol(worst.observable)} {be(worst.observable)} off by {measure(worst.error, worst.unit)}{at_every_step}"
 
 
 def _nearest(row: ReportedRow) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +27,23 @@ from proofroll.robots.control.air_rows import (
     motion_of,
     rms,
 )
-from proofroll.robots.control.air_several import several_causes
+from proofroll.robots.control.air_several import may_be_explained, several_causes
 from proofroll.robots.control.bookkeeping.air import AirRobot, HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import ControlRecord, LayerCause
 from proofroll.robots.model import Array
 
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
+_FEW = 150  # equations by which a scheme that is rare is looked at first
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
+
+
+class _Trial(NamedTuple):
+    """Forces at the rows of a record by the steps of a scheme; ``hopeful``: False if no numbers explain a few rows."""
+
+    scheme: StepScheme
+    rows: AirRows
+    hopeful: bool
 
 
 @dataclass(frozen=True)
@@ -59,6 +69,11 @@ class AirFit:
     imitated: bool = False
     tried: int = 0
     between: bool = False
+
+    @property
+    def left(self) -> float:
+        """Part of the forces that the best cause leaves, or the right numbers where there is none."""
+        return min((cause.after for cause in self.causes), default=self.off)
 
 
 def acceleration_fit(
@@ -87,8 +102,9 @@ def acceleration_fit(
     if isinstance(motion, str):
         return motion
     states, moving = motion
+    few = max(FEWEST_ROWS, -(-_FEW // robot.mechanism.nv))
     table = AirTable(record, law, robot, states, efforts, held.links)
-    trials: list[tuple[StepScheme, AirRows]] = []
+    trials: list[_Trial] = []
     every = [StepScheme(*item) for item in itertools.product((False, True), (False, True))]
     schemes = [item for item in every if robot.damping.any() or not item.damped]
     rarer = [*(item for item in every if item not in schemes), StepScheme(whole=True)]
@@ -100,15 +116,18 @@ def acceleration_fit(
                 rows = rows[usable[rows] & usable[rows - central]]
             if len(rows) < FEWEST_ROWS:
                 continue
-            rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(_MOST_ROWS, len(rows))).astype(int))]
+            moved = rows[~table.slow[rows]]  # near rest dry friction is none that a sign tells
+            first, rows = _spread(moved if len(moved) >= few else rows, few), _spread(rows, _MOST_ROWS)
             for scheme in (*schemes, *([] if central else rarer)):
-                if scheme in rarer and any(item.exact for _, item in trials):
+                if scheme in rarer and any(item.rows.exact for item in trials):
                     break
-                trials.append((scheme, table.rows(rows, rated, scheme, central=central)))
-                if trials[-1][1].exact and not any(scheme):
-                    return AirFit(
-                        trials[-1][1].off / trials[-1][1].size, SAFETY * trials[-1][1].rounding / trials[-1][1].size
-                    )
+                begun = table.rows(first, rated, scheme, central=central) if trials else None
+                hopeful = begun is None or _promising(begun, law)
+                if scheme in rarer and not hopeful:
+                    continue
+                trials.append(_Trial(scheme, table.rows(rows, rated, scheme, central=central), hopeful))
+                if trials[-1].rows.exact and not any(scheme):
+                    return _judged(trials[-1:], law, robot, together=False)
     except (Diverged, Refused) as error:
         return str(error)
     if not trials:
@@ -116,21 +135,29 @@ def acceleration_fit(
     return _judged(trials, law, robot, together=together)
 
 
-def _judged(
-    trials: Sequence[tuple[StepScheme, AirRows]], law: ControlLaw, robot: AirRobot, *, together: bool
-) -> AirFit:
+def _spread(rows: Any, most: int) -> Any:
+    """Some of the rows at equal intervals."""
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
+
+
+def _promising(rows: AirRows, law: ControlLaw) -> bool:
+    """True if a scheme may explain a record by what it leaves at a few rows, with or without a cause."""
+    return rows.exact or bool(_causes(rows, law)) or may_be_explained(rows, law.joints)
+
+
+def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, together: bool) -> AirFit:
     """Fit with the scheme that leaves least, and causes where that is more than rounding."""
-    scheme, best = min(trials, key=lambda trial: trial[1].off / trial[1].size)
+    scheme, best, _ = min(trials, key=lambda trial: trial.rows.off / trial.rows.size)
     scale = 1 / best.size
     if best.exact:
-        armed = [rows for item, rows in trials if not item.implicit and _fits(rows, "implicit")]
+        armed = [item for item in trials if not item.scheme.implicit and _fits(item.rows, "implicit")]
         imitated = scheme.implicit and bool(armed)
         damped = scheme.damped and bool(robot.damping.any())
         return AirFit(best.off * scale, SAFETY * best.rounding * scale, damped=damped, imitated=imitated)
     right = LayerCause("", "", None, best.off * scale)  # what no cause may leave, whatever the scheme
     causes: dict[str, LayerCause] = {}
-    for _, rows in trials:
-        for cause in _causes(rows, law):
+    for trial in trials:
+        for cause in _causes(trial.rows, law):
             if cause.after < causes.get(cause.id, right).after:
                 causes[cause.id] = cause
     bar = SAFETY * best.rounding
@@ -138,10 +165,14 @@ def _judged(
     several = [cause for cause in causes.values() if cause.after <= bar * scale or not closed]
     named = sorted(several, key=lambda cause: cause.after)
     if together and not closed:
-        sets = [several_causes(rows, law.joints, _right(law)) for item, rows in trials if not item.stages]
+        sets = [
+            several_causes(rows, law.joints, _right(law))
+            for item, rows, hopeful in trials
+            if hopeful and not item.stages
+        ]
         named = min(filter(None, sets), key=len, default=named)
     # The steps of the program may be no rows.
-    between = not named and bar < best.off <= min(rows.unknown for _, rows in trials)
+    between = not named and bar < best.off <= min(item.rows.unknown for item in trials)
     tried = len(NUMBERS) + len(best.added)
     return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between)
 

@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.integrators import classical_step
 from proofroll.core.number_format import error
-from proofroll.elements.mechanism.scene.rotations import skew
-from proofroll.robots.control.bookkeeping.air import AirLink, AirRobot
+from proofroll.elements.mechanism.scene.rotations import skews
+from proofroll.robots.control.bookkeeping.air import AirForces, AirLink, AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.record import BASE, ControlRecord
 from proofroll.robots.model import Array
@@ -35,6 +35,7 @@ _SLOW = 0.02  # part of its largest rate below which a joint is about to turn ba
 FEWEST_ROWS = 4
 SAFETY = 10.0  # on what rounding of the record leaves, whose size is estimated and whose errors are not independent
 ROUND_OFF = 1e-9  # part of the forces: round-off of a sum of some terms
+_HAS = np.array([[1, 0, 0, 1, 1, 0], [0, 1, 0, 1, 0, 1], [0, 0, 1, 0, 1, 1]])  # moments that a component multiplies
 _EQUAL = 1e-3  # part of an interval by which intervals may differ
 _HELPS = 0.1  # part of a difference that a cause may leave
 # Number -> what it is called, and its unit; gravity and efforts are in parts of the right ones.
@@ -216,18 +217,16 @@ class AirTable:
         self.targets = record.stacked("target", law.joints)
         self.rated = _largest(record, ("v.", "v_WB.", "w_WB."))
         self.placed, self.forced = _largest(record, ("q.", "q_WB.")), _largest(record, ("effort.",))
-        self._known: dict[int, tuple[Array, ...]] = {}
+        speeds = np.abs([v[robot.driven[:, 1]] for _, v in states])
+        self.slow = np.any(speeds < _SLOW * speeds.max(axis=0), axis=1)  # rows at which a joint is about to turn back
+        self._forces: dict[int, AirForces] = {}
         self._stepped: dict[tuple[int, bool], Array] = {}
-        self._added: dict[tuple[int, tuple[bool, bool]], list[Array]] = {}
 
-    def _forces(self, row: int) -> tuple[Array, ...]:
-        """Mass matrix with armatures, inertial forces, weight, whitening of free directions, and drag, at a row."""
-        if row not in self._known:
-            M, inner, weight, free = self.robot.forces(*self.at[row])
-            armed = M + np.diag(self.robot.load(self.law.armature))
-            into = np.linalg.inv(np.linalg.cholesky(free.T @ armed @ free)) @ free.T
-            self._known[row] = armed, inner, weight, into, self._drag(*self.at[row])
-        return self._known[row]
+    def _at(self, row: int) -> AirForces:
+        """Forces at a row."""
+        if row not in self._forces:
+            self._forces[row] = _armed(self.robot, self.law, self.at[row])
+        return self._forces[row]
 
     def _by_stages(self, row: int, *, held: bool) -> Array:
         """Change of the velocities by a step of RK4 from a row less the recorded one, in parts of the step."""
@@ -248,14 +247,14 @@ class AirTable:
 
         def rates(y: Array) -> Array:
             place, velocity = y[: len(q)], y[len(q) :]
-            M, inner, weight, free = robot.forces(place, velocity)
-            armed = M + np.diag(robot.load(law.armature))
-            load = robot.load(effort_at(place[at_q], velocity[at_v]))
-            acting = free.T @ (inner + law.gravity * weight + load)
-            rate = free @ np.linalg.solve(free.T @ armed @ free, acting)
+            first = np.array_equal(y, start)
+            M, inner, weight, free, _ = self._at(row) if first else _armed(robot, law, (place, velocity))
+            acting = free.T @ (inner + law.gravity * weight + robot.load(effort_at(place[at_q], velocity[at_v])))
+            rate = free @ np.linalg.solve(free.T @ M @ free, acting)
             return np.concatenate([robot.equations.tree.rate(place, velocity), rate])
 
-        new_v = classical_step(rates, np.concatenate([q, v]), self.step)[len(q) :]
+        start = np.concatenate([q, v])
+        new_v = classical_step(rates, start, self.step)[len(q) :]
         self._stepped[row, held] = np.asarray((self.at[row + 1][1] - new_v) / self.step)
         return self._stepped[row, held]
 
@@ -265,7 +264,7 @@ class AirTable:
         ``of_world``: True if the velocity of a base that floats has its steps along the world's axes.
         """
         q, v = self.at[row]
-        M, place = self._forces(row)[0], self.robot.base[1] if of_world and self.robot.base else slice(0, 0)
+        M, place = self._at(row).mass, self.robot.base[1] if of_world and self.robot.base else slice(0, 0)
 
         def turning(velocity: Array) -> Array:
             """Part of the base's acceleration that the turning of its axes makes."""
@@ -275,7 +274,9 @@ class AirTable:
         change[place][:3] += turning(v)
         size = (np.abs(v).max() or 1.0) / (np.abs(change).max() or 1.0)
         ends = (v + size * change, v - size * change)
-        forces_after, forces_before = (self.robot.forces(q, end)[1] + M[:, place][:, :3] @ turning(end) for end in ends)
+        forces_after, forces_before = (
+            self.robot.forces(q, end).inertial + M[:, place][:, :3] @ turning(end) for end in ends
+        )
         return np.asarray((forces_after - forces_before) / (2 * size))
 
     def rows(self, rows: Array, moving: MovingRates, scheme: StepScheme, *, central: bool) -> AirRows:
@@ -288,102 +289,113 @@ class AirTable:
             central: True if accelerations are differences over two intervals.
         """
         law, robot, h, rated = self.law, self.robot, self.step, moving.rates
-        previous, width = (rows - 1, 2 * h) if central else (rows, h)
-        rates = (rated[rows + 1] - rated[previous]) / width
+        width = 2 * h if central else h
         late = np.minimum(rows + 1, len(rated) - 2)
-        ahead = (rated[late + 1] - rated[late]) / h
-        added = law.armature if law.armature.any() else np.ones(len(law.joints))
-        driven = robot.driven[:, 1]
-        left, noise, lates, sizes, slow = [], [], [], [], []
-        least = _SLOW * np.abs(rated[:, driven]).max(axis=0)
-        columns: dict[str, list[Array]] = {name: [] for name in (*NUMBERS, "implicit")}
-        singles: dict[str, list[Array]] = {name: [] for name in BY_JOINT}
-        bodies: dict[str, list[Array]] = {body.name: [] for body in robot.mechanism.bodies}
-        for row, rate, following in zip(rows.tolist(), rates.copy(), ahead.copy(), strict=True):
-            q, v = self.at[row]
-            M, inner, weight, into, drag = self._forces(row)
+        q, v = (np.array(part) for part in zip(*(self.at[row] for row in rows.tolist()), strict=True))
+        rate, following = (rated[rows + 1] - rated[rows - central]) / width, (rated[late + 1] - rated[late]) / h
+        if robot.base is not None and moving.axes is not None:
+            place = slice(robot.base[1].start, robot.base[1].start + 3)
+            spin = v[:, robot.base[1]][:, 3:]
             for item in (rate, following):
-                if robot.base is not None and moving.axes is not None:
-                    base, velocity, spin = item[robot.base[1]], v[robot.base[1]][:3], v[robot.base[1]][3:]
-                    base[:3] = moving.axes[row].T @ base[:3] - np.cross(spin, velocity)
-            effort = self.efforts[row]
-            acting = M @ rate - inner - law.gravity * weight - robot.load(effort)
-            if scheme.stages:
-                acting = M @ self._by_stages(row, held=scheme.held)
-            if scheme.whole:
-                acting -= h * self._slope(row, rate, of_world=moving.axes is not None)
-            if scheme.damped:
-                acting += h * robot.damping * rate
-            if scheme.implicit:
-                acting += h * robot.load(np.where(np.abs(effort) < law.limit * (1 - 1e-6), law.kd, 0.0)) * rate
-            left.append(into @ acting)
-            forces = np.linalg.norm(into @ (M @ rate)) + np.linalg.norm(into @ weight)
-            sizes.append(into @ (M @ rate - inner))
-            # Rounding errors spread evenly up to the largest, whose variance is a third of its square.
-            squares = ((into @ M) ** 2).sum(axis=1) * 2 * (self.rated / width) ** 2 / 3
-            squares = squares + into**2 @ robot.load(np.full(len(effort), self.forced)) ** 2 / 3
-            parts = 2 * self.placed + 2 * self.rated / (1e-300 + np.abs(v).max()) + ROUND_OFF
-            noise.append(np.sqrt(squares + (parts * forces) ** 2))
-            slow.append(np.full(len(into), bool(np.any(np.abs(v[driven]) < least))))
-            lates.append(into @ (M @ (following - rate)) / 2)
-            columns["gravity"].append(into @ weight)
-            columns["effort"].append(into @ robot.load(effort))
-            columns["armature"].append(-into @ (robot.load(added) * rate))
-            damped_v = v[driven] + (h * rate[driven] if scheme.damped or scheme.whole else 0.0)
-            columns["damping"].append(-into @ robot.load(damped_v))
-            columns["friction"].append(-into @ robot.load(np.sign(v[driven])))
-            columns["drag"].append(-into @ drag)
-            columns["implicit"].append(-into @ (robot.load(h * law.kd) * rate))
-            of_joints = {"damping": -damped_v, "friction": -np.sign(v[driven]), "torque": np.ones(len(driven))}
-            of_joints |= {"stiffness": -q[robot.driven[:, 0]], "armature": -rate[driven]}
-            for name, values in of_joints.items():
-                singles[name].append(into[:, driven] * values)
-            for body, forces_of in zip(bodies, self._of_bodies(row, rate, (central, moving.axes is None)), strict=True):
-                bodies[body].append(-into @ forces_of)
+                along_base = np.einsum("tji,tj->ti", moving.axes[rows], item[:, place])
+                item[:, place] = along_base - np.cross(spin, v[:, place])
+        forces = [self._at(row) for row in rows.tolist()]
+        M, inner, weight, free = (np.array(part) for part in list(zip(*forces, strict=True))[:4])
+        turned = np.swapaxes(free, 1, 2)
+        into = np.linalg.inv(np.linalg.cholesky(turned @ M @ free)) @ turned
+
+        def whitened(values: Array) -> Array:
+            """Forces along the velocities, (rows, nv, ...), one after the other, (numbers, ...)."""
+            columns = into @ values.reshape(*values.shape[:2], -1)
+            return np.asarray(columns.reshape(-1, *values.shape[2:]))
+
+        driven, effort, at_v = robot.driven[:, 1], self.efforts[rows], v[:, robot.driven[:, 1]]
+        masses = np.einsum("tij,tj->ti", M, rate)
+        acting = masses - inner - law.gravity * weight - robot.load(effort)
+        if scheme.stages:
+            stepped = np.array([self._by_stages(row, held=scheme.held) for row in rows.tolist()])
+            acting = np.einsum("tij,tj->ti", M, stepped)
+        if scheme.whole:
+            of_world = moving.axes is not None
+            pairs = zip(rows.tolist(), rate, strict=True)
+            acting = acting - h * np.array([self._slope(*pair, of_world=of_world) for pair in pairs])
+        if scheme.damped:
+            acting = acting + h * robot.damping * rate
+        if scheme.implicit:
+            acting = acting + h * robot.load(np.where(np.abs(effort) < law.limit * (1 - 1e-6), law.kd, 0.0)) * rate
+        # Rounding errors spread evenly up to the largest, whose variance is a third of its square.
+        squares = ((into @ M) ** 2).sum(axis=2) * 2 * (self.rated / width) ** 2 / 3
+        squares = squares + into**2 @ robot.load(np.full(effort.shape[1], self.forced)) ** 2 / 3
+        sizes = (np.linalg.norm(whitened(part).reshape(len(rows), -1), axis=1) for part in (masses, weight))
+        parts = 2 * self.placed + 2 * self.rated / (1e-300 + np.abs(v).max(axis=1)) + ROUND_OFF
+        noise = np.sqrt(squares + (parts * sum(sizes))[:, None] ** 2)
+        damped_v = at_v + (h * rate[:, driven] if scheme.damped or scheme.whole else 0.0)
+        armature = law.armature if law.armature.any() else np.ones(len(driven))
+        columns = {
+            "gravity": weight,
+            "effort": robot.load(effort),
+            "armature": -robot.load(armature) * rate,
+            "damping": -robot.load(damped_v),
+            "friction": -robot.load(np.sign(at_v)),
+            "drag": -self._drag(forces, v),
+            "implicit": -robot.load(h * law.kd) * rate,
+        }
+        of_joints = {"torque": np.ones(at_v.shape), "friction": -np.sign(at_v), "damping": -damped_v}
+        of_joints |= {"stiffness": -q[:, robot.driven[:, 0]], "armature": -rate[:, driven]}
+        bodies = -np.moveaxis(self._of_bodies(forces, rate), 1, 0)
+        size = rms(whitened(masses - inner))
         return AirRows(
-            left=np.concatenate(left),
-            columns={name: np.concatenate(parts) for name, parts in columns.items()},
-            by_joint={name: np.concatenate(parts) for name, parts in singles.items()},
-            added={name: np.concatenate(parts) for name, parts in bodies.items()},
-            rounding=rms(np.concatenate(noise)),
-            late=np.concatenate(lates),
-            size=rms(np.concatenate(sizes)) or 1.0,
-            slow=np.concatenate(slow),
+            left=whitened(acting),
+            columns={name: whitened(values) for name, values in columns.items()},
+            by_joint={
+                name: whitened(robot.load(values[:, None] * np.eye(len(driven))).swapaxes(1, 2))
+                for name, values in of_joints.items()
+            },
+            added={body.name: whitened(values) for body, values in zip(robot.mechanism.bodies, bodies, strict=True)},
+            rounding=rms(noise),
+            late=whitened(np.einsum("tij,tj->ti", M, following - rate) / 2),
+            size=size if size > ROUND_OFF * rms(whitened(weight)) else 1.0,
+            slow=np.repeat(self.slow[rows], into.shape[1]),
         )
 
-    def _drag(self, q: Array, v: Array) -> Array:
-        """Forces along the velocities that drag of 1 1/s on each link needs, (nv,)."""
-        motion, total = self.robot.equations.tree.at(q, v), np.zeros(len(v))
+    def _drag(self, forces: Sequence[AirForces], v: Array) -> Array:
+        """Forces along the velocities (rows, nv) that drag of 1 1/s on each link needs, (rows, nv)."""
+        R, w, J = _bodies(forces, "R_WB", "w_WB", "J")
+        total = np.zeros(v.shape)
         for link in self.links:
-            R, w, J = motion.R_WB[link.body], motion.w_WB[link.body], motion.J[link.body]
-            arm = R @ link.com
-            velocity = J[:3] @ v + np.cross(w, arm)
-            force = link.mass * velocity * (1 + np.linalg.norm(velocity))
-            torque = R @ link.inertia @ R.T @ w * (1 + np.linalg.norm(w))
-            total += J[:3].T @ force + J[3:].T @ (torque + np.cross(arm, force))
+            R_k, w_k, J_k = R[:, link.body], w[:, link.body], J[:, link.body]
+            arm = R_k @ link.com
+            velocity = np.einsum("tij,tj->ti", J_k[:, :3], v) + np.cross(w_k, arm)
+            force = link.mass * velocity * (1 + np.linalg.norm(velocity, axis=1, keepdims=True))
+            moment = np.einsum("tij,jk,tlk,tl->ti", R_k, link.inertia, R_k, w_k)
+            torque = moment * (1 + np.linalg.norm(w_k, axis=1, keepdims=True)) + np.cross(arm, force)
+            total += np.einsum("tij,ti->tj", J_k, np.concatenate([force, torque], axis=1))
         return total
 
-    def _of_bodies(self, row: int, rate: Array, kind: tuple[bool, bool]) -> list[Array]:
-        """Forces along the velocities that a mass, a first moment and an inertia of each body need, (nv, 10).
+    def _of_bodies(self, forces: Sequence[AirForces], rate: Array) -> Array:
+        """Forces that a mass, a first moment and an inertia of each body need, (rows, bodies, nv, 10)."""
+        R, w, J, bias = _bodies(forces, "R_WB", "w_WB", "J", "bias")
+        back = np.swapaxes(R, 2, 3)
+        acceleration = np.einsum("tbij,tj->tbi", J, rate) + bias
+        vectors = (acceleration[..., :3] - np.array(self.robot.mechanism.gravity), acceleration[..., 3:], w)
+        pull, turning, spin = ((back @ vector[..., None])[..., 0] for vector in vectors)
+        wrench = np.zeros((*R.shape[:2], 6, 10))
+        wrench[..., :3, 0], wrench[..., 3:, 1:4] = pull, -skews(pull)
+        wrench[..., :3, 1:4] = skews(turning) + skews(spin) @ skews(spin)
+        wrench[..., 3:, 4:] = _inertial(turning) + skews(spin) @ _inertial(spin)
+        turned = np.swapaxes(J, 2, 3)
+        return np.asarray(turned[..., :3] @ R @ wrench[..., :3, :] + turned[..., 3:] @ R @ wrench[..., 3:, :])
 
-        ``kind``: of the rates; a row has one rate of each.
-        """
-        if (row, kind) in self._added:
-            return self._added[row, kind]
-        tree, gravity, added = self.robot.equations.tree, np.array(self.robot.mechanism.gravity), []
-        motion = tree.at(*self.at[row])
-        for k in range(len(self.robot.mechanism.bodies)):
-            R, J = motion.R_WB[k], motion.J[k]
-            acceleration = J @ rate + motion.bias[k]
-            pull, turning, spin = R.T @ (acceleration[:3] - gravity), R.T @ acceleration[3:], R.T @ motion.w_WB[k]
-            moved = skew(turning) + skew(spin) @ skew(spin)
-            wrench = np.zeros((6, 10))
-            wrench[:3, 0], wrench[:3, 1:4] = pull, moved
-            wrench[3:, 1:4] = -skew(pull)
-            wrench[3:, 4:] = _inertial(turning) + skew(spin) @ _inertial(spin)
-            added.append(J[:3].T @ R @ wrench[:3] + J[3:].T @ R @ wrench[3:])
-        self._added[row, kind] = added
-        return added
+
+def _armed(robot: AirRobot, law: ControlLaw, state: tuple[Array, Array]) -> AirForces:
+    """Forces in a state, with the armatures of a law."""
+    forces = robot.forces(*state)
+    return forces._replace(mass=forces.mass + np.diag(robot.load(law.armature)))
+
+
+def _bodies(forces: Sequence[AirForces], *names: str) -> list[Array]:
+    """Arrays of the motion of all bodies, each (rows, bodies, ...)."""
+    return [np.array([getattr(item.motion, name)[:-1] for item in forces]) for name in names]
 
 
 def _largest(record: ControlRecord, kinds: tuple[str, ...]) -> float:
@@ -392,6 +404,5 @@ def _largest(record: ControlRecord, kinds: tuple[str, ...]) -> float:
 
 
 def _inertial(a: Array) -> Array:
-    """Matrix that turns an inertia (xx, yy, zz, xy, xz, yz) into its product with a vector, (3, 6)."""
-    x, y, z = a
-    return np.array([[x, 0, 0, y, z, 0], [0, y, 0, x, 0, z], [0, 0, z, 0, x, y]])
+    """Matrices that turn an inertia (xx, yy, zz, xy, xz, yz) into its products with vectors (..., 3), (..., 3, 6)."""
+    return np.asarray(a[..., [[0, 0, 0, 1, 2, 0], [0, 1, 0, 0, 0, 2], [0, 0, 2, 0, 0, 1]]] * _HAS)

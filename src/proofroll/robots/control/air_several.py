@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -47,11 +48,8 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         joints: driven joints.
         right: number -> its right value, for those that are parts of the right ones.
     """
-    if rows.slow.any() and not rows.slow.all():  # near rest dry friction is none that a sign tells
-        rows = rows.without(rows.slow)
-    groups = [*_groups(rows, joints)]
-    screen = _Screen(groups, rows.left)
-    sets = [*((k,) for k in range(len(groups))), *itertools.combinations(range(len(groups)), 2)]
+    rows, groups = _moving(rows, joints)
+    sets, screen = _sets(groups, rows), _Screen(groups, rows.left)
     carried: list[LayerCause] | None = None
     for numbers in sorted(sets, key=lambda item: sum(groups[k].columns.shape[1] for k in item)):
         chosen = [groups[k] for k in numbers]
@@ -65,6 +63,38 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         if rms(remainder) <= SAFETY * rows.rounding:
             return [*_told(rows, chosen, columns, values, right)]
     return []
+
+
+def may_be_explained(rows: AirRows, joints: Sequence[str]) -> bool:
+    """True if two groups of numbers may leave no more than rounding."""
+    rows, groups = _moving(rows, joints)
+    return any(_close([groups[k] for k in item], rows) for item in _sets(groups, rows))
+
+
+def _moving(rows: AirRows, joints: Sequence[str]) -> tuple[AirRows, list[_Group]]:
+    """Rows without those near rest, at which dry friction is none that a sign tells, with their groups of numbers."""
+    rows = rows.without(rows.slow) if rows.slow.any() and not rows.slow.all() else rows
+    return rows, [*_groups(rows, joints)]
+
+
+def _sets(groups: Sequence[_Group], rows: AirRows) -> list[tuple[int, ...]]:
+    """Indices of one group or two that may leave no more than rounding.
+
+    All groups but the scale of efforts leave least; with it, all of them together are the equations themselves.
+    """
+    sets = [*((k,) for k in range(len(groups))), *itertools.combinations(range(len(groups)), 2)]
+    scaled = {k for k, group in enumerate(groups) if group.kind == "effort"}
+    if _close([group for group in groups if group.kind != "effort"], rows):
+        return sets
+    return [item for item in sets if scaled & {*item}]
+
+
+def _close(groups: Sequence[_Group], rows: AirRows) -> bool:
+    """True if groups of numbers, all together, leave no more than rounding; every second equation tells that."""
+    columns = np.concatenate([group.columns for group in groups], axis=1)
+    every = 2 if len(rows.left) > 4 * columns.shape[1] else 1
+    _, remainder = _solved(columns[::every], rows.left[::every])
+    return rms(remainder) <= math.sqrt(every) * SAFETY * rows.rounding
 
 
 def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
@@ -142,7 +172,9 @@ def _carried(rows: AirRows) -> list[LayerCause]:
         sizes = np.linalg.norm(columns, axis=0)
         if sizes[0] <= ROUND_OFF * sizes.max():  # about a fixed axis no mass shows
             continue
-        values, _ = _solved(columns, rows.left)
+        values, remainder = _solved(columns, rows.left)
+        if rms(remainder) > SAFETY * rows.rounding:
+            continue
         start = np.array([abs(values[0]) or 1.0, *values[1:4]])
 
         def left(numbers: Array, columns: Array = columns) -> Array:

@@ -24,7 +24,7 @@ from proofroll.elements.mechanism.scene.policy import PolicySource
 from proofroll.elements.mechanism.scene.rotations import from_quaternion
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
 from proofroll.robots.files.actuators import scene_actuators
-from proofroll.robots.files.feet import GROUNDS, NO_GROUND, OF_FILE, StandingRobot, ground_tables
+from proofroll.robots.files.feet import GROUNDS, NO_FLOOR, NO_GROUND, OF_FILE, StandingRobot, ground_tables
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.scene_tables import (
     CONTACTS,
@@ -51,6 +51,7 @@ _LADDER, _FINER = 4, 2  # a ladder's coarsest step has so many of the finest; st
 _STANDING = 0.3  # s: duration of a robot on a ground, which lands and stands by then
 _SEEN = 1e-6  # m: way of a robot at its start that is told
 _GROUND_WORDS = "what the robot stands on: nothing (0), the floor of its file (1), or a plane z = 0 (2)"
+_STEEP = 0.1  # cosine between the normal of a plane and the vertical from which on it is a wall
 _ABOVE = 10.0  # m: by which a robot is lifted while the heights of its shapes are measured
 
 
@@ -225,7 +226,8 @@ class ControlledScenes:
         tables["joints"] = _lifted(tables["joints"], way * up)
         about = touching.about
         if abs(way) > _SEEN and controller.start.drop is None:
-            about += f"; moved up by {1e3 * way:.3g} mm, as its start overlaps the floor"
+            below = "what it stands on" if about.startswith(NO_FLOOR) else "the floor"
+            about += f"; moved up by {1e3 * way:.3g} mm, as its start overlaps {below}"
         others = [clause for clause in tables["omitted"] if clause != CONTACTS]
         return tables | {"about": about, "omitted": [*touching.left_out, *others]}
 
@@ -275,12 +277,16 @@ def _first_target(target: Any, angle: float) -> float:
 
 def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> float:
     """Way against gravity to the start of the first body that floats [m], for the height of its lowest shape."""
-    floors = {row["name"]: row for row in tables["geometries"] if row["kind"] == "plane" and row["body"] == WORLD}
     free = next((joint for joint in robot.moving if joint.kind == JointKind.FREE), None)
     size = float(np.linalg.norm(robot.gravity))
-    if not floors or free is None or not size:
+    if free is None or not size:
         return 0.0
     up = -robot.gravity / size
+    planes = [row for row in tables["geometries"] if row["kind"] == "plane" and row["body"] == WORLD]
+    slopes = {row["name"]: float(np.array(row.get("normal", Z)) @ up) for row in planes}
+    floors = {name: slope for name, slope in slopes.items() if slope > _STEEP}
+    if not floors:
+        return 0.0
     raised = {key: value for key, value in tables.items() if key not in {"gravity", "omitted", "control"}}
     raised["joints"] = _lifted(tables["joints"], _ABOVE * up)
     x, y, z = robot.gravity.tolist()
@@ -289,9 +295,9 @@ def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> floa
     ends = {pair.name: pair.geometries[1] for pair in mechanism.pairs}
     heights = []
     for contact, touch in zip(mechanism.contacts, touching, strict=True):
-        floor = floors.get(ends[contact.pair])
-        if floor is not None:
-            heights.append(touch.gap / float(np.array(floor.get("normal", Z)) @ up) - _ABOVE)
+        slope = floors.get(ends[contact.pair])
+        if slope is not None:
+            heights.append(touch.gap / slope - _ABOVE)
     return lift(min(heights), drop) if heights else 0.0
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -59,15 +59,20 @@ def _changes(record: ControlRecord, names: Sequence[str]) -> int:
 
 def instant_rows(record: ControlRecord, law: ControlLaw) -> Any:
     """Rows at which a record's action or target changes, and the first row if an instant can lie there."""
+    return _instant_rows(record, law.rate)
+
+
+@lru_cache(maxsize=16)
+def _instant_rows(record: ControlRecord, rate: float) -> Any:
     names = _of_instants(record)
     if not names:
-        near = np.abs(record.time * law.rate - np.round(record.time * law.rate)) < SAME_TIME
+        near = np.abs(record.time * rate - np.round(record.time * rate)) < SAME_TIME
         return np.flatnonzero(near)
     values = np.stack([record.columns[name] for name in names], axis=1)
     changes = np.any(np.abs(np.diff(values, axis=0)) > 0, axis=1)
     later = 1 + np.flatnonzero(changes)
     if record.time[0] != 0 and len(later):  # a record may begin between two instants
-        periods = (record.time[later[0]] - record.time[0]) * law.rate
+        periods = (record.time[later[0]] - record.time[0]) * rate
         if abs(periods - np.round(periods)) > SAME_TIME:
             return later
     return np.concatenate([[0], later])
@@ -113,11 +118,16 @@ def _instants(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
 
 def at_instants(record: ControlRecord, law: ControlLaw) -> ControlRecord:
     """Rows of a record at instants, with the state that the policy sees there."""
-    rows = instant_rows(record, law)
+    return _at_instants(record, law.rate, law.observed_lag)
+
+
+@lru_cache(maxsize=16)
+def _at_instants(record: ControlRecord, rate: float, lag: int) -> ControlRecord:
+    rows = _instant_rows(record, rate)
     part = record.part(rows)
-    if not law.observed_lag:
+    if not lag:
         return part
-    states = record.part(np.maximum(rows - law.observed_lag, 0))
+    states = record.part(np.maximum(rows - lag, 0))
     kinds = ("q.", "v.", *(f"{name}." for name in BASE))
     columns = {name: (states if name.startswith(kinds) else part).columns[name] for name in part.columns}
     return ControlRecord(record.path, columns, part.rounding, part.time)
@@ -131,21 +141,15 @@ def held_rows(record: ControlRecord, law: ControlLaw) -> Any:
     return mask
 
 
-def states(record: ControlRecord, law: ControlLaw) -> list[RobotState] | str:
+def states(record: ControlRecord, law: ControlLaw) -> RobotState | str:
     """States at all rows of a record, or the reason why it has none; without columns of the base it is fixed."""
     q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
     if q is None or v is None:
         return f"the record has no columns {'q' if q is None else 'v'}.JOINT"
-    parts = ((name, record.stacked(name, tuple(axes))) for name, axes in BASE.items())
-    base = {name: item for name, item in parts if item is not None}
-    return [
-        RobotState(time=float(time), q=q[row], v=v[row], **{name: item[row] for name, item in base.items()})
-        for row, time in enumerate(record.time)
-    ]
-
-
-def _part(observation: Observation, name: str) -> Array:
-    return np.asarray(getattr(observation, name))
+    fixed = vars(RobotState(time=0.0, q=q, v=v))
+    parts = {name: record.stacked(name, tuple(axes)) for name, axes in BASE.items()}
+    base = {name: np.tile(fixed[name], (len(q), 1)) if item is None else item for name, item in parts.items()}
+    return RobotState(time=record.time, q=q, v=v, **base)
 
 
 def _observed(record: ControlRecord, law: ControlLaw) -> tuple[dict[str, Array], list[str]]:
@@ -169,12 +173,10 @@ def _observation(record: ControlRecord, law: ControlLaw) -> LayerDifferences | s
     instants = states(record, law)
     if isinstance(instants, str):
         return instants
-    if not instants:
+    if not len(record.time):
         return "no row lies at an instant of the controller"
-    no_action = np.zeros((1, len(law.joints)))
-    last = np.tile(no_action, (len(instants), 1)) if actions is None else np.concatenate([no_action, actions[:-1]])
-    seen = [law.observed(state, action) for state, action in zip(instants, last, strict=True)]
-    computed = np.concatenate([np.stack([_part(item, name) for item in seen]) for name in recorded], axis=1)
+    seen = law.observed(instants, _before(actions, instants.q))
+    computed = np.concatenate([getattr(seen, name) for name in recorded], axis=1)
     return _compared(columns, record.time, np.concatenate([*recorded.values()], axis=1), computed)
 
 
@@ -187,14 +189,18 @@ def _actions(record: ControlRecord, law: ControlLaw) -> Array | str:
     if isinstance(instants, str):
         return instants
     recorded = record.stacked("action", law.joints)
-    last = np.zeros(len(law.joints))
-    actions = []
-    for row, state in enumerate(instants):
-        seen = law.observed(state, observed["last"][row] if "last" in observed else last)
-        seen = dataclasses.replace(seen, **{name: item[row] for name, item in observed.items()})
-        actions.append(np.clip(answer(seen), -law.clip, law.clip))
-        last = actions[-1] if recorded is None else recorded[row]
+    seen = vars(law.observed(instants, _before(recorded, instants.q))) | observed
+    actions: list[Array] = []
+    for row in range(len(record.time)):
+        last = {"last": law.factors[-1] * actions[-1]} if row and recorded is None and "last" not in observed else {}
+        observation = Observation(**{name: item[row] for name, item in seen.items()} | last)
+        actions.append(np.clip(answer(observation), -law.clip, law.clip))
     return np.array(actions)
+
+
+def _before(actions: Array | None, places: Array) -> Array:
+    """Actions of the instant before each one, zero at the first and where none is recorded, as many as places."""
+    return np.zeros(places.shape) if actions is None else np.concatenate([np.zeros((1, places.shape[1])), actions[:-1]])
 
 
 def _of_joints(

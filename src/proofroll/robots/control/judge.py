@@ -34,11 +34,13 @@ from proofroll.robots.control.controlled import ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
 from proofroll.robots.control.imported import MOST
 from proofroll.robots.control.layers import InAir, record_layers
-from proofroll.robots.control.record import FITTED, ControlRecord, Layer, read_record, record_of
+from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
 
 _Judged = tuple[StateReading, list[Layer]]
 _LAGS = ("late", "early")  # ids of rates at other rows
+_OF_JOINTS = {"instants", "target", "effort"}  # layers that are computed without the base, where actions are recorded
+_BASE = {name[:4] for name in BASE}
 _SAME_STEP = 1e-3  # part of the interval between rows by which the step of the program may differ from it
 
 
@@ -142,6 +144,7 @@ def judge_record(
     Raises:
         InputError: a file is wrong, or they do not fit.
     """
+    time = SearchTime(SEARCH_TIME)
     scenes = ControlledScenes(control)
     law_of = ControlLaw.of if control else ControlLaw.of_efforts
     stepwise, assumed = False, ""
@@ -155,10 +158,10 @@ def judge_record(
         driven = law_of(model.mechanism).joints
         if control and LAYOUTS[layout].from_refs and model.refs:
             _refuse_refs(control, model.refs)
-        time, columns = columns_of(record, arrays, layout, model.mechanism, driven, model.refs)
+        times, columns = columns_of(record, arrays, layout, model.mechanism, driven, model.refs)
         eps = [float(np.finfo(item.dtype).eps) for item in arrays.values() if item.dtype.kind == "f"]
         digits = max(eps, default=0.0) / 2
-        read = record_of(time, columns, record, digits=digits)
+        read = record_of(times, columns, record, digits=digits)
         usual = LAYOUTS[layout].step
         if "sim_dt" in arrays:
             stepwise = _are_steps(read, _step_of(record, arrays["sim_dt"]))
@@ -177,7 +180,7 @@ def judge_record(
 
     robots: dict[int, tuple[StateReading, InAir]] = {}  # by the identity of a reading, which they keep
 
-    def layers_of(reading: StateReading, time: SearchTime, imported: int = 0) -> list[Layer]:
+    def layers_of(reading: StateReading, within: SearchTime, imported: int = 0) -> list[Layer]:
         state_layers = [] if reading.layer is None else [reading.layer]
         if id(reading) not in robots:
             robots[id(reading)] = (
@@ -201,14 +204,16 @@ def judge_record(
                 names=names_of_layers,
                 stepwise=stepwise,
                 in_air=held,
-                time=time,
+                time=within,
             ),
         ]
 
     inertial = bool(layout) and LAYOUTS[layout].inertial and free
     frames = model.base_frames
     readings = framed_readings(read, law, frames) if inertial else state_readings(read, law)
-    reading, layers = _best_reading(readings, layers_of, () if inertial else frames, controlled=control is not None)
+    reading, layers = _best_reading(
+        readings, layers_of, () if inertial else frames, time, controlled=control is not None
+    )
     read = reading.record
     return RecordJudgement(
         record=str(record),
@@ -227,6 +232,7 @@ def _best_reading(
     readings: Sequence[StateReading],
     layers_of: Callable[..., list[Layer]],
     frames: Sequence[BaseFrame],
+    time: SearchTime,
     *,
     controlled: bool,
 ) -> _Judged:
@@ -239,9 +245,9 @@ def _best_reading(
         readings: by the state.
         layers_of: layers of a reading, for a time of the search.
         frames: frames that the record may have for its base.
+        time: of all searches.
         controlled: True if a controller's law tells the efforts.
     """
-    time = SearchTime(SEARCH_TIME)
     judged = _searched(readings, layers_of, time)
     plain = min(judged, key=_rank)
     silent: list[_Judged] = []
@@ -251,9 +257,17 @@ def _best_reading(
         return min([*judged, *(item for item in silent if not _open_layers(item[1]))], key=_rank)
 
     def try_rivals(rivals: Iterable[StateReading]) -> None:
-        """Adds readings that look at every layer that is open without them."""
-        trials = [(rival, layers_of(rival, time)) for rival in rivals]
-        silent.extend(item for item in trials if _open_layers(plain[1]) <= _looked_at(item[1]))
+        """Adds readings that look at every layer that is open without them.
+
+        Mistakes are searched for where forces are explained, and no layer is open that the readings leave as it is.
+        """
+        for rival in itertools.takewhile(lambda _: not time.over, rivals):
+            layers = layers_of(rival, SearchTime(0.0))
+            same = _OF_JOINTS if _differs_in_base(rival.record, plain[0].record) else set[str]()
+            if not _open_layers(layers) & ({"acceleration"} | (_open_layers(plain[1]) & same)):
+                layers = layers_of(rival, time)
+            if _open_layers(plain[1]) <= _looked_at(layers):
+                silent.append((rival, layers))
 
     if any(_open(plain)):
         in_degrees = [_beside(item, lambda record: filter(None, [reading_in_degrees(record)])) for item, _ in judged]
@@ -267,10 +281,15 @@ def _best_reading(
     if _unexplained_forces(best()[1]) or _open(best())[2]:
         candidates = sorted((rival for rival, _ in (*judged, *silent)), key=_count)
         by_state = {id(rival) for rival, _ in judged}
-        trials = _of_importers(candidates, partial(layers_of, time=time), time)
+        trials = _of_importers(candidates, partial(layers_of, within=time), time)
         silent.extend(item for item in trials if id(item[0]) not in by_state)
         judged = [*(item for item in trials if id(item[0]) in by_state), *judged]
     return best()
+
+
+def _differs_in_base(record: ControlRecord, rival: ControlRecord) -> bool:
+    """True if two records have the same columns but for those of the base."""
+    return all(rival.columns.get(name) is item for name, item in record.columns.items() if name[:4] not in _BASE)
 
 
 def _of_importers(

@@ -34,7 +34,7 @@ from proofroll.robots.control.bookkeeping.search import (
     explanations,
     largest,
 )
-from proofroll.robots.control.bookkeeping.together import LayerTrials, mistakes_together
+from proofroll.robots.control.bookkeeping.together import LayerTrials, may_close, mistakes_together
 from proofroll.robots.control.columns import action_mistakes
 from proofroll.robots.control.differences import (
     DIFFERENCES,
@@ -62,6 +62,7 @@ _DAMPED = "damping of joints acts at the velocity after the step, or they have a
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
 _HELPS = 0.1
+_FIRST = 12  # instants of a long record at which mistakes are tried before all of it
 _INSTANTS = 4  # least number of rows from which a pose is fitted beside another mistake
 
 
@@ -91,13 +92,17 @@ def record_layers(
     evidence = _Evidence(record, law, mechanism, in_air or InAir(HeldRobot.of(mechanism)))
     layers: list[Layer] = []
     time = time or SearchTime()
+    known = evidence.in_air.layers
     for name in names:
-        layer = _layer(name, evidence)
-        if not layer.holds:
-            skipped = {item.name for item in layers if item.residual is None}
-            layer = dataclasses.replace(layer, **_explained(layer, skipped, evidence, time))
-            if name == "observation" or (name == "action" and not layer.causes):
+        if name in known:
+            layer, record = known[name]
+            evidence = dataclasses.replace(evidence, record=record)
+        else:
+            layer = _layer(name, evidence, {item.name for item in layers if item.residual is None}, time)
+            if not layer.holds and (name == "observation" or (name == "action" and not layer.causes)):
                 layer, evidence = _of_columns(layer, evidence)
+            if layer.holds or not time.over:
+                known[name] = layer, evidence.record
         layers.append(layer)
     record = evidence.record
     if grounded:
@@ -122,6 +127,7 @@ class InAir:
         ranges: joint -> its limits [rad or m].
         assumed: clause on rows that are steps if the program has its usual ones; empty: they are not, or it is known.
         fits: of records to robots that were compared before, by their identities.
+        layers: that were judged before, each with the record without the mistakes of columns found so far.
     """
 
     held: HeldRobot
@@ -131,6 +137,7 @@ class InAir:
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: str = ""
     fits: dict[tuple[int, int], tuple[ControlRecord, StandingFit]] = field(default_factory=dict)
+    layers: dict[str, tuple[Layer, ControlRecord]] = field(default_factory=dict)
 
     def fit(self, record: ControlRecord, law: ControlLaw, robot: HeldRobot, efforts: Array) -> StandingFit:
         """Fit of a record to one of the robots, computed once: it hangs on no search."""
@@ -160,7 +167,8 @@ class _Evidence:
         return np.array(np.nan) if isinstance(compared, str) else (compared.difference / compared.sizes).ravel()
 
 
-def _layer(name: str, evidence: _Evidence) -> Layer:
+def _layer(name: str, evidence: _Evidence, skipped: Collection[str], time: SearchTime) -> Layer:
+    """A layer, with the mistakes that explain it if it does not hold; ``skipped``: those not looked at before it."""
     compared = evidence.difference(name)
     if not isinstance(compared, str) and not len(compared.time):
         compared = "no row that counts lies at an instant of the controller"
@@ -169,13 +177,15 @@ def _layer(name: str, evidence: _Evidence) -> Layer:
     bars = _bars(name, evidence, compared)
     parts = np.abs(compared.difference) / bars
     row, column = np.unravel_index(int(np.argmax(parts)), parts.shape)
-    return Layer(
+    layer = Layer(
         name=name,
         residual=abs(float(compared.difference[row, column])),
         bar=float(bars[column]),
         column=compared.columns[column],
         time=float(compared.time[row]),
     )
+    causes = {} if layer.holds else _explained(name, compared, bars, skipped, evidence, time)
+    return dataclasses.replace(layer, **causes)
 
 
 def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, stepwise: bool) -> Layer:
@@ -187,7 +197,7 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     fit, off_stops, remark = evidence.in_air.fit(record, law, evidence.in_air.held, efforts)
     if evidence.in_air.stepped is not None and not isinstance(fit, str) and fit.off > fit.bar:
         rival = evidence.in_air.fit(evidence.record, law, evidence.in_air.stepped, efforts)
-        if not isinstance(rival.fit, str) and rival.fit.off < fit.off:
+        if not isinstance(rival.fit, str) and rival.fit.left < fit.left:
             fit, off_stops, remark = rival
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
@@ -256,7 +266,7 @@ def _of_another_robot(
             continue
         if trial.off > trial.bar and not trial.causes:
             continue
-        left = min((cause.after for cause in trial.causes), default=trial.off)
+        left = trial.left
         if left > max(trial.bar, _HELPS * fit.off):  # a robot far from this one may be helped by anything
             continue
         further = bool(trial.causes)  # several of them are alternatives
@@ -286,48 +296,52 @@ def _bars(name: str, evidence: _Evidence, compared: LayerDifferences) -> Array:
     return np.asarray(_SAFETY * np.max(changes, axis=0) + ROUND_OFF * compared.sizes)
 
 
-def _explained(layer: Layer, skipped: Collection[str], evidence: _Evidence, time: SearchTime) -> dict[str, Any]:
+def _explained(
+    name: str, compared: LayerDifferences, bars: Array, skipped: Collection[str], evidence: _Evidence, time: SearchTime
+) -> dict[str, Any]:
     """Mistakes that leave a small part of a layer's residual, the best first, and how many were tried.
 
     Mistakes of the layers before it count where the record does not show these; ``skipped``: their names.
     """
-    compared = evidence.difference(layer.name)
-    assert not isinstance(compared, str)  # the layer was looked at
     order = list(LAYERS)
-    shown = [*(name for name in order[: order.index(layer.name)] if name in skipped), layer.name]
-    distance = _norm(evidence, layer.name, evidence.law)
-    rounding = float((_bars(layer.name, evidence, compared) / compared.sizes).max())
+    shown = [*(item for item in order[: order.index(name)] if item in skipped), name]
+    distance = _norm(evidence, name, evidence.law)
+    rounding = float((bars / compared.sizes).max())
     most = max(_HELPS * distance, min(rounding, 0.5 * distance))
 
+    right = evidence.left(name, evidence.law)
+
     def explanation(mistake: Mistake) -> MistakeExplanation | None:
-        left, size = best_size(mistake, evidence.law, partial(evidence.left, layer.name))
+        begun = (evidence.left(name, mistake.changed(evidence.law, size)) for size in mistake.starts)
+        if mistake.sized and all(left.shape == right.shape and largest(right[left == right]) > most for left in begun):
+            return None  # it does not change what is off
+        left, size = best_size(mistake, evidence.law, partial(evidence.left, name))
         if left > most:
             return None
 
         def left_by(size: float) -> float:
-            return _norm(evidence, layer.name, mistake.changed(evidence.law, size))
+            return _norm(evidence, name, mistake.changed(evidence.law, size))
 
         return bounded(MistakeExplanation(mistake, size, left), left_by, max(2 * left, rounding))
 
     candidates = [item for item in mistakes(evidence.law) if _shows(item, shown)]
     several, tried = explanations(candidates, explanation, time)
     ranked = [(item.rank, item.cause) for item in several]
-    if "target" in shown and not isinstance(offset := _offset(evidence, layer.name), str):
+    if "target" in shown and not isinstance(offset := _offset(evidence, name), str):
         ranked.append((2 * offset.after, offset))  # a pose has many numbers: a mistake with fewer goes before
     if all(item.after > rounding for item in several):
         ranked += [
-            ((1 + numbers) * cause.after, cause)
-            for numbers, cause in _fitted_causes(layer.name, compared, evidence, most)
+            ((1 + numbers) * cause.after, cause) for numbers, cause in _fitted_causes(name, compared, evidence, most)
         ]
     by_words: dict[str, LayerCause] = {}
     for _, cause in sorted(ranked, key=lambda item: item[0]):
         by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
     causes = [*by_words.values()]
-    if layer.name == "instants":
-        causes = causes or [*_missed(evidence)]
+    if name == "instants":
+        closing = [cause for cause in causes if cause.after <= rounding]
+        causes = closing or [*_missed(evidence, candidates)] or causes
     elif all(cause.after > rounding for cause in causes):
-        trials = _trials(layer.name, evidence, _bars(layer.name, evidence, compared))
-        together = mistakes_together(candidates, evidence.law, trials, time)
+        together = _together(name, candidates, evidence, bars, time)
         causes = causes if together is None else [together]
     closing = [cause for cause in causes if cause.after <= rounding]
     causes = closing or [_with_rest(cause, cause.after / distance) for cause in causes]
@@ -338,6 +352,20 @@ def _with_rest(cause: LayerCause, part: float) -> LayerCause:
     """A cause that says which part of the difference it leaves."""
     rest = f"{cause.sentence}; a cause is missing: {part:.2g} of the difference is left"
     return dataclasses.replace(cause, sentence=rest)
+
+
+def _together(
+    name: str, candidates: Sequence[Mistake], evidence: _Evidence, bars: Array, time: SearchTime
+) -> LayerCause | None:
+    """Cause that names mistakes which close a layer together; its first instants are looked at before the whole."""
+    law, trials, rows = evidence.law, _trials(name, evidence, bars), instant_rows(evidence.record, evidence.law)
+    if len(rows) > _FIRST:
+        begun = dataclasses.replace(evidence, record=evidence.record.part(np.arange(rows[_FIRST])))
+        first = _trials(name, begun, bars)
+        same = np.array_equal(first.parts(law) > 1, trials.parts(law) > 1)
+        if same and not may_close(candidates, law, first, time):
+            return None
+    return mistakes_together(candidates, law, trials, time)
 
 
 def _trials(name: str, evidence: _Evidence, bars: Array) -> LayerTrials:
@@ -436,20 +464,23 @@ def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:
     return dataclasses.replace(tried, causes=(cause,)), evidence
 
 
-def _missed(evidence: _Evidence) -> Iterator[LayerCause]:
-    """Instants at which the action before acts again, where all others have one."""
-    record, law = evidence.record, evidence.law
-    changes, due = instant_rows(record, law), due_rows(record, law)
-    period, times = 1 / law.rate, record.time
-    others = times[changes] * law.rate
-    if not len(due) or np.abs(others - np.round(others)).max() > SAME_TIME:
-        return
-    missed = [row for row in due.tolist() if np.abs(times[changes] - times[row]).min() > 0.5 * period]
-    if missed:
-        words = (
-            f"at {counted(len(missed), 'instants')}, first at {times[missed[0]]:.4g} s, the action before acts again"
-        )
-        yield LayerCause("repeated", words, None, 0.0)
+def _missed(evidence: _Evidence, candidates: Iterable[Mistake]) -> Iterator[LayerCause]:
+    """Instants at which the action before acts again, where all others have one, at the rate that misses fewest."""
+    record, times, trials = evidence.record, evidence.record.time, list[tuple[int, LayerCause]]()
+    rates = [
+        (item.id, f"{item.words}; and ", item.changed(evidence.law, 1.0)) for item in candidates if item.id == "rate"
+    ]
+    for name, words, law in [("", "", evidence.law), *rates]:
+        changes, due = instant_rows(record, law), due_rows(record, law)
+        others = times[changes] * law.rate
+        missed = [row for row in due.tolist() if np.abs(times[changes] - times[row]).min() > 0.5 / law.rate]
+        if missed and np.abs(others - np.round(others)).max() <= SAME_TIME:
+            when = f"at {counted(len(missed), 'instants')}, first at {times[missed[0]]:.4g} s"
+            cause = LayerCause(
+                " + ".join(filter(None, [name, "repeated"])), f"{words}{when}, the action before acts again", None, 0.0
+            )
+            trials.append((len(missed) + bool(name), cause))
+    yield from (cause for _, cause in sorted(trials, key=lambda item: item[0])[:1])
 
 
 def _offset(evidence: _Evidence, name: str) -> LayerCause | str:

@@ -52,7 +52,7 @@ def probe_start(path: Path, *, free: bool) -> ProbeStart:
     joints = {joint.name: joint for joint in robot.moving}
     starts = [_inside(joints[name], states.angle[name][0], states.velocity[name][0, 0]) for name in air.joints]
     q, v, accelerations = np.reshape(starts, (-1, 3)).T
-    M, inner, weight, _ = air.forces(*air.coordinates(q, v, base))
+    M, inner, weight, *_ = air.forces(*air.coordinates(q, v, base))
     moved = air.places[:, 1]
     efforts = []
     for part in (0.0, 1.0):

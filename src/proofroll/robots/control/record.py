@@ -27,7 +27,7 @@ _MANY = 30  # different values that agree in their decimals by no accident
 _DECIMALS = 8  # most decimals of a file that is written with a fixed number of them
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ControlRecord:
     """Columns of a record over time, in SI units.
 

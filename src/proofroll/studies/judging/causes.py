@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES
 from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, mistaken_rate
-from proofroll.core.number_format import number, spaced
+from proofroll.core.number_format import be, number, spaced
 
 _DEGREE = np.pi / 180
 # Unit -> factors by which numbers in another unit or sign differ, each with a clause and the unit of a length or angle
@@ -115,7 +115,7 @@ def begun_later(variables: Mapping[str, GivenVariable], from_start: Mapping[str,
     name = max(wrong, key=lambda name: variables[name].off / (variables[name].way or 1.0))
     unit, off, left = spaced(variables[name].unit), number(variables[name].off), number(from_start[name].off, 1)
     return (
-        f"the record is late by {begin:.4g} s (its clock begins then, with the scene's start: {name} is off by "
+        f"the record is late by {begin:.4g} s (its clock begins then, with the scene's start: {name} {be(name)} off by "
         f"{off}{unit}, by {left}{unit} with that)"
     )
 

@@ -16,7 +16,7 @@ from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.element_abilities import MovesFreely, step_bound
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.multi_element import REQUIRED
-from proofroll.core.number_format import number, spaced
+from proofroll.core.number_format import be, number, spaced
 from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
@@ -68,7 +68,8 @@ class Compared:
         unit = spaced(judgement.unit)
         when = "" if self.at is None else f" at {self.at:.4g} s"
         error, allowed = number(judgement.error, 3), number(judgement.tolerance, 3)
-        difference = f"{judgement.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
+        quantity = f"{judgement.observable} {be(judgement.observable)}"
+        difference = f"{quantity} off by {error}{unit}{when}, allowed {allowed}{unit}"
         if not np.isfinite(judgement.error):
             counts = judgement.reason.removeprefix("the question is ill-posed here; ").partition(";")[0]
             unlike = f"has {counts}" if " values, the truth has " in counts else f"is not finite{self.lost}"

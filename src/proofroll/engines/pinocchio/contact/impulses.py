@@ -17,7 +17,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import ONE_POINT, Touching, touch
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, ALL_SHAPES, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK
@@ -40,6 +40,7 @@ _CAPABILITY = MechanismCapability
 PROVIDES: frozenset[str] = (
     ALL_JOINTS
     | FORCES
+    | ALL_SHAPES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
     | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
     | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
@@ -425,8 +426,10 @@ class ImpulseSteps:
         """Impulses as by :meth:`_found`, or by blocks, which go first from where Pinocchio's ADMM stopped.
 
         Raises:
-            Diverged: neither finds them.
+            Diverged: neither finds them, or a velocity is not finite.
         """
+        if not (np.isfinite(g).all() and np.isfinite(G).all()):
+            raise Diverged(f"the state is not finite at t = {self.t:.6g} s")
         if not self.blocks.solved:
             try:
                 return self._found(which, G, g, terms, span, convex=convex)

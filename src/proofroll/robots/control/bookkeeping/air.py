@@ -9,13 +9,13 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import classical_step
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates, Solution
+from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion
 from proofroll.elements.mechanism.dynamics.switches import held_joints
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.policy import Observation
@@ -100,6 +100,24 @@ class HeldRobot:
         return cls(mechanism, tuple(links))
 
 
+class AirForces(NamedTuple):
+    """Forces of a robot in the air in a state, along its velocities.
+
+    Attributes:
+        mass: mass matrix, (nv, nv).
+        inertial: forces of inertia and of the joints' own laws, (nv).
+        weight: (nv).
+        free: directions that loops and couplings allow, (nv, freedoms).
+        motion: of the bodies.
+    """
+
+    mass: Array
+    inertial: Array
+    weight: Array
+    free: Array
+    motion: BodyMotion
+
+
 class AirRobot:
     """Equations of a robot without its servos, and the places of joints in its coordinates.
 
@@ -140,10 +158,6 @@ class AirRobot:
             damping[place] = joint.damping
         return damping
 
-    @cached_property
-    def _weightless(self) -> JointCoordinates:
-        return JointCoordinates(replace(self.mechanism, gravity=(0.0, 0.0, 0.0)), self.equations.rank)
-
     def solved(self, q: Array, v: Array, efforts: Array) -> Solution:
         """Accelerations under efforts of the joints [N m], where friction and stops hold joints at rest if they can."""
         joints, load = self.equations.switched, self.load(efforts)
@@ -163,14 +177,19 @@ class AirRobot:
             for number, force in beyond:
                 mode[number] = joints[number].moving(-force)
 
-    def forces(self, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
-        """Mass matrix, forces of inertia, weight (nv), and directions that loops and couplings allow (nv, freedoms)."""
-        weightless = self._weightless.solve(q, v)
-        M = self.equations.inertial(weightless.motion)[1]
-        inertial = M @ weightless.acceleration
-        weight = M @ self.equations.solve(q, v).acceleration - inertial
-        free = null_space(self.equations.rows(q).C) if self.equations.rank else np.eye(len(M))
-        return M, inertial, weight, free
+    @cached_property
+    def _weights(self) -> Array:
+        """Weights of the bodies in world axes [N], (bodies, 3)."""
+        return np.outer([body.mass for body in self.mechanism.bodies], self.mechanism.gravity)
+
+    def forces(self, q: Array, v: Array) -> AirForces:
+        """Forces of the robot in a state without efforts."""
+        solution = self.equations.solve(q, v)
+        J, M, _ = self.equations.inertial(solution.motion)
+        weight = np.einsum("bi,bij->j", self._weights, J[:, :3])
+        rank = self.equations.rank
+        free = np.linalg.svd(solution.rows.C)[2][rank:].T if rank else np.eye(len(M))
+        return AirForces(M, M @ solution.acceleration - weight, weight, free, solution.motion)
 
     def coordinates(self, q: Array, v: Array, base: Array | None) -> tuple[Array, Array]:
         """Coordinates and velocities of the mechanism.
@@ -198,9 +217,9 @@ class AirRobot:
         return replace(state, p_WB=pose[:3], q_WB=pose[3:], v_WB=R @ twist[:3], w_WB=R @ twist[3:])
 
     def load(self, efforts: Array) -> Array:
-        """Efforts of the driven joints along all velocities, (nv)."""
-        load = np.zeros(self.mechanism.nv)
-        load[self.driven[:, 1]] = efforts
+        """Efforts of the driven joints along all velocities; arrays have the joints, or the velocities, last."""
+        load = np.zeros((*efforts.shape[:-1], self.mechanism.nv))
+        load[..., self.driven[:, 1]] = efforts
         return load
 
 

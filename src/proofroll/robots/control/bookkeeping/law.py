@@ -29,6 +29,8 @@ SCALED = ("q", "v", "v_WB_W", "w_WB_B", "last")  # parts of an observation that 
 class RobotState:
     """State of a robot at a time, SI units; W is the world, B the frame of the base, which is by default the world's.
 
+    Arrays of several states have these first.
+
     Attributes:
         time: [s].
         q, v: coordinates and rates of the driven joints, in the controller's order.
@@ -38,7 +40,7 @@ class RobotState:
         w_WB: its angular velocity in world axes [rad/s], shape (3,).
     """
 
-    time: float
+    time: Any
     q: Array
     v: Array
     p_WB: Array = dataclasses.field(default_factory=lambda: np.zeros(3))
@@ -201,23 +203,23 @@ class ControlLaw:
         return None if self.policy is None else self.policy.made(self.joints)
 
     def observed(self, state: RobotState, last: Array) -> Observation:
-        """Observation of a state, ``last`` being the action before."""
+        """Observation of a state, ``last`` being the action before; or of several states at once."""
         quaternion = state.q_WB * [1, -1, -1, -1] if self.conjugated else state.q_WB
-        R = Rotation.from_quat(np.roll(quaternion, -self.scalar_last), scalar_first=True).as_matrix()
-        R = R.T if self.turned_back else R
+        R = Rotation.from_quat(np.roll(quaternion, -self.scalar_last, axis=-1), scalar_first=True).as_matrix()
+        R = np.swapaxes(R, -1, -2) if self.turned_back else R
         body = Rotation.from_quat(state.q_WB, scalar_first=True).as_matrix()
         order = self._entries[1]
         q, v, velocity, spin, action_factor = self.factors
         moving = state.v_WB + self.at_centre * np.cross(state.w_WB, body @ self.centre)
         return Observation(
             time=state.time,
-            q=q * (state.q + self.pose_observed * self.pose)[order],
-            v=v * state.v[order],
+            q=q * (state.q + self.pose_observed * self.pose)[..., order],
+            v=v * state.v[..., order],
             p_WB=state.p_WB,
             R_WB=R,
-            v_WB_W=velocity * (_turned(body, self.velocity_turns) @ moving),
-            w_WB_B=spin * (_turned(body, self.spin_turns) @ state.w_WB),
-            gravity_B=self.gravity_sign * (R.T @ self.down),
+            v_WB_W=velocity * _turned(body, self.velocity_turns, moving),
+            w_WB_B=spin * _turned(body, self.spin_turns, state.w_WB),
+            gravity_B=self.gravity_sign * (np.swapaxes(R, -1, -2) @ self.down),
             last=action_factor * last,
         )
 
@@ -265,6 +267,7 @@ class ControlLaw:
         return np.asarray(self.effort_factor * np.clip(unclamped, -self.limit, self.limit))
 
 
-def _turned(body: Array, turns: int) -> Array:
-    """Matrix that turns a vector so many times from the world's axes to those of the body, or back."""
-    return np.linalg.matrix_power(body.T if turns > 0 else body, abs(turns))
+def _turned(body: Array, turns: int, vector: Array) -> Array:
+    """Vector that is turned so many times from the world's axes to those of the body, or back."""
+    R = np.linalg.matrix_power(np.swapaxes(body, -1, -2) if turns > 0 else body, abs(turns))
+    return np.asarray((R @ vector[..., None])[..., 0])

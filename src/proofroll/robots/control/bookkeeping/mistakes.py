@@ -39,7 +39,7 @@ _STANDARD = 9.81  # m/s², by which an observed direction is no unit vector
 _TOLD = 1e-3  # least part of the largest offset of a pose that is told
 
 
-SEARCH_TIME = 10.0  # processor seconds after which a search ends
+SEARCH_TIME = 8.0  # processor seconds after which searches end; what was begun takes one or two more
 
 
 LawChange = Callable[[ControlLaw, float], ControlLaw]  # law, size -> law with a mistake

@@ -53,7 +53,7 @@ class MistakeScreen:
         self.law, self.step, self.stride = law, step, stride
         self._robot = AirRobot.bare(mechanism, law)
         self._states, self._coupled = [*self._between(q, v)], bool(self._robot.equations.rank)
-        forces = zip(*(self._robot.forces(*state) for state in self._states[:-1]), strict=True)
+        forces = zip(*(self._robot.forces(*state)[:4] for state in self._states[:-1]), strict=True)
         self._mass, self._inertial, self._weight, self._free = map(np.array, forces)
         self._roots = np.linalg.cholesky(self._mass[::stride])
         self._seen = v[1:]

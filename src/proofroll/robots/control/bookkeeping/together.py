@@ -64,6 +64,11 @@ def mistakes_together(
     return LayerCause(" + ".join(item.mistake.id for item in several), sentence, None, residual)
 
 
+def may_close(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, time: SearchTime) -> bool:
+    """True if one mistake or more close every column."""
+    return bool(_one_by_one(candidates, law, trials, time) or _pair(candidates, law, trials, time)) or time.over
+
+
 def _one_by_one(
     candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, time: SearchTime
 ) -> Sequence[_Told]:
@@ -71,7 +76,9 @@ def _one_by_one(
     several: list[_Told] = []
     while (wrong := trials.parts(law) > 1).any() and len(several) < _MOST and not time.over:
         rest = [item for item in candidates if item.id not in {before.mistake.id for before in several}]
-        steps = [(closed, item) for item in _sized(rest, law, trials) if (closed := _closed(item, trials, wrong))]
+        changed = _changed(rest, law, trials)
+        near = [item for item in rest if np.any(changed[item.words] & wrong)]
+        steps = [(closed, item) for item in _sized(near, law, trials) if (closed := _closed(item, trials, wrong))]
         more = [max(steps, key=lambda step: (step[0], -step[1].numbers))[1]] if steps else []
         if not more and several:
             more = _pair(rest, law, trials, time)
@@ -90,17 +97,29 @@ def _closed(item: _Told, trials: LayerTrials, wrong: Flags) -> int:
 def _pair(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, time: SearchTime) -> list[_Told]:
     """Two mistakes that close every column, with the fewest fitted numbers; empty where none are found."""
     best: list[_Told] = []
-    wrong = trials.parts(law) > 1
+    wrong, changed = trials.parts(law) > 1, _changed(candidates, law, trials)
+    candidates = [item for item in candidates if changed[item.words].any()]
     for first in _known(candidates, law):
         if not np.all(trials.parts(first.law)[~wrong] <= 1):
             continue
-        others = [item for item in candidates if item.id != first.mistake.id]
+        beside = wrong & ~changed[first.mistake.words]
+        others = [item for item in candidates if item.id != first.mistake.id and np.all(changed[item.words][beside])]
         for second in itertools.chain(_sized(others, first.law, trials), _fitting(first.law, trials)):
             if time.over:
                 return best
             if np.all(trials.parts(second.law) <= 1) and (not best or second.numbers < best[1].numbers):
                 best = [first, second]
     return best
+
+
+def _changed(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials) -> dict[str, Flags]:
+    """Words of each mistake -> True at columns that it changes: a column that two leave as it is, they do not close."""
+    right = trials.parts(law)
+    sizes = ((item, item.starts if item.sized else (1.0,)) for item in candidates)
+    return {
+        item.words: np.any([trials.parts(item.changed(law, size)) != right for size in starts], axis=0)
+        for item, starts in sizes
+    }
 
 
 def _known(candidates: Sequence[Mistake], law: ControlLaw) -> Iterator[_Told]:
