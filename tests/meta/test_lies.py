@@ -164,8 +164,8 @@ UNASKED = [
     ("loop", "quaternions of another body", "q_WB is"),
     ("rolls", "v + 7 m/s between samples", "v_WB is"),
     ("rolls", "spins x 3 between samples", "w_WB is"),
-    ("tree", "moments + 5 N m", "torques is"),
-    ("bounces", "right on the grid alone, an impact in each interval", "positions is"),
+    ("tree", "moments + 5 N m", "torques are"),
+    ("bounces", "right on the grid alone, an impact in each interval", "positions are"),
     ("slips", "nothing", "not judged: event_times, event_order; no tolerance is given for it"),
 ]
 

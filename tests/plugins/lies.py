@@ -55,13 +55,13 @@ def echo(_: Any, true: Any) -> Any:
 
 # Texts of verdicts, of which one must appear; further below, those of causes.
 _PLACES, _FIRST, _MODEL = (
-    ("positions is", "z is", "gamma is"),
+    ("positions are", "z is", "gamma is"),
     ("first steps",),
     ("differs from the scene", "does not say"),
 )
-_V, _W, _Q = ("v_WB",), ("w_WB",), ("q_WB", "attitude is", "attitudes is")
-_FORCES = ("N is", "F3 is", "forces is")
-_EVENTS = ("event_times is", "event_times has", "first_slip is", "first_slip has", "event_order is", "creep is")
+_V, _W, _Q = ("v_WB",), ("w_WB",), ("q_WB", "attitude is", "attitudes are")
+_FORCES = ("N is", "F3 is", "forces are")
+_EVENTS = ("event_times are", "event_times has", "first_slip is", "first_slip has", "event_order is", "creep is")
 ORDER = ("event_order is",)  # no error in a quantity
 _TURNED = ("rolls", *MECHANISMS, "sled")
 _STATE, _WRENCH = ("p_WB", "v_WB", "w_WB", "q_WB"), ("joint_force", "joint_torque")
@@ -203,7 +203,7 @@ def _reactions_of_joints() -> Iterator[Lie]:
     yield Lie("reactions of a servo 3 ms late", ("servo",), _FORCES, late, ("0.00287 s late",))
     yield Lie("reactions not finite", MECHANISMS, _FORCES, each(lambda m, name: np.nan * getattr(m.right, name)))
     yield Lie("no reactions", MECHANISMS, _FORCES, each(lambda *_: None), begins=0.0)
-    yield Lie("moments + 5 N m", MECHANISMS, ("torques is",), lambda m: {"joint_torque": m.right.joint_torque + 5})
+    yield Lie("moments + 5 N m", MECHANISMS, ("torques are",), lambda m: {"joint_torque": m.right.joint_torque + 5})
 
 
 def _efforts() -> Iterator[Lie]:
@@ -223,7 +223,7 @@ def _forces_of_contacts() -> Iterator[Lie]:
         return Lie(
             name,
             ("sled",),
-            ("contact_forces is", "this trajectory has"),
+            ("contact_forces are", "this trajectory has"),
             lambda m: {"contact_force": change(m)},
             causes,
         )
@@ -400,7 +400,7 @@ def _further_impacts() -> Iterator[Lie]:
     yield Lie(
         "contacts + 0.02 of the largest upwards",
         ("sled",),
-        ("contact_forces is", "normal_forces is"),
+        ("contact_forces are", "normal_forces are"),
         lambda m: {"contact_force": m.right.contact_force + 0.02 * np.abs(m.right.contact_force).max() * np.eye(3)[2]},
     )
     yield Lie("brackets not finite", both, ("has the bracket nan to inf s",), events=_each(**unbounded))
@@ -457,7 +457,7 @@ def _parts_of_motion() -> Iterator[Lie]:
               lambda m: {"v_WB": turned.apply(m.right.v_WB)})  # fmt: skip
     yield Lie("v of the last body x 1.01", ("tree", "loop", "driven", "servo"), _V,
               lambda m: {"v_WB": of_last(m, "v_WB", 1.01)}, _FACTOR)  # fmt: skip
-    yield Lie("one joint's reactions x 1.02", ("tree", "loop", "driven", "servo"), (*_FORCES, "torques is"),
+    yield Lie("one joint's reactions x 1.02", ("tree", "loop", "driven", "servo"), (*_FORCES, "torques are"),
               lambda m: {name: of_last(m, name, 1.02) for name in _WRENCH}, _FACTOR)  # fmt: skip
     yield Lie("places as texts", rest, ("real numbers",), lambda m: {"p_WB": np.asarray(m.right.p_WB).astype(str)})
 
@@ -487,7 +487,7 @@ def _of_one_body_or_sum() -> Iterator[Lie]:
     yield Lie("the first body half a hundredth further", ("tree", "driven", "loop", "servo"), ("p_WB is",),
               first_elsewhere)  # fmt: skip
     yield Lie("quaternions of the first body for all", ("loop",), _Q, first_for_all)
-    yield Lie("contacts that share their sum evenly", ("sled",), ("contact_forces is", "normal_forces is"), evenly)
+    yield Lie("contacts that share their sum evenly", ("sled",), ("contact_forces are", "normal_forces are"), evenly)
 
 
 def table() -> list[Lie]:

@@ -182,7 +182,8 @@ def test_json(proofroll: Proofroll) -> None:
     assert (code, found["kind"], found["name"]) == (0, "scene", "sphere_in_cylinder")
     assert Path(found["path"]).is_file()
     assert found["counts"]["[[balls]]"] == 1
-    assert found["requires"] == ["contact between bodies", "contacts that never slip (friction = inf)"]
+    of_contact = ["contact between bodies", "contact of spheres", "contact with bores"]
+    assert found["requires"] == [*of_contact, "contacts that never slip (friction = inf)"]
 
 
 def broken(tmp_path: Path, name: str, old: str, new: str) -> str:

@@ -13,7 +13,7 @@ from proofroll.cli.command_groups import GROUPS, NOW
 
 ROOT = Path(__file__).parents[3]
 # Commands of packages that may be lacking.
-_PACKAGES = {name: ROOT / name for name in ("fuzz", "throughput")}
+_PACKAGES = {name: ROOT / name for name in ("balance", "fuzz", "throughput")}
 Proofroll = Callable[..., tuple[int, str, str]]
 
 

@@ -68,12 +68,12 @@ class Compared:
         unit = spaced(judgement.unit)
         when = "" if self.at is None else f" at {self.at:.4g} s"
         error, allowed = number(judgement.error, 3), number(judgement.tolerance, 3)
-        quantity = f"{judgement.observable} {be(judgement.observable)}"
-        difference = f"{quantity} off by {error}{unit}{when}, allowed {allowed}{unit}"
+        quantity, verb = judgement.observable, be(judgement.observable)
+        difference = f"{quantity} {verb} off by {error}{unit}{when}, allowed {allowed}{unit}"
         if not np.isfinite(judgement.error):
             counts = judgement.reason.removeprefix("the question is ill-posed here; ").partition(";")[0]
-            unlike = f"has {counts}" if " values, the truth has " in counts else f"is not finite{self.lost}"
-            difference = f"{judgement.observable} {unlike}{when}"
+            unlike = f"has {counts}" if " values, the truth has " in counts else f"{verb} not finite{self.lost}"
+            difference = f"{quantity} {unlike}{when}"
         bar = f"the truth is known to {number(judgement.truth_error_bar)}{unit}"
         if judgement.verdict is Verdict.NOT_JUDGED:
             bar = f"not judged, for {bar} only"
