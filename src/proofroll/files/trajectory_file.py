@@ -15,7 +15,7 @@ import zipfile
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -191,10 +191,10 @@ def read_columns(path: Path) -> Columns:
     """
     content = ordinary_content(path)
     what = f"{path} is no stored trajectory"
-    _require_rows(content, what)
-    with reading(what), np.load(io.BytesIO(content), allow_pickle=False) as file:
-        about, attrs = map(dict, json.loads(file[_ABOUT]))
-        variables = {name: Variable(tuple(dims), file[name], dict(its)) for name, (dims, its) in about.items()}
+    arrays = _arrays(content, what)
+    with reading(what), zipfile.ZipFile(io.BytesIO(content)) as archive:
+        about, attrs = map(dict, json.loads(archive.read(_ABOUT)))
+        variables = {name: Variable(tuple(dims), arrays[name], dict(its)) for name, (dims, its) in about.items()}
     return Columns(variables, attrs)
 
 
@@ -209,29 +209,43 @@ def read_arrays(path: Path, times: str = "time") -> dict[str, npt.NDArray[Any]]:
         OSError, ValueError: the file cannot be read, has another format, or an array other rows.
     """
     content = ordinary_content(path)
-    what = f"{path.name} is no file of numpy's arrays"
-    _require_rows(content, what, times)
-    with reading(what), np.load(io.BytesIO(content), allow_pickle=False) as file:
-        return dict(file)
+    return _arrays(content, f"{path.name} is no file of numpy's arrays", times)
 
 
-def _require_rows(content: bytes, what: str, times: str = "") -> None:
-    """Raises ValueError if a header promises what does not follow, or other rows than the times; nothing is unpacked.
+def _arrays(content: bytes, what: str, times: str = "") -> dict[str, npt.NDArray[Any]]:
+    """Arrays of a file of numpy by name, whose headers are parsed once for all that are alike.
 
-    numpy would ask for the memory that a header promises.
+    Raises:
+        ValueError: a header promises what does not follow, whose memory numpy would ask for, or other rows than times.
     """
-    shapes = {}
+    arrays, lacking = dict[str, npt.NDArray[Any]](), ""
     with reading(what), zipfile.ZipFile(io.BytesIO(content)) as archive:
-        readers = {(1, 0): np.lib.format.read_array_header_1_0}
         for entry in [item for item in archive.infolist() if item.filename.endswith(".npy")]:
-            with archive.open(entry) as array:
-                version = np.lib.format.read_magic(array)
-                shape, _, kind = readers.get(version, np.lib.format.read_array_header_2_0)(array)
-                shapes[entry.filename.removesuffix(".npy")] = shape, kind.itemsize, entry.file_size
-    for name, (shape, size, follow) in shapes.items():
-        promised = math.prod(shape)
-        if promised * size > follow:
-            raise ValueError(f"the header of {name} promises {promised:.3g} numbers, which do not follow")
-        rows = shapes[times][0] if times in shapes else shape
-        if shape[:1] != rows[:1]:
-            raise ValueError(f"{name} has the shape {shape}; give one row for each of {rows[0] if rows else 1} times")
+            name = entry.filename.removesuffix(".npy")
+            with archive.open(entry) as file:
+                version = np.lib.format.read_magic(file)
+                size = file.read(2 if version == (1, 0) else 4)
+                shape, by_columns, kind = _header(version, size + file.read(int.from_bytes(size, "little")))
+                if math.prod(shape) * kind.itemsize > entry.file_size:
+                    lacking = f"the header of {name} promises {math.prod(shape):.3g} numbers, which do not follow"
+                    break
+                arrays[name] = np.ndarray(shape, kind, bytearray(file.read()), order="F" if by_columns else "C")
+    if lacking:
+        raise ValueError(lacking)
+    for name, array in arrays.items():
+        rows = arrays[times].shape if times in arrays else array.shape
+        if array.shape[:1] != rows[:1]:
+            raise ValueError(
+                f"{name} has the shape {array.shape}; give one row for each of {rows[0] if rows else 1} times"
+            )
+    return arrays
+
+
+@lru_cache(maxsize=1000)
+def _header(version: tuple[int, int], text: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, order by columns, and type of an array, by its header in a version of numpy's format."""
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, by_columns, kind = read(io.BytesIO(text))
+    if kind.hasobject:
+        raise ValueError("it holds objects, which only Python could load")
+    return shape, by_columns, kind

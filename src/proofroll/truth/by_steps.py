@@ -21,7 +21,7 @@ from proofroll.core.dataset import BARS, BY_STEPS, CONTINUOUS, ENDED, ENDS, HORI
 from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.core.events import Event, with_events
-from proofroll.core.multi_element import copied, events_of_engine, watch_events
+from proofroll.core.multi_element import copied, events_of_engine, sample_of, watch_events
 from proofroll.core.number_format import number
 from proofroll.core.pace import PACE, OutOfTime
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
@@ -143,7 +143,7 @@ def _twins(element: MechanismElement, times: FloatArray, step: float, engine: st
             joints.append(replace(joint, q0=tuple(moved.tolist())))
         twins.append(replace(element, mechanism=replace(mechanism, joints=tuple(joints))))
     try:
-        return [_run(twin, times, step, engine) for twin in twins]
+        return [_run(twin, times, step, engine, places=True) for twin in twins]
     except (Missing, Refused, Diverged):
         return []
 
@@ -187,7 +187,13 @@ def _steps(element: MechanismElement) -> list[float]:
 
 
 def _run(
-    element: MechanismElement, times: FloatArray, step: float, engine_name: str, before: float = 0.0
+    element: MechanismElement,
+    times: FloatArray,
+    step: float,
+    engine_name: str,
+    before: float = 0.0,
+    *,
+    places: bool = False,
 ) -> _SteppedRun:
     """Run of a mechanism in an engine with one step; between two steps its variables are interpolated.
 
@@ -197,6 +203,7 @@ def _run(
         step: its length [s].
         engine_name: ``name[formulation=…]``.
         before: number of steps of the runs before it.
+        places: True for the places of bodies alone.
     """
     scene = Scene(name=element.name, title=element.name, elements=(element,))
     spec = parse_engine(engine_name)
@@ -220,7 +227,13 @@ def _run(
     whole, counts = len(samples) == len(counts), counts[: len(samples)]
     told = whole_steps + (part > 0) <= counts[-1]
     times, whole_steps, part = times[told], whole_steps[told], part[told]
-    columns = columns_of(scene, counts * step, samples)
+    if places:
+        p_WB = Variable(
+            ("time", "body", "xyz"), np.array([sample_of(scene, element, sample).p_WB for sample in samples])
+        )
+        columns = Columns({"time": Variable(("time",), counts * step), "p_WB": p_WB})
+    else:
+        columns = columns_of(scene, counts * step, samples)
     first, last = np.searchsorted(counts, whole_steps), np.searchsorted(counts, whole_steps + (part > 0))
     variables = {}
     for key, item in columns.variables.items():

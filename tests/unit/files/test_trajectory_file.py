@@ -17,7 +17,7 @@ from proofroll.core.columns import Columns
 from proofroll.core.errors import ProofrollError
 from proofroll.core.events import Event, with_events
 from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import StoredTrajectory, read, read_columns, write
+from proofroll.files.trajectory_file import StoredTrajectory, read, read_arrays, read_columns, write
 from proofroll.running.simulation import simulate
 
 VALUES = np.array([5e-324, -0.0, 1.7976931348623157e308, np.nan, -np.inf, 0.1, 9.969209968386869e36])
@@ -111,6 +111,19 @@ def test_another_file_is_no_trajectory(tmp_path: Path, content: bytes, ending: s
     file.write_bytes(content)
     with pytest.raises(ValueError, match="netCDF" if ending == ".nc" else "no stored trajectory"):
         read(file)
+
+
+def test_arrays_are_numbers_and_texts(tmp_path: Path) -> None:
+    """Arrays of numpy come back as they are, by columns, empty or compressed; objects are refused."""
+    path, columns = tmp_path / "run.npz", np.asfortranarray(np.arange(6.0).reshape(2, 3))
+    arrays = {"time": np.arange(2.0), "columns": columns, "texts": np.array(["a", "bc"]), "empty": np.zeros((2, 0))}
+    np.savez_compressed(path, **arrays)
+    for name, values in read_arrays(path).items():
+        np.testing.assert_array_equal(values, arrays.pop(name), strict=True)
+    assert not arrays
+    np.savez(path, time=np.arange(2.0), objects=np.array([None, 1], dtype=object))
+    with pytest.raises(ValueError, match="it holds objects"):
+        read_arrays(path)
 
 
 def test_a_damaged_file_is_no_trajectory(tmp_path: Path) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism.scene import checks
 from proofroll.elements.mechanism.scene.joint import Joint
 from proofroll.elements.mechanism.scene.joint_kinds import LAWS
-from proofroll.elements.mechanism.scene.signal import Formula, Table, checked, value_at
+from proofroll.elements.mechanism.scene.signal import Formula, Held, Table, checked, value_at
 
 ActuatorKind = Literal["torque", "velocity", "position"]
 # Gains of each kind.
@@ -107,6 +108,15 @@ class Actuator:
             return -self.bound if mode == "least" else self.bound
         free = float(self.wanted(time, q, v, functions))
         return free if mode == "linear" else min(max(free, -self.bound), self.bound)
+
+    def law(self) -> Callable[[float, float, float], float]:
+        """:meth:`effort` at a time, coordinate and rate, with its numbers at hand: Exudyn asks it 100 times a step."""
+        if self.kind != "position":
+            return self.effort
+        n, bound, target = self.gear, self.bound, self.target
+        spring, damper = n * self.kp, n * n * self.kd
+        at = target.at if isinstance(target, Table | Held) else partial(value_at, target)
+        return lambda t, q, v: min(max(float(spring * (at(t) - n * q) - damper * v), -bound), bound)
 
     def mode(self, time: float, q: float, v: float) -> str:
         """Mode, of :data:`MODES`, at a time [s], for coordinate and rate of the joint."""

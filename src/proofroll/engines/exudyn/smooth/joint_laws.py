@@ -124,7 +124,7 @@ class JointLaws:
     def _acting(self, actuator: Actuator) -> Any:
         """Adds an actuator: a spring and damper if its law is linear and constant, else a user function."""
         if actuator.kind != "position" or actuator.limit is not None or varies(actuator.target):
-            return self._pushing(actuator.joint, actuator.effort)
+            return self._pushing(actuator.joint, actuator.law())
         n = actuator.gear
         return self._system.AddObject(
             items.ObjectConnectorCoordinateSpringDamper(

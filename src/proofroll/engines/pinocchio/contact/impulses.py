@@ -322,8 +322,7 @@ class ImpulseSteps:
         count, dt, speeds = len(terms.touching), self._dt, (terms.rows @ v).tolist()
         begin, shifts = count + len(self.joints.friction), [0.0] * len(speeds)
         gaps = [math.inf if touch.absent else touch.gap for touch in terms.touching]
-        numbered = [*enumerate(gaps), *enumerate((item.gap(q) for item in self.joints.stops), begin)]
-        for k, gap in numbered:
+        for k, gap in [*enumerate(gaps), *enumerate((item.gap(q) for item in self.joints.stops), begin)]:
             row = self._rows[k][-1]
             e, approach, bend = self._returned[k], speeds[row], abs(turning[k][2]) if k < count else 0.0
             hits = e and -e * approach > _SOFT * (self._gravity * dt + bend)
@@ -337,8 +336,7 @@ class ImpulseSteps:
             else:
                 hits = hits and gap + dt * (approach - dt * self._gravity) <= 0
                 shifts[row] = e * approach if hits else gap / dt
-            if hits and k < count and self.contacts[k].tangential_restitution:
-                rebound = self.contacts[k].tangential_restitution
+            if hits and k < count and (rebound := self.contacts[k].tangential_restitution):
                 shifts[row - 2 : row] = rebound * speeds[row - 2], rebound * speeds[row - 1]
         return shifts
 
@@ -390,10 +388,9 @@ class ImpulseSteps:
         while True:
             closing = set[int]()
             for k in gaps:
-                own = own_rows[k]
-                of_row = speeds[own[0] : own[-1] + 1]
+                of_row = [speeds[row] for row in own_rows[k]]
                 # a speed that is round-off of its rows would be the unit of impulses, in which slips are huge
-                if of_row[-1] + shifts[own[-1]] < -_SMALL * max(map(abs, of_row)):
+                if of_row[-1] + shifts[own_rows[k][-1]] < -_SMALL * max(map(abs, of_row)):
                     closing.add(k)
             if not grown and closing.issubset(which):
                 driving = alone - motor_responses.T @ pushed if alone.size else alone

@@ -163,7 +163,7 @@ class JointTree:
             for joint, columns in zip(joints, self.mechanism.v_slices, strict=True)
             if varies(joint.torque)
         ]
-        self._actuators = [(item, *self.mechanism.place_of(item.joint)) for item in self.mechanism.actuators]
+        self._actuators = [(item.law(), *self.mechanism.place_of(item.joint)) for item in self.mechanism.actuators]
         self.varies, self.now = any(map(varies, self.mechanism.signals)), 0.0
         self._constant = not (self.sprung or self.damping.any() or self._timed or self._actuators)
         couplings = self.mechanism.couplings
@@ -201,7 +201,7 @@ class JointTree:
 
     def efforts(self, q: Array, v: Array) -> Array:
         """Efforts of the actuators, N or N m, (actuators,)."""
-        return np.array([item.effort(self.now, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self._actuators])
+        return np.array([law(self.now, float(q[at_q]), float(v[at_v])) for law, at_q, at_v in self._actuators])
 
     def pulls(self, data: Any) -> Any:
         """Forces of springs, bushings and applied forces on Pinocchio's joints, in their axes.

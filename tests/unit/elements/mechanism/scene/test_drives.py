@@ -10,8 +10,8 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, required
-from proofroll.elements.mechanism.scene.drives import Actuator
-from proofroll.elements.mechanism.scene.signal import Formula, value_at
+from proofroll.elements.mechanism.scene.drives import Actuator, ActuatorKind
+from proofroll.elements.mechanism.scene.signal import Formula, Held, Signal, Table, value_at
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.truth_of_mechanism import truth_of
 
@@ -109,6 +109,16 @@ def test_efforts_go_through_the_gear_and_the_limit_is_at_the_joint(more: dict[st
     made = slider(**more)
     assert JointCoordinates(made).solve(*made.start()).acceleration == pytest.approx([effort])
     assert JointCoordinates(made).sample(*made.start())["named"] == pytest.approx([effort])
+
+
+@pytest.mark.parametrize("kind", ["torque", "velocity", "position"])
+@pytest.mark.parametrize("target", [0.3, Formula("sin(3*t)"), Table((0.0, 0.5), (0.1, -0.4), hold=True), Held(0.7)])
+def test_the_law_is_the_effort(kind: ActuatorKind, target: Signal) -> None:
+    """An actuator's law has its effort to the last digit, at its limit and between."""
+    gains = {"torque": {}, "velocity": {"kd": 3.0}, "position": {"kp": 30.0, "kd": 0.7}}[kind]
+    actuator = Actuator("motor", "j", kind, target=target, gear=1.7, limit=2.0, **gains)
+    states = np.random.default_rng(0).normal(size=(50, 2)).tolist()
+    assert [actuator.law()(0.6, q, v) for q, v in states] == [actuator.effort(0.6, q, v) for q, v in states]
 
 
 @pytest.mark.parametrize(
