@@ -197,7 +197,9 @@ class MistakeScreen:
 
     def best(self, candidates: Sequence[Mistake]) -> list[Screened]:
         """Mistakes with their sizes in each treatment of gains, those that leave least first."""
-        trials = [(item, size) for item in candidates for size in _sizes(item)]
+        further = {item.words: _FACTORS if item.none == 1 else () for item in candidates}
+        sizes = {item.words: item.starts + further[item.words] if item.sized else (1.0,) for item in candidates}
+        trials = [(item, size) for item in candidates for size in sizes[item.words]]
         laws = [item.changed(self.law, size) for item, size in trials]
         screened: list[Screened] = []
         for treatment in TREATMENTS:
@@ -246,13 +248,6 @@ class MistakeScreen:
         return np.array(
             [np.median(off[mask]) if mask.any() else _BEYOND * off[np.abs(off).argmax()] for off, mask in columns]
         )
-
-
-def _sizes(mistake: Mistake) -> tuple[float, ...]:
-    """Sizes of a mistake that are tried; 1 where it has none."""
-    if not mistake.sized:
-        return (1.0,)
-    return mistake.starts + (_FACTORS if mistake.none == 1 else ())
 
 
 def _laws(law: ControlLaw, screened: Sequence[Screened], sizes: Array) -> list[ControlLaw]:
