@@ -14,10 +14,10 @@ install: $(VENV)/.installed
 
 # A pip of today takes two thirds of the time of Python's own; what builds the packages is installed once for all of
 # them. Bytecode is compiled on all cores, where pip would use one, and not for the thousands of modules that nobody imports.
-$(VENV)/.installed: pyproject.toml constraints.txt fuzz/pyproject.toml throughput/pyproject.toml cluster/pyproject.toml benchmarks/pyproject.toml tests/drill/pyproject.toml
+$(VENV)/.installed: pyproject.toml constraints.txt fuzz/pyproject.toml throughput/pyproject.toml cluster/pyproject.toml balance/pyproject.toml benchmarks/pyproject.toml tests/drill/pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --no-compile --upgrade pip hatchling editables
-	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --no-compile --no-build-isolation --editable ".[dev]" --editable ./fuzz --editable ./throughput --editable ./cluster --editable ./benchmarks --editable ./tests/drill
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --no-compile --no-build-isolation --editable ".[dev]" --editable ./fuzz --editable ./throughput --editable ./cluster --editable ./balance --editable ./benchmarks --editable ./tests/drill
 	-$(BIN)/python -m compileall -q -j 0 -x '/(OpenGL|fontTools|mypyc?|setuptools|tests)/' $(VENV)/lib >/dev/null
 	touch $@
 

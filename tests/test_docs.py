@@ -276,7 +276,7 @@ GIVEN_BACK = (Sample, MechanismSample, BallSample, MechanismBuilt, BallBuilt)
 
 
 # Beginnings of names of modules; entry points and files have names with dots, too.
-_ROOMS = "core|elements|engines|files|running|studies|truth|conformance|mechanism_studies|papers|robots|cli"
+_ROOMS = "core|elements|engines|files|running|studies|truth|conformance|papers|robots|cli"
 _FILES = ("csv", "json", "html", "md", "py", "toml")
 
 

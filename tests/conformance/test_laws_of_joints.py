@@ -19,9 +19,8 @@ LAWS = frozenset(
     MechanismCapability[name]
     for name in ("JOINT_SPRINGS", "ARMATURE", "JOINT_FRICTION", "ACTUATORS", "SATURATION", "COUPLINGS", "SIGNALS")
 )
-CONTACTS = frozenset(
-    MechanismCapability[name] for name in ("CONTACT", "CONTACT_FRICTION", "CONTACT_REBOUNDS", "REVOLUTE", "FREE")
-)
+OF_CONTACTS = ("CONTACT", "SPHERES", "PLANES", "CONTACT_FRICTION", "CONTACT_REBOUNDS", "REVOLUTE", "FREE")
+CONTACTS = frozenset(MechanismCapability[name] for name in OF_CONTACTS)
 
 DRIVES = ("servo", "limit", "target", "coupling")
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from source_code import PACKAGES
 
 import proofroll
 from proofroll.files.comparison_file import comparison_names
@@ -63,7 +64,7 @@ def test_the_workflow_of_platforms_asks_for_what_there_is() -> None:
 BROUGHT = {"distributed>=2025.1": "`proofroll-cluster`"}
 
 
-@pytest.mark.parametrize("folder", ["cluster", "fuzz", "throughput"])
+@pytest.mark.parametrize("folder", PACKAGES)
 def test_a_package_with_a_command_fits_the_suite(folder: str) -> None:
     """It has the version and the Pythons of the suite, and asks for that version: it uses more than public names."""
     package = tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]

@@ -144,6 +144,7 @@ def test_entry_points(installed: Path) -> None:
     assert "fuzz" not in text
     assert "throughput" not in text
     assert "cluster" not in text
+    assert "balance" not in text
 
 
 def test_types_are_announced(wheel: Path) -> None:

@@ -56,6 +56,7 @@ ROOMS = {
         ),
     ),
     "fuzz": Room(("tests/unit/fuzz",), (*_MECHANICS, "studies", "vocabulary"), ("fuzz",)),
+    "balance": Room(("tests/unit/balance",), (*_MECHANICS, "cli", "studies"), ("balance",)),
     "throughput": Room(("tests/unit/throughput",), (*_MECHANICS, "studies"), ("throughput",)),
     "benchmarks": Room(
         ("tests/unit/benchmarks",), (*_MECHANICS, "cli", "report", "studies"), ("benchmarks", "tests/drill")

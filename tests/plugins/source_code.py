@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TypeVar
 
 Made = TypeVar("Made")
+# Folders of packages beside src that bring commands or options, each with the package proofroll_<folder>.
+PACKAGES = ("balance", "cluster", "fuzz", "throughput")
 
 
 def _kept(make: Callable[[Path], Made]) -> Callable[[Path], Made]:

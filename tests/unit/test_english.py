@@ -8,21 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from source_code import statements, tree
+from source_code import PACKAGES, statements, tree
 
 pytestmark = pytest.mark.usefixtures("parsed_sources")
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = (
-    "src",
-    "fuzz",
-    "throughput",
-    "cluster",
-    "benchmarks",
-    "papers",
-    "tests/drill",
-    "tests/plugins",
-    "examples/engines",
-)
+FOLDERS = ("src", *PACKAGES, "benchmarks", "papers", "tests/drill", "tests/plugins", "examples/engines")
 # A clause or a phrase that hangs on a word which is not there.
 _OPENERS = (
     r"all (?:that|who)|as|at(?! least)|because|by|every(?:thing|body) (?:that|who)|everything|for|from|how|if|in|is|it|"

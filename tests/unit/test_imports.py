@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from source_code import nodes, statements, tree
+from source_code import PACKAGES, nodes, statements, tree
 
 import proofroll
 from proofroll.core.engine import Sample
@@ -32,10 +32,9 @@ MAY: dict[str, set[str]] = {
     "cli": {"core", "files", "running", "studies", "report", "cli"},
     "elements": {"core", "files", "elements"},
     "truth": {"core", "elements", "truth"},
-    "mechanism_studies": HARNESS | {"elements", "truth", "mechanism_studies"},
     "engines": {"core", "elements", "engines"},
     # as a package of somebody else would be
-    "papers": HARNESS | {"elements", "truth", "mechanism_studies", "engines", "papers"},
+    "papers": HARNESS | {"elements", "truth", "engines", "papers"},
     "vocabulary": HARNESS | {"elements", "vocabulary"},
     # A plug-in: scenes of mechanisms to be run, and the engines' own importers of robot files.
     "robots": {"core", "files", "running", "studies", "report", "cli", "robots", "elements", "engines", "vocabulary"},
@@ -58,7 +57,7 @@ PLUGIN_PARTS = {"report"}
 
 
 # Packages that stand on this one: it imports none of them.
-OUTSIDE = ("proofroll_benchmarks", "proofroll_cluster", "proofroll_drill", "proofroll_fuzz", "proofroll_throughput")
+OUTSIDE = ("proofroll_benchmarks", "proofroll_drill", *(f"proofroll_{name}" for name in PACKAGES))
 # A module by its name in a text, as ``import_module`` takes it, and an import in a program that is written.
 _BY_NAME = re.compile(rf"(proofroll\.\w+\.|({'|'.join(OUTSIDE)})\b)")
 _WRITTEN = re.compile(rf"(?:from|import) (proofroll\.\w+|{'|'.join(OUTSIDE)})")
@@ -241,7 +240,13 @@ def test_modules_are_short_enough_to_be_read_at_once() -> None:
     repository = ROOT.parents[1]
     files = [
         file
-        for folder in (ROOT, repository / "fuzz", repository / "throughput", repository / "cluster")
+        for folder in (
+            ROOT,
+            repository / "fuzz",
+            repository / "throughput",
+            repository / "cluster",
+            repository / "balance",
+        )
         for file in folder.rglob("*.py")
     ]
     long = [str(file.relative_to(repository)) for file in files if len(file.read_text().splitlines()) > 500]

@@ -7,15 +7,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
-from source_code import nodes
+from source_code import PACKAGES, nodes
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = (
-    ROOT / "src" / "proofroll",
-    ROOT / "fuzz" / "proofroll_fuzz",
-    ROOT / "throughput" / "proofroll_throughput",
-    ROOT / "cluster" / "proofroll_cluster",
-)
+FOLDERS = (ROOT / "src" / "proofroll", *(ROOT / name / f"proofroll_{name}" for name in PACKAGES))
 # Determiners, adverbs and participles that hide what a name holds.
 BARE = frozenset({
     "after", "along", "at", "before", "changed", "closed", "each", "first", "found", "given", "held", "here", "known",
@@ -51,7 +46,7 @@ def bare_names(function: ast.FunctionDef) -> set[str]:
 def parts() -> dict[str, float]:
     """Folder of a package -> part of its functions with a local or argument that is a bare determiner or adverb."""
     functions: dict[str, list[bool]] = {}
-    for path in (path for package in PACKAGES for path in package.rglob("*.py")):
+    for path in (path for folder in FOLDERS for path in folder.rglob("*.py")):
         bare = [bool(bare_names(item)) for item in _functions(nodes(path))]
         functions.setdefault(path.parent.relative_to(ROOT).as_posix(), []).extend(bare)
     return {folder: sum(bare) / len(bare) for folder, bare in functions.items() if bare}

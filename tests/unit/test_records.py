@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
-from source_code import nodes
+from source_code import PACKAGES, nodes
 
 ROOT = Path(__file__).resolve().parents[2]
-FILES = [file for folder in ("src", "fuzz", "throughput", "cluster") for file in (ROOT / folder).rglob("*.py")]
+FILES = [file for folder in ("src", *PACKAGES) for file in (ROOT / folder).rglob("*.py")]
 MOST = 4  # positional arguments of a record
 
 
@@ -38,7 +38,7 @@ def long_calls(module: list[ast.AST], records: set[str]) -> Iterator[ast.Call]:
 
 
 def test_records_are_built_by_keyword() -> None:
-    """No call in src, fuzz, throughput and cluster builds a record with more than four positional arguments."""
+    """No call in src and in the packages with commands builds a record with more than four positional arguments."""
     modules = {path.relative_to(ROOT): nodes(path) for path in FILES}
     records = records_of(modules.values())
     calls = [f"{path}:{call.lineno}" for path, module in modules.items() for call in long_calls(module, records)]

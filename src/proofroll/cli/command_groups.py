@@ -16,7 +16,7 @@ GROUPS = {
 _OTHERS = "Others"
 _WIDE = 80  # columns of a screen
 # Command of earlier versions -> command that does the same now. The last two come with a clone, not with the wheel;
-# `fuzz` and `throughput` are looked for here only where their packages are not installed.
+# `balance`, `fuzz` and `throughput` are looked for here only where their packages are not installed.
 NOW = {
     "tradeoff": "proofroll recommend SCENE --plot FILE.svg",
     "plot": "proofroll run SCENE --engine NAME --plot FILE, and of a stored run proofroll replay RUN",
@@ -27,6 +27,7 @@ NOW = {
     "vocabulary": "proofroll check --keys [WORD]",
     "fuzz": "in a package of its own: pip install proofroll-fuzz; in a clone of the repository, pip install ./fuzz",
     "throughput": "in a package of its own: pip install proofroll-throughput; in a clone, pip install ./throughput",
+    "balance": "in a package of its own: pip install proofroll-balance; in a clone, pip install ./balance",
     "bench": "python -m proofroll_benchmarks; in a clone of the repository, pip install ./benchmarks",
     "drill": "python -m proofroll_drill; in a clone of the repository, pip install ./tests/drill",
 }

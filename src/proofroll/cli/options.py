@@ -185,9 +185,12 @@ def new_runner(
     out: Path, fresh: bool, jobs: int | None, scheduler: str | None = None, workers: Workers | None = None
 ) -> Runner:
     """Runner in worker processes, on this machine or on a cluster, that keeps results under ``out``."""
+    from proofroll.files.trajectory_file import import_xarray
     from proofroll.running.runner import Runner
     from proofroll.running.store import Store
 
+    if scheduler is None:  # a cluster is one of dask
+        import_xarray()
     store = Store(out / "cases")  # raises for a folder that cannot be written, before a cluster is started
     return Runner(store, jobs=jobs, fresh=fresh, cluster=new_cluster(scheduler), workers=workers)
 

@@ -396,7 +396,17 @@ def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
             for name, capabilities in engine.provides.items()
             if scene.requires <= capabilities and offered(name, scene.requires, purposes)
         ]
-        none = f"no formulation of {engine.name}'s adapter has {'all of that' if len(missing) > 1 else 'that'}"
+        apart = set(missing) & set().union(*engine.provides.values())  # in formulations that lack something else
+        lack = "all that the scene needs" if apart else "all of that" if len(missing) > 1 else "that"
+        none = f"no formulation of {engine.name}'s adapter has {lack}"
         instead = f"choose formulation={' or '.join(able)}" if able else none
-        needs = ", ".join(f"{name}, and {reasons[name]}" if name in reasons else name for name in missing)
-        raise Refused(f"needs {needs}; {instead}")
+        raise Refused(f"{needed(missing, reasons)}; {instead}")
+
+
+def needed(missing: Sequence[str], reasons: Mapping[str, str]) -> str:
+    """Clause on capabilities that are missing: first those without a reason, then those of each reason together."""
+    by_reason: dict[str, list[str]] = {"": []}
+    for name in missing:
+        by_reason.setdefault(reasons.get(name, ""), []).append(name)
+    clauses = [", ".join(names) + (f", and {reason}" if reason else "") for reason, names in by_reason.items() if names]
+    return f"needs {', '.join(clauses)}"

@@ -36,6 +36,10 @@ def place_of(name: str) -> str:
     return name.partition("@")[2]
 
 
+# Engine -> its title for readers, from the answers of processes in which engines run.
+KNOWN_TITLES: dict[str, str] = {}
+
+
 def load_engine(name: str) -> Any:
     """Class of an engine with the formulations that packages add to it, loaded into this process.
 

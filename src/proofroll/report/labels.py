@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.engine_abilities import title_of
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.number_format import number
-from proofroll.core.plugins import load_engine, parse_engine
+from proofroll.core.plugins import KNOWN_TITLES, load_engine, parse_engine
 
 if TYPE_CHECKING:
     from proofroll.core.comparison import Tolerance
@@ -55,11 +55,11 @@ def engine_title(engine: str, title: str = "") -> str:
 
     Args:
         engine: code name, with a place or options or without.
-        title: its own title, where it is known; else the engine is loaded, which may take half a second.
+        title: its own title; empty: that of its process or, loaded here, of the engine, which may take half a second.
     """
     code = re.split(r"[\[@]", engine, maxsplit=1)[0]
     try:
-        title = title or title_of(load_engine(code))
+        title = title or KNOWN_TITLES.get(code) or title_of(load_engine(code))
     except (ProofrollError, PackageNotFoundError):
         title = code
     return title + engine[len(code) :]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.robots.model import Array, Robot
@@ -73,6 +72,8 @@ class RobotStates:
 
 def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
     """Random states within the limits of the joints (or ±π, ±1 m), with moderate velocities, consistent with mimics."""
+    from scipy.spatial.transform import Rotation
+
     random = np.random.default_rng(seed)
     angle, rotation, position = {}, {}, {}
     for joint in robot.moving:

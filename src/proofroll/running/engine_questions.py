@@ -10,7 +10,7 @@ from typing import Any
 from proofroll.core.engine_abilities import Steps, Term, stepped
 from proofroll.core.errors import ProofrollError, Refused
 from proofroll.core.limits import HELLO_TIME_LIMIT, PROGRAM_TIME_LIMIT
-from proofroll.core.plugins import engine_names, parse_engine
+from proofroll.core.plugins import KNOWN_TITLES, engine_names, parse_engine, plain_name
 from proofroll.core.scene import Scene
 from proofroll.core.truth import needs_steps
 from proofroll.running.case import Case, EngineDescription, EngineFacts, Status
@@ -107,7 +107,9 @@ def resolve(
     common = {"do": "resolve", "requires": sorted(requires)}
     requests = [(name, {**common, "engine": name, "options": dict(options)}) for name, options in engines]
     answers = _answers(requests, workers)
-    return [answer if isinstance(answer, ProofrollError) else EngineFacts(**answer) for answer in answers]
+    facts = [answer if isinstance(answer, ProofrollError) else EngineFacts(**answer) for answer in answers]
+    KNOWN_TITLES.update({plain_name(item.name): item.title for item in facts if isinstance(item, EngineFacts)})
+    return facts
 
 
 def resolve_with_truth(

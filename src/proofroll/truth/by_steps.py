@@ -80,7 +80,11 @@ def reference_by_steps(element: MechanismElement, times: FloatArray, engines: Se
     steps = _steps(element)
     PACE.follow("second", sum(times[-1] / step for step in steps))
     for step in steps:
-        runs.append(_run(element, times, step, engines[0], before=sum(times[-1] / run.step for run in runs)))
+        try:
+            runs.append(_run(element, times, step, engines[0], before=sum(times[-1] / run.step for run in runs)))
+        except Diverged as error:
+            by = f"{_words(engines[0])}, dt {number(step, 3)} s"
+            raise Diverged(f"{NO_ROUTE}, and the steps of {by} end: {error}", error.time) from None
         if not runs[-1].whole:
             break
     PACE.leave()

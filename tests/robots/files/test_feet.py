@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import pytest
 from proofroll import load_scene, simulate
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Tree
+from proofroll.elements.mechanism.contact.start import touches
 from proofroll.files.scene_sources import with_control
 from proofroll.robots.protocol import lift
 
@@ -94,11 +97,17 @@ def test_excluded_pairs_do_not_touch(stood: Callable[..., Scene]) -> None:
     }  # fmt: skip
 
 
-def test_a_margin_is_a_larger_radius(stood: Callable[..., Scene]) -> None:
-    """A contact that presses from a distance on is one of a larger ball."""
-    scene = stood(robot(FOOT.replace("size", 'margin=".005" size')))
-    radii = {shape.radius for shape in scene.elements[0].mechanism.geometries if shape.kind == "sphere"}  # type: ignore[attr-defined]
-    assert radii == {0.025}
+@pytest.mark.parametrize(("mesh", "radius"), [(False, 0.02), (True, 0.0)], ids=["balls", "meshes"])
+def test_half_a_margin_is_a_larger_radius_and_half_a_higher_floor(
+    stood: Callable[..., Scene], mesh: bool, radius: float
+) -> None:
+    """A contact that presses from a distance on does so in the middle, of balls and of the corners of a mesh."""
+    text = robot(FOOT.replace("size", 'margin=".005" size'))
+    if mesh:
+        text = robot(HOOF.replace("mesh=", 'margin=".005" mesh='), after=hoof())
+    shapes = stood(text).elements[0].mechanism.geometries  # type: ignore[attr-defined]
+    assert {shape.radius for shape in shapes if shape.kind == "sphere"} == {radius + 0.0025}
+    assert {shape.position[2] for shape in shapes if shape.kind == "plane"} == {0.0025}
 
 
 def test_turning_friction_of_balls_is_taken(stood: Callable[..., Scene]) -> None:
@@ -157,6 +166,68 @@ def test_meshes_that_collide_are_told(stood: Callable[..., Scene]) -> None:
     assert "collision meshes of trunk" in stood(text).omitted
 
 
+# A foot of three corners and one above them, with points of no meaning: on a face, on an edge and within.
+CORNERS = ((-0.02, -0.01, -0.2), (0.03, -0.01, -0.2), (0.0, 0.02, -0.2), (0.0, 0.0, -0.17))
+WITHIN = ((0.0, 0.0, -0.2), (0.005, -0.01, -0.2), (0.0, 0.0, -0.19))
+HOOF = FOOT.replace('type="sphere" size=".02" pos="0 0 -.2"', 'type="mesh" mesh="hoof"')
+
+
+def hoof(points: Any = CORNERS + WITHIN) -> str:
+    """Asset of a mesh of these points."""
+    return f'<asset><mesh name="hoof" vertex="{" ".join(str(x) for point in points for x in point)}"/></asset>'
+
+
+def test_a_mesh_stands_on_the_corners_of_its_hull(stood: Callable[..., Scene]) -> None:
+    """Each corner is a vertex on the link, and what lies within the hull or on its faces is none."""
+    scene = stood(robot(HOOF, after=hoof()))
+    assert "3 shapes on a floor, friction 0.4" in scene.title
+    assert "mesh" not in scene.omitted
+    assert set(_pairs(scene)) == {f"{name}_foot corner {k} on floor" for name in PLACES for k in range(1, 5)}
+    mechanism = scene.elements[0].mechanism  # type: ignore[attr-defined]
+    for name in PLACES:
+        places = [shape.position for shape in mechanism.geometries if shape.name.startswith(name)]
+        apart = np.linalg.norm(np.array(places)[:, None] - np.array(CORNERS), axis=-1)
+        assert apart.min(axis=0).max() < 1e-8  # MuJoCo's are of 32 bits
+    assert {shape.radius for shape in mechanism.geometries if shape.kind == "sphere"} == {0.0}
+
+
+def test_a_mesh_in_a_file_stands_as_one_in_the_text(stood: Callable[..., Scene], tmp_path: Path) -> None:
+    """Its file is read from the folder that the compiler names, where it collides."""
+    (tmp_path / "parts").mkdir()
+    points = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
+    (tmp_path / "parts" / "hoof.obj").write_text(points + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    named = '<compiler meshdir="parts"/><asset><mesh name="hoof" file="hoof.obj"/></asset>'
+    assert set(_pairs(stood(robot(HOOF, after=named)))) == set(_pairs(stood(robot(HOOF, after=hoof()))))
+    looks = stood(robot(FOOT + HOOF.replace('name="{name}_foot"', 'contype="0" conaffinity="0"'), after=named))
+    assert len(_pairs(looks)) == 3
+    assert "mesh" not in looks.omitted
+
+
+def test_a_mesh_of_very_many_corners_is_refused_by_its_number(stood: Callable[..., Scene]) -> None:
+    """A hull of more corners than the bound is named, with the number and with balls in its place."""
+    turn = np.linspace(0, 2 * np.pi, 66, endpoint=False)
+    wide = [*np.stack([0.03 * np.cos(turn), 0.03 * np.sin(turn), 0 * turn - 0.2], axis=1).tolist(), CORNERS[-1]]
+    with pytest.raises(InputError) as caught:
+        stood(robot(HOOF, after=hoof(wide)))
+    for text in ("left_foot and floor", "a mesh whose convex hull has 67 corners; at most 64", "[ground] feet"):
+        assert text in str(caught.value)
+
+
+@pytest.mark.parametrize(("gap", "touches"), [(0.01, False), (-0.01, True)])
+def test_a_mesh_on_another_shape_has_no_contact(stood: Callable[..., Scene], gap: float, touches: bool) -> None:
+    """Where it touches one that is no plane, both are named with the pair; where it comes near, they are left out."""
+    wall = f'<geom name="wall" type="sphere" size=".1" pos="{0.15 + 0.03 + 0.1 + gap} .1 0"/>'
+    text = robot(HOOF, after=hoof(), trunk=FOOT.format(name="trunk")).replace("</worldbody>", f"{wall}</worldbody>")
+    control = CONTROL.replace("left_hip = 0.1", "left_hip = 0")
+    if touches:
+        with pytest.raises(InputError, match=r"no contact of left_foot and wall \(mesh on sphere\);"):
+            stood(text, control)
+        return
+    assert any(
+        "left_foot and wall, " in words and "(mesh on sphere)" in words for words in stood(text, control).omitted
+    )
+
+
 URDF = """<robot name="stool"><link name="trunk"><inertial><mass value="3"/>
 <inertia ixx=".02" iyy=".03" izz=".04" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><origin xyz="0 0 -.1"/><geometry><box size=".4 .2 .1"/></geometry></collision>
@@ -174,24 +245,127 @@ def test_a_urdf_stands_on_a_plane(stood: Callable[..., Scene]) -> None:
     assert [pair.friction for pair in _pairs(rough).values()] == [0.3]
 
 
-def test_a_scene_moves_as_the_file_in_plain_mujoco(stood: Callable[..., Scene]) -> None:
+# Solids that fall on a table, which is a box, turned about the vertical; of the mesh see above.
+TIN = '<geom name="tin" {shape} friction=".4"/>'
+SHAPES = {
+    "cylinder": 'type="cylinder" size=".04 .06"',
+    "ellipsoid": 'type="ellipsoid" size=".04 .05 .06"',
+    "mesh": 'type="mesh" mesh="hoof"',
+}
+
+
+def table(kind: str, place: str = ".1 .2", turn: str = "0.9659258 0.258819 0.1 0") -> str:
+    """MJCF of a solid 9 cm above a table."""
+    return (
+        (
+            f'<mujoco model="table">{hoof()}<worldbody><geom name="table" type="box" size=".5 .4 .1" pos="0 0 -.1" '
+            f'euler="0 0 20"/><body name="can" pos="{place} .09" quat="{turn}"><freejoint name="root"/>'
+            f'<inertial mass=".5" pos="0 0 0" diaginertia="8e-4 8e-4 4e-4"/>{TIN.format(shape=SHAPES[kind])}</body>'
+            "</worldbody></mujoco>"
+        )
+        .replace("-0.2 ", "-0.02 ")
+        .replace('-0.2"', '-0.02"')
+        .replace("-0.17", "0.05")
+        .replace("-0.19", "0.0")
+    )
+
+
+BARE = "rate = 50\n[ground]\n"
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_solids_on_a_box_are_as_far_from_its_face_as_from_the_box(stood: Callable[..., Scene], kind: str) -> None:
+    """In any attitude above the face the least gap is the distance of both convex bodies, with the face's normal."""
+    import mujoco
+
+    scene = stood(table(kind), BARE)
+    (element,) = scene.elements
+    mechanism = element.mechanism  # type: ignore[attr-defined]
+    assert "edges of table face +z, which is endless for tin" in scene.omitted
+    assert "no floor" in scene.title
+    model = mujoco.MjModel.from_xml_string(table(kind))
+    model.opt.ccd_tolerance, model.opt.ccd_iterations = 1e-12, 500
+    data, ends = mujoco.MjData(model), np.zeros(6)
+    rng, (joint,) = np.random.default_rng(3), mechanism.joints
+    for _ in range(20):
+        turn = rng.normal(size=4)
+        q = [*rng.uniform(-0.1, 0.1, 2), rng.uniform(0.08, 0.2), *(turn / np.linalg.norm(turn))]
+        data.qpos[:] = q
+        mujoco.mj_forward(model, data)
+        apart = mujoco.mj_geomDistance(model, data, 0, 1, 1.0, ends)
+        placed = replace(mechanism, joints=(replace(joint, q0=tuple(q)),))
+        nearest = min(touches(placed, Tree(placed).at(*placed.start())), key=lambda touch: touch.gap)
+        assert nearest.gap == pytest.approx(apart, abs=1e-8)
+        assert nearest.normal == pytest.approx((ends[3:] - ends[:3]) / apart, abs=1e-5)
+
+
+def test_a_solid_at_the_edge_of_a_box_is_refused_by_name(stood: Callable[..., Scene]) -> None:
+    """Where it meets an edge no face stands for the box; a box that moves has none either."""
+    beyond = table("cylinder", place=".5 .15", turn="1 0 0 0")
+    moving = table("cylinder").replace(
+        '<geom name="table"', '<body name="lift"><joint type="slide" axis="1 0 0"/><geom name="table"'
+    )
+    moving = moving.replace('euler="0 0 20"/>', 'euler="0 0 20"/></body>')
+    for text in (beyond, moving):
+        with pytest.raises(InputError, match=r"no contact of (tin and table|table and tin) \((cylinder|box) on "):
+            stood(text, BARE)
+
+
+def test_a_solid_beside_a_wall_is_not_lifted_by_it(stood: Callable[..., Scene]) -> None:
+    """Planes that stand upright are no floors, and the solid starts where its file says."""
+    wall = '<geom name="wall" type="plane" size="0 0 1" pos="-.25 0 0" zaxis="1 0 0"/>'
+    scene = stood(table("cylinder", place="-.19 0").replace("<worldbody>", f"<worldbody>{wall}"), BARE)
+    assert _height(scene) == 0.09
+    assert "tin on wall" in _pairs(scene)
+
+
+def test_shapes_that_come_near_without_a_rule_are_told(stood: Callable[..., Scene]) -> None:
+    """A file whose only near shapes have no contact says so, and not that none comes near."""
+    held = table("cylinder", turn="1 0 0 0").replace('<freejoint name="root"/>', '<joint type="slide" axis="1 0 0"/>')
+    with pytest.raises(InputError, match=r"have a rule or touch: contact of tin and table, \d+ mm apart \(cylinder on"):
+        stood(held.replace(' .09"', ' .065"'), BARE)
+
+
+FLOORED = robot(HOOF, after=hoof())
+
+
+@pytest.mark.parametrize(
+    ("text", "control", "bound"),
+    [
+        pytest.param(robot(), CONTROL, 1e-9, id="balls"),
+        pytest.param(FLOORED, CONTROL, 1e-9, id="meshes"),
+        pytest.param(robot(FOOT.replace("size", 'margin=".005" size')), CONTROL, 1e-9, id="balls with a margin"),
+        pytest.param(
+            robot(HOOF.replace("mesh=", 'margin=".005" mesh='), after=hoof()), CONTROL, 1e-9,
+            id="meshes with a margin",
+        ),
+        pytest.param(table("cylinder"), BARE, 1e-6, id="cylinder on a box"),
+        pytest.param(table("mesh"), BARE, 1e-7, id="mesh on a box"),
+    ],
+)  # fmt: skip
+def test_a_scene_moves_as_the_file_in_plain_mujoco(
+    stood: Callable[..., Scene], text: str, control: str, bound: float
+) -> None:
     """The file itself in MuJoCo, with the settings of matched, lands and stands as its scene does there."""
     import mujoco
 
-    scene = stood(robot(), CONTROL + "[start]\nbase = [0, 0, 0.24, 0.9998, 0.015, 0.0132287566, 0]\n")
+    tilted = "[start]\nbase = [0, 0, 0.24, 0.9998, 0.015, 0.0132287566, 0]\n"
+    scene = stood(text, control + (tilted if control == CONTROL else ""))
     step, until = 1e-3, 0.3
     ours = simulate(scene, "mujoco[formulation=geoms,preset=matched,damping_armature=false]", dt=step, until=until)
-    model = mujoco.MjModel.from_xml_string(robot())
+    model = mujoco.MjModel.from_xml_string(text)
     model.opt.timestep, model.opt.cone, model.opt.integrator = step, 1, 0
     for name in ("geom_solref", "dof_solref", "pair_solref"):
         getattr(model, name)[:] = 2 * step, 1
     for name in ("geom_solimp", "dof_solimp", "pair_solimp"):
         getattr(model, name)[:] = 0.9999, 0.9999, 1e-3, 0.5, 2
+    model.opt.ccd_tolerance, model.opt.ccd_iterations = 1e-13, 500  # its own 1e-6 are 0.7 mm of the cylinder's motion
+    model.geom_margin[0] += 1e-9  # of the floor or table, as the adapter gives each pair
     data = mujoco.MjData(model)
     for joint in scene.elements[0].mechanism.joints:  # type: ignore[attr-defined]
         place = int(model.joint(joint.name).qposadr[0])
         data.qpos[place : place + len(joint.q0)] = joint.q0
-    data.ctrl[:] = 0.1, 0, 0
+    data.ctrl[:1] = 0.1
     places = [data.qpos[:3].copy()]
     for _ in range(round(until / 0.01)):
         for _ in range(10):
@@ -199,7 +373,7 @@ def test_a_scene_moves_as_the_file_in_plain_mujoco(stood: Callable[..., Scene]) 
         places.append(data.qpos[:3].copy())
     moved = float(np.abs(np.diff(places, axis=0)).max())
     assert moved > 1e-3
-    assert np.abs(ours["p_WB"].values[:, 0] - places).max() < 1e-8
+    assert np.abs(ours["p_WB"].values[:, 0] - places).max() < bound
 
 
 @pytest.mark.parametrize(("lowest", "drop", "way"), [(-0.02, None, 0.03), (0.02, None, 0.0), (0.02, 0.01, -0.01)])

@@ -151,9 +151,9 @@ ONE_COEFFICIENT = "this formulation gives a contact one coefficient"
     ("mechanism", "engine", "why"),
     [
         (on_wall("bore"), "mujoco[formulation=geoms,integrator=RK4]", "posed once a step, and RK4 needs it"),
-        (on_plane(), "exudyn[formulation=discs]", "contact is not of a circle and a plane"),
+        (on_plane(), "exudyn[formulation=discs]", "contact of spheres, and Exudyn's joint rolls discs on planes"),
         (on_plane(), "mujoco[formulation=geoms,cone=pyramidal]", "friction above 1 makes a contact soft"),
-        (over("box"), "exudyn[formulation=spheres]", "touch has a shape that is neither sphere nor wall"),
+        (over("box"), "exudyn[formulation=spheres]", "contact of boxes, and Exudyn's contacts are of spheres"),
         (over_a_rim(RIMS["block"]), PROJECTION, "begin and end at borders of faces"),
         (standing_cylinder(), "pinocchio[formulation=impulses]", "of which this formulation has one point"),
         (falling(static_friction=0.9), "mujoco[formulation=geoms]", ONE_COEFFICIENT),

@@ -64,8 +64,16 @@ def test_two_spheres_press_apart():
 @pytest.mark.parametrize(
     ("geometry", "pair", "said"),
     [
-        (Geometry("g", "b", "sphere", radius=0.0), {}, "a corner touches in p"),
-        (Geometry("g", "b", "ellipsoid", axes=(0.1, 0.2, 0.3)), {}, "p has a shape that is neither sphere nor wall"),
+        (
+            Geometry("g", "b", "sphere", radius=0.0),
+            {},
+            "contact of vertices, and Exudyn's contacts are of spheres with a radius",
+        ),
+        (
+            Geometry("g", "b", "ellipsoid", axes=(0.1, 0.2, 0.3)),
+            {},
+            "contact of ellipsoids, and Exudyn's contacts are of spheres with a radius",
+        ),
         (Geometry("g", "b", "sphere", radius=0.1), {"restitution": 0.5}, "restitution"),
     ],
 )
@@ -73,6 +81,16 @@ def test_shapes_and_impacts_that_exudyn_lacks_are_refused(geometry, pair, said):
     """Corners, ellipsoids and restitution are refused, each with its reason."""
     with pytest.raises(Refused, match=said):
         EXUDYN.build(touching(FLOOR, geometry, pairs=(Pair("p", ("g", "floor"), 0.3, **pair),), height=1.0), MATCHED)
+
+
+def test_a_capsule_touches_planes_with_its_ends_alone():
+    """A capsule runs on a plane, of which its side is refused against a sphere."""
+    capsule = Geometry("g", "b", "capsule", radius=0.1, length=0.2, axis=(1.0, 0.0, 0.0))
+    run = EXUDYN.build(touching(FLOOR, capsule, pairs=(Pair("p", ("g", "floor"), 0.3),), height=0.1), MATCHED)
+    assert run.sample().contact_force[:, 2].sum() == pytest.approx(2 * G, rel=1e-6)
+    ball = Geometry("ball", "world", "sphere", radius=0.1)
+    with pytest.raises(Refused, match="the side of a capsule touches in p"):
+        EXUDYN.build(touching(ball, capsule, pairs=(Pair("p", ("g", "ball"), 0.3),), height=0.3), MATCHED)
 
 
 def test_what_sinks_in_beyond_its_wall_is_refused():

@@ -43,6 +43,26 @@ def test_impulses_obey_the_laws(seed: int) -> None:
     assert abs(f[10] * u[10]) < 1e-9
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-17])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_body_in_a_plane_gives_way_in_two_directions(seed: int, noise: float) -> None:
+    """Contacts that nothing moves across a plane have the impulses of the plane, and none but round-off across it."""
+    random = np.random.default_rng(seed)
+    rows, g = random.normal(size=(6, 8)), random.normal(size=6) - np.array([0, 0, 2, 0, 0, 2])
+    rows[[1, 4]] *= noise
+    g[[1, 4]] *= noise
+    f, change = impulses_by_blocks(rows @ rows.T, g, [Block(0, 0.6), Block(3, 20.0)], np.zeros(6), 1e-9)
+    u = g + rows @ rows.T @ f
+    assert change < 1e-9
+    for slip, across, normal in ((0, 1, 2), (3, 4, 5)):
+        assert min(f[normal], u[normal]) >= -1e-9
+        assert abs(f[normal] * u[normal]) < 1e-9
+        assert abs(f[across]) < 1e-9
+        bound = (0.6 if not slip else 20.0) * f[normal]
+        assert abs(f[slip]) <= bound + 1e-9
+        assert abs(u[slip]) < 1e-9 or f[slip] * np.sign(u[slip]) == pytest.approx(-bound, abs=1e-8)
+
+
 def test_sweeps_end_where_round_off_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     """A change within the tolerance that no longer falls ends the sweeps; one above it goes on to the last."""
     random, sweeps = np.random.default_rng(3), [0]

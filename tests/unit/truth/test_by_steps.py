@@ -14,7 +14,7 @@ from proofroll.core import plugins
 from proofroll.core.columns import Variable
 from proofroll.core.dataset import BARS, BY_STEPS, ENDED, ENDS, HORIZON, bar_until
 from proofroll.core.engine_abilities import Steps, stepped
-from proofroll.core.errors import Missing
+from proofroll.core.errors import Diverged, Missing
 from proofroll.core.pace import PACE, OutOfTime
 from proofroll.core.scene import Scene
 from proofroll.core.truth import needs_steps
@@ -78,6 +78,20 @@ def test_without_its_engine_there_is_none(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(plugins, "load_engine", missing)
     with pytest.raises(Refused, match="held targets yet, and no installed engine that represents it declares"):
         simulate(hopper(held=True), until=0.01)
+
+
+def test_steps_that_diverge_are_named() -> None:
+    """Where a run of the steps ends early, the reason says whose, with which step and when."""
+    (element,) = hopper(held=True).elements
+    assert isinstance(element, MechanismElement)
+    (servo,) = element.mechanism.actuators
+    mechanism = replace(element.mechanism, actuators=(replace(servo, kd=1e9),))
+    with pytest.raises(
+        Diverged, match=r"the steps of pinocchio impulses, dt 1e-3 s end: the state is not finite at t ="
+    ):
+        by_steps.reference_by_steps(
+            MechanismElement(mechanism), np.linspace(0, UNTIL, 13), ["pinocchio[formulation=impulses]"]
+        )
 
 
 def test_the_first_exact_claim_is_the_reference() -> None:

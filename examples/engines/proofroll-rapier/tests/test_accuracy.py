@@ -53,7 +53,7 @@ def test_friction_of_three_feet_is_aside():
         ("pendulum_friction", "no dry friction"),
         ("gear_pair", "no gears"),
         ("andrews_squeezer", "no springs between points"),
-        ("rattleback", "builds no ellipsoid"),
+        ("rattleback", "needs contact of ellipsoids"),
     ],
 )
 def test_what_it_has_not_is_refused_with_the_reason(scene, reason):

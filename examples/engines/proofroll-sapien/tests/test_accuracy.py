@@ -56,7 +56,11 @@ def test_contact_forces_have_their_normal_part_alone():
 
 @pytest.mark.parametrize(
     ("scene", "reason"),
-    [("rattleback", "only spheres, boxes"), ("free_turntable", "not joined"), ("double_pendulum", "not joined")],
+    [
+        ("rattleback", "contact of ellipsoids"),
+        ("free_turntable", "not joined"),
+        ("double_pendulum", "not joined"),
+    ],
 )
 def test_what_it_has_not_is_refused_with_the_reason(scene, reason):
     """Other shapes, planes that move and joints are refused before anything moves."""

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, error_location
 from proofroll.core.parameters import Parameters
@@ -22,11 +21,10 @@ from proofroll.elements.mechanism.scene.control import TARGET, Control
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import TOGETHER
 from proofroll.elements.mechanism.scene.policy import PolicySource
-from proofroll.robots.control.base_frames import BaseFrame, base_frames
+from proofroll.elements.mechanism.scene.rotations import from_quaternion
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
-from proofroll.robots.control.imported import imported_robots
 from proofroll.robots.files.actuators import scene_actuators
-from proofroll.robots.files.feet import GROUNDS, NO_GROUND, OF_FILE, StandingRobot, ground_tables
+from proofroll.robots.files.feet import GROUNDS, NO_FLOOR, NO_GROUND, OF_FILE, StandingRobot, ground_tables
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.scene_tables import (
     CONTACTS,
@@ -44,6 +42,7 @@ from proofroll.robots.protocol import lift
 from proofroll.robots.states import RobotStates
 
 if TYPE_CHECKING:
+    from proofroll.robots.control.base_frames import BaseFrame
     from proofroll.robots.control.bookkeeping.air import HeldRobot
 
 _DURATION = 0.1  # s: what is wrong with the bookkeeping of a controller shows in the air within it
@@ -52,6 +51,7 @@ _LADDER, _FINER = 4, 2  # a ladder's coarsest step has so many of the finest; st
 _STANDING = 0.3  # s: duration of a robot on a ground, which lands and stands by then
 _SEEN = 1e-6  # m: way of a robot at its start that is told
 _GROUND_WORDS = "what the robot stands on: nothing (0), the floor of its file (1), or a plane z = 0 (2)"
+_STEEP = 0.1  # cosine between the normal of a plane and the vertical from which on it is a wall
 _ABOVE = 10.0  # m: by which a robot is lifted while the heights of its shapes are measured
 
 
@@ -129,6 +129,9 @@ class ControlledScenes:
         Raises:
             InputError: the controller has no rate, does not fit the robot, or the robot cannot be moved.
         """
+        from proofroll.robots.control.base_frames import base_frames
+        from proofroll.robots.control.imported import imported_robots
+
         controller = read_controller(self._path) if self._controlled else Controller(rate=1.0)
         if controller.rate is None:
             advice = "mistakes of bookkeeping are found at a controller's instants; give the rate in Hz"
@@ -223,7 +226,8 @@ class ControlledScenes:
         tables["joints"] = _lifted(tables["joints"], way * up)
         about = touching.about
         if abs(way) > _SEEN and controller.start.drop is None:
-            about += f"; moved up by {1e3 * way:.3g} mm, as its start overlaps the floor"
+            below = "what it stands on" if about.startswith(NO_FLOOR) else "the floor"
+            about += f"; moved up by {1e3 * way:.3g} mm, as its start overlaps {below}"
         others = [clause for clause in tables["omitted"] if clause != CONTACTS]
         return tables | {"about": about, "omitted": [*touching.left_out, *others]}
 
@@ -273,12 +277,16 @@ def _first_target(target: Any, angle: float) -> float:
 
 def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> float:
     """Way against gravity to the start of the first body that floats [m], for the height of its lowest shape."""
-    floors = {row["name"]: row for row in tables["geometries"] if row["kind"] == "plane" and row["body"] == WORLD}
     free = next((joint for joint in robot.moving if joint.kind == JointKind.FREE), None)
     size = float(np.linalg.norm(robot.gravity))
-    if not floors or free is None or not size:
+    if free is None or not size:
         return 0.0
     up = -robot.gravity / size
+    planes = [row for row in tables["geometries"] if row["kind"] == "plane" and row["body"] == WORLD]
+    slopes = {row["name"]: float(np.array(row.get("normal", Z)) @ up) for row in planes}
+    floors = {name: slope for name, slope in slopes.items() if slope > _STEEP}
+    if not floors:
+        return 0.0
     raised = {key: value for key, value in tables.items() if key not in {"gravity", "omitted", "control"}}
     raised["joints"] = _lifted(tables["joints"], _ABOVE * up)
     x, y, z = robot.gravity.tolist()
@@ -287,9 +295,9 @@ def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> floa
     ends = {pair.name: pair.geometries[1] for pair in mechanism.pairs}
     heights = []
     for contact, touch in zip(mechanism.contacts, touching, strict=True):
-        floor = floors.get(ends[contact.pair])
-        if floor is not None:
-            heights.append(touch.gap / float(np.array(floor.get("normal", Z)) @ up) - _ABOVE)
+        slope = floors.get(ends[contact.pair])
+        if slope is not None:
+            heights.append(touch.gap / slope - _ABOVE)
     return lift(min(heights), drop) if heights else 0.0
 
 
@@ -335,7 +343,7 @@ def start_of(file: RobotFile, robot: Robot, controller: Controller, *, placed: b
             rates = home.velocity[joint.name][0]
         if joint.kind == JointKind.FREE and not position and (home is None or start.base is not None):
             if start.base is not None:
-                R = np.asarray(Rotation.from_quat(start.base[3:], scalar_first=True).as_matrix())
+                R = from_quaternion(start.base[3:])
                 p = np.array(start.base[:3])
             spin = R @ np.array(start.base_velocity[3:])
             rates = np.concatenate([start.base_velocity[:3], spin])

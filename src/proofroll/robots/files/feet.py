@@ -6,6 +6,7 @@ of who touches whom needs no rules of ours. Of a URDF the pairs with a floor cou
 
 from __future__ import annotations
 
+import itertools
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,13 +15,12 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import fromstring, tostring
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.number_format import counted
 from proofroll.elements.mechanism import WORLD
-from proofroll.elements.mechanism.scene.rotations import to_rpy
+from proofroll.elements.mechanism.scene.rotations import frame_of_axis, to_quaternion, to_rpy
 from proofroll.files.json_data import plain
 from proofroll.robots.files import reading
 from proofroll.robots.files.meaning import by_definer, opened
@@ -34,19 +34,23 @@ from proofroll.robots.states import RobotStates
 # What a robot stands on: the number of each in the parameter ``ground`` of a scene.
 NO_GROUND, OF_FILE, ON_A_PLANE = "none", "file", "plane"
 GROUNDS = (NO_GROUND, OF_FILE, ON_A_PLANE)
-FLOOR = "floor"
-_NAMED = 4  # links in a clause
+FLOOR, NO_FLOOR = "floor", "no floor"
+_NAMED = 4  # links or shapes in a clause
 _FRICTION = 1.0  # of shapes of a URDF, which has none
 _ANOTHER_WAY = "give [ground] feet = {LINK = radius}, or take --ground none"
 # Pairs of shapes that have a rule of contact in a scene.
-_RULED = {frozenset(("plane", kind)) for kind in ("sphere", "capsule", "box", "cylinder", "ellipsoid")} | {
+_RULED = {frozenset(("plane", kind)) for kind in ("sphere", "capsule", "box", "cylinder", "ellipsoid", "mesh")} | {
     frozenset(("sphere", "capsule")),
     frozenset(("sphere", "box")),
     frozenset(("sphere", "cylinder")),
     frozenset(("capsule", "box")),
     *(frozenset((kind,)) for kind in ("sphere", "capsule", "box")),
 }
-_ROUND = ("sphere", "capsule")  # a margin around these is a larger radius
+# Shapes without a rule on a box that have one on its face, as on a plane.
+_ON_FACES = ("cylinder", "ellipsoid", "mesh")
+_ROUND = ("sphere", "capsule", "mesh")  # a margin around these, or around the corners of a mesh, is a larger radius
+_MOST_CORNERS = 64  # of the convex hull of a mesh; each is a contact
+_OVERLAP = 1e-6  # m: at the start, of shapes out of which no robot is lifted
 _THIN = 1e-3  # m: margin around other shapes that is left out
 _REBOUNDS = 0.5  # damping ratio of a soft contact below which it visibly rebounds
 _SLIDES, _SPINS, _ROLLS = 1, 4, 6  # dimensions of MuJoCo's contacts without friction, and with more than sticking
@@ -131,7 +135,15 @@ def ground_tables(
 
 
 class _Shape(NamedTuple):
-    """A shape of the file: unique name, body of the scene and its link, MuJoCo's kind and size, pose in the body."""
+    """A shape of the file.
+
+    Attributes:
+        name: unique.
+        body, link: body of the scene, and link.
+        kind, size: MuJoCo's.
+        p, R: pose in the body.
+        corners: of a mesh, in its axes [m].
+    """
 
     name: str
     body: str
@@ -140,14 +152,32 @@ class _Shape(NamedTuple):
     size: Sequence[float]
     p: Array
     R: Array
+    corners: Sequence[Sequence[float]] = ()
+
+    def face(self, axis: int, side: int) -> _Shape:
+        """Plane in which a face of a box lies."""
+        normal = side * self.R[:, axis]
+        name = f"{self.name} face {'-+'[side > 0]}{'xyz'[axis]}"
+        return self._replace(name=name, kind="plane", p=self.p + self.size[axis] * normal, R=frame_of_axis(normal))
+
+    def tables(self, margin: float) -> list[dict[str, Any]]:
+        """Tables of the geometry, of each corner of a mesh, with a margin added around it."""
+        if self.kind != "mesh":
+            return [self.table(margin)]
+        places = self.p + np.array(self.corners) @ self.R.T
+        points = (
+            self._replace(name=f"{self.name} corner {number}", kind="sphere", size=(0.0,), p=place)
+            for number, place in enumerate(places, 1)
+        )
+        return [point.table(margin) for point in points]
 
     def table(self, margin: float) -> dict[str, Any]:
-        """Table of the geometry, with a margin added around it."""
+        """Table of the geometry, which is no mesh, with a margin added around it."""
         grown = f"{self.name} and {margin:g} m" if margin else self.name
         row: dict[str, Any] = {"name": grown, "body": self.body, "kind": self.kind, "position": self.p.tolist()}
         size, axis = list(self.size), self.R[:, 2].tolist()
         if self.kind == "plane":
-            return row | {"normal": axis}
+            return row | {"position": (self.p + margin * self.R[:, 2]).tolist(), "normal": axis}
         if self.kind == "sphere":
             return row | {"radius": size[0] + margin}
         if self.kind in {"capsule", "cylinder"}:
@@ -165,7 +195,8 @@ class _NearPair:
         friction: coefficients along two directions [1], of spin [m], of rolling about two axes [m].
         softness: time constant [s] and damping ratio, or two negative numbers.
         margin: distance from which it presses [m].
-        distance: the least one that was seen [m].
+        distance, start: the least one that was seen, and that at the start [m].
+        face: axis and side of the face of a box of the world within whose borders they met; empty: there is none.
     """
 
     shapes: tuple[_Shape, ...]
@@ -174,9 +205,19 @@ class _NearPair:
     softness: Sequence[float]
     margin: float
     distance: float
+    start: float
+    face: Sequence[int]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "shapes", tuple(sorted(self.shapes, key=lambda shape: shape.body == WORLD)))
+        moving, other = sorted(self.shapes, key=lambda shape: shape.body == WORLD)
+        if self.face and self.touches and other.kind == "box" and moving.kind in _ON_FACES:
+            other = other.face(*self.face)
+        object.__setattr__(self, "shapes", (moving, other))
+
+    @property
+    def touches(self) -> bool:
+        """True if they pressed each other."""
+        return self.distance <= max(self.margin, 0.0)
 
     @property
     def moves(self) -> bool:
@@ -185,14 +226,21 @@ class _NearPair:
 
     @property
     def on_floor(self) -> bool:
-        """True if one shape is a plane of the world."""
-        return self.shapes[1].kind == "plane" and self.shapes[1].body == WORLD
+        """True if one shape is a plane of the world, and no face of a box."""
+        return self.shapes[1].kind == "plane" and self.shapes[1].body == WORLD and not self.face
 
     @property
-    def grown(self) -> int | None:
-        """Number of the shape to which the margin is added; None: there is no margin, or no round shape."""
-        rounds = [place for place, shape in enumerate(self.shapes) if shape.kind in _ROUND]
-        return rounds[0] if self.margin > 0 and rounds else None
+    def on_face(self) -> bool:
+        """True if one shape is the plane of a box's face."""
+        return self.shapes[1].kind == "plane" and bool(self.face)
+
+    @property
+    def grown(self) -> tuple[float, float]:
+        """Margins around both shapes [m], if one is round; MuJoCo presses in the middle between them."""
+        rounds = [shape.kind in _ROUND for shape in self.shapes]
+        takes = [item or shape.kind == "plane" for item, shape in zip(rounds, self.shapes, strict=True)]
+        share = self.margin / sum(takes) if self.margin > 0 and any(rounds) else 0.0
+        return share * takes[0], share * takes[1]
 
     def reasons(self) -> Iterator[str]:
         """Reasons that a scene has no such pair."""
@@ -203,13 +251,19 @@ class _NearPair:
             yield "friction of another size along another direction"
         if self.dim >= _ROLLS and self.friction[3] != self.friction[4]:
             yield "rolling friction of another size about another axis"
-        several = {"capsule", "cylinder", "box"} & set(kinds) and "sphere" not in kinds
+        most = max(len(shape.corners) for shape in self.shapes)
+        if most > _MOST_CORNERS:
+            yield f"a mesh whose convex hull has {most} corners; at most {_MOST_CORNERS} are taken"
+        several = {"capsule", "cylinder", "box", "mesh"} & set(kinds) and "sphere" not in kinds
         if several and (self.table(None).keys() & {"spinning_friction", "rolling_resistance"}):
-            yield f"{' on '.join(kinds)} with friction against turning"
-        if self.margin > _THIN and self.grown is None:
+            yield f"{' on '.join(kinds)} with friction against turning: of condim 4 or 6, 3 is taken"
+        if self.margin > _THIN and not any(self.grown):
             yield f"a margin of {self.margin:g} m around {kinds[0]}"
         if self.softness[0] > 0 and self.softness[1] < _REBOUNDS:
             yield "a contact that rebounds by its softness"
+        if self.margin - self.start > _OVERLAP and self.shapes[1].kind != "plane":
+            by = f"they overlap by {1e3 * (self.margin - self.start):.3g} mm at the start"
+            yield f"{by}: begin elsewhere by [start], or exclude the pair in the file"
 
     def table(self, friction: float | None) -> dict[str, Any]:
         """Table of the pair's laws; ``friction``: in place of the file's."""
@@ -230,27 +284,36 @@ def _tables(file: RobotFile, pairs: Sequence[_NearPair], friction: float | None,
     """
     geometries: dict[str, dict[str, Any]] = {}
     rows, left_out, wrong = list[dict[str, Any]](), list(lost), list[str]()
+    stands, others, endless = list[tuple[str, float]](), 0, dict[str, list[str]]()
     for pair in pairs:
         names = " and ".join(shape.name for shape in pair.shapes)
         if reasons := list(pair.reasons()):
-            if pair.distance > max(pair.margin, 0.0):
-                left_out.append(f"contact of {names}, {1e3 * pair.distance:.0f} mm apart ({reasons[0]})")
-            else:
+            if pair.touches:
                 wrong.append(f"{names} ({reasons[0]})")
+            else:
+                left_out.append(f"contact of {names}, {1e3 * pair.distance:.0f} mm apart ({reasons[0]})")
             continue
-        ends = [shape.table(pair.margin if place == pair.grown else 0.0) for place, shape in enumerate(pair.shapes)]
-        geometries |= {end["name"]: end for end in ends}
-        rows.append({"name": f"{ends[0]['name']} on {ends[1]['name']}", "geometries": [end["name"] for end in ends]})
-        rows[-1] |= pair.table(friction)
+        if pair.on_face:
+            endless.setdefault(pair.shapes[1].name, []).append(pair.shapes[0].name)
+        laws = pair.table(friction)
+        stands += [(pair.shapes[0].name, laws["friction"])] if pair.on_floor else []
+        others += not pair.on_floor
+        ends = [shape.tables(margin) for shape, margin in zip(pair.shapes, pair.grown, strict=True)]
+        for end, other in itertools.product(*ends):
+            geometries |= {end["name"]: end, other["name"]: other}
+            both = [end["name"], other["name"]]
+            rows.append({"name": " on ".join(both), "geometries": both} | laws)
     if wrong:
         more = f" and {counted(len(wrong) - 1, 'other pairs')}" if len(wrong) > 1 else ""
         raise InputError("ground", file.path, f"a scene has no contact of {wrong[0]}{more}; {_ANOTHER_WAY}")
     if not rows:
-        advice = (
-            "no shape of it comes near a floor or another shape within a second; give [ground] feet = {LINK = radius}"
-        )
-        raise InputError("ground", file.path, f"{advice}, or take --ground plane")
-    return GroundTables(list(geometries.values()), rows, _about(geometries, rows), left_out)
+        near = "no shape of it comes near a floor or another shape within a second"
+        if pairs:
+            near = f"no shapes that come near each other within a second have a rule or touch: {left_out[-1]}"
+        advice = "give [ground] feet = {LINK = radius}, or take --ground plane or none"
+        raise InputError("ground", file.path, f"{near}; {advice}")
+    left_out += [f"edges of {face}, which is endless for {_listed(shapes)}" for face, shapes in endless.items()]
+    return GroundTables(list(geometries.values()), rows, _about(stands, others), left_out)
 
 
 def _balls(standing: StandingRobot, feet: Mapping[str, float], friction: float) -> GroundTables:
@@ -266,20 +329,18 @@ def _balls(standing: StandingRobot, feet: Mapping[str, float], friction: float) 
         shape = _Shape(name=link, body=body, link=link, kind="sphere", size=(radius,), p=p, R=R)
         geometries[link] = shape.table(0.0)
     rows = [{"name": link, "geometries": [link, FLOOR], "friction": friction} for link in geometries]
+    about = _about([(link, friction) for link in geometries], 0)
     geometries[FLOOR] = {"name": FLOOR, "body": WORLD, "kind": "plane"}
-    return GroundTables(list(geometries.values()), rows, _about(geometries, rows), ["shapes of the file"])
+    return GroundTables(list(geometries.values()), rows, about, ["shapes of the file"])
 
 
-def _about(geometries: Mapping[str, Mapping[str, Any]], pairs: Sequence[Mapping[str, Any]]) -> str:
-    """Clause on what stands on what."""
-    floors = {name for name, row in geometries.items() if row["kind"] == "plane" and row["body"] == WORLD}
-    on_floor = [pair for pair in pairs if floors & set(pair["geometries"])]
-    feet = {name for pair in on_floor for name in pair["geometries"]} - floors
-    least, *_, most = sorted(f"{pair['friction']:g}" for pair in on_floor) * 2 or [""] * 2
+def _about(stands: Sequence[tuple[str, float]], others: int) -> str:
+    """Clause on what stands on what: shapes and frictions of the pairs with a floor, and the number of other pairs."""
+    feet = {name for name, _ in stands}
+    least, *_, most = sorted(f"{friction:g}" for _, friction in stands) * 2 or [""] * 2
     rough = f"friction {least}" if least == most else f"friction {least} to {most}"
-    stands = f"{counted(len(feet), 'shapes')} on a floor, {rough}" if on_floor else "no floor"
-    others = len(pairs) - len(on_floor)
-    return f"{stands}; {counted(others, 'other pairs')}" if others else stands
+    words = f"{counted(len(feet), 'shapes')} on a floor, {rough}" if stands else NO_FLOOR
+    return f"{words}; {counted(others, 'other pairs')}" if others else words
 
 
 def _shape(standing: StandingRobot, row: Mapping[str, Any]) -> _Shape:
@@ -294,6 +355,7 @@ def _shape(standing: StandingRobot, row: Mapping[str, Any]) -> _Shape:
         size=row["size"],
         p=p + R @ np.array(row["position"]),
         R=R @ np.array(row["rotation"]),
+        corners=row["corners"],
     )
 
 
@@ -301,7 +363,7 @@ def _coordinates(start: RobotStates) -> dict[str, list[float]]:
     """Joint -> coordinates of a start, as :func:`proofroll.robots.importers.mujoco_shapes.near_shapes` takes them."""
     rows: dict[str, list[float]] = {name: values[:1].tolist() for name, values in start.angle.items()}
     for name, matrices in start.rotation.items():
-        turned = Rotation.from_matrix(matrices[0]).as_quat(scalar_first=True).tolist()
+        turned = to_quaternion(matrices[0]).tolist()
         rows[name] = [*start.position[name][0].tolist(), *turned] if name in start.position else turned
     return rows
 
@@ -322,10 +384,13 @@ def _with_contacts(file: RobotFile) -> tuple[bytes, list[str]]:
 
 def _meshes(links: Sequence[str]) -> list[str]:
     """Clause on the meshes of links that collide in a file."""
-    if not links:
-        return []
-    named = ", ".join(links[:_NAMED]) + (f" and {counted(len(links) - _NAMED, 'others')}" if links[_NAMED:] else "")
-    return [f"collision meshes of {named}"]
+    return [f"collision meshes of {_listed(links)}"] if links else []
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The first names, and the number of the others."""
+    others = counted(len(names) - _NAMED, "others")
+    return ", ".join(names[:_NAMED]) + (f" and {others}" if names[_NAMED:] else "")
 
 
 def _near(path: Path, kind: str, content: bytes, asked: dict[str, Any]) -> dict[str, Any]:

@@ -13,12 +13,11 @@ from typing import Any
 from xml.etree.ElementTree import tostring
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, FACTS, LAWS, ONE_COORDINATE, JointKind
-from proofroll.elements.mechanism.scene.rotations import to_rpy
+from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_quaternion, to_rpy
 from proofroll.robots.files.meaning import opened, robot_of_text
 from proofroll.robots.files.mjcf.parse import COMPENSATION
 from proofroll.robots.files.robot_file import Keyframe, RobotFile
@@ -194,7 +193,7 @@ def _joint(
 
 
 def _quaternion(R: Array) -> Any:
-    return Rotation.from_matrix(R).as_quat(scalar_first=True).tolist()
+    return to_quaternion(R).tolist()
 
 
 def _coupled(robot: Robot) -> Iterator[dict[str, Any]]:
@@ -291,7 +290,7 @@ def keyframe_states(robot: Robot, keyframe: Keyframe) -> RobotStates:
         if joint.kind in ONE_COORDINATE:
             angle[joint.name] = q - joint.ref if q.size else np.zeros(1)
         elif q.size:
-            rotation[joint.name] = np.asarray(Rotation.from_quat(q[-4:], scalar_first=True).as_matrix())[None]
+            rotation[joint.name] = from_quaternion(q[-4:])[None]
         else:
             rotation[joint.name] = np.array(home["rotation"] if joint.kind == JointKind.FREE else np.eye(3))[None]
         if joint.kind == JointKind.FREE:

@@ -7,10 +7,10 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, choices, error_location
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
+from proofroll.elements.mechanism.scene.rotations import from_rpy
 from proofroll.robots.files.robot_file import LintRemark, RobotFile, numbers
 from proofroll.robots.model import DOFS, NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint
 
@@ -169,7 +169,7 @@ def _origin(element: Element) -> tuple[Array, Array]:
     if origin is None:
         return np.zeros(3), np.eye(3)
     angles = numbers(origin, "rpy", "0 0 0", 3)
-    return np.array(numbers(origin, "xyz", "0 0 0", 3)), np.asarray(Rotation.from_euler("xyz", angles).as_matrix())
+    return np.array(numbers(origin, "xyz", "0 0 0", 3)), from_rpy(angles)
 
 
 def _body(name: str, link: Element) -> tuple[RobotBody, dict[str, Any]]:

@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
+from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_quaternion
 from proofroll.engines.mujoco.running import mass_matrix, written
 from proofroll.robots.importers.mujoco_actuators import actuators_of, is_off, reflected
 from proofroll.robots.importers.mujoco_shapes import near_shapes
@@ -164,7 +164,7 @@ def _at(
                 data.qpos[q : q + 3] = states.position[name][k]
                 T[v + 3 : v + 6, v + 3 : v + 6] = R.T  # its angular velocity has body axes
                 q += 3
-            data.qpos[q : q + 4] = Rotation.from_matrix(R).as_quat(scalar_first=True)
+            data.qpos[q : q + 4] = to_quaternion(R)
         elif name in states.angle:
             data.qpos[q] += states.angle[name][k]
     mujoco.mj_forward(model, data)
@@ -471,4 +471,4 @@ def _first(value: Any) -> float:
 
 def matrix(quaternion: Array) -> Array:
     """Rotation matrix of a quaternion w, x, y, z, shape (3, 3)."""
-    return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())
+    return from_quaternion(quaternion)

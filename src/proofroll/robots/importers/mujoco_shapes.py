@@ -16,6 +16,9 @@ from proofroll.robots.protocol import lift
 _NEAR, _HIGH = 0.02, 10.0
 # Duration of the run [s], and its largest number of steps times velocities.
 _SECONDS, _MOST = 1.0, 2e5
+# Cosine between the normals of a contact and of a face from which on the contact is one of this face (MuJoCo may give
+# that of the other face of almost parallel ones), and way of its place from the border of the face [m].
+_UPRIGHT, _WITHIN = 0.99, 1e-3
 _KINDS = {
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")): name.lower().replace("hfield", "height field")
     for name in ("plane", "sphere", "capsule", "box", "cylinder", "ellipsoid", "mesh", "hfield", "sdf")
@@ -43,8 +46,8 @@ def near_shapes(
         drop: height of the lowest shape over the floor [m]; None: as it is, or 1 cm where it overlaps the floor.
 
     Returns:
-        ``shapes`` as by :func:`_shape`; ``pairs`` with the numbers of two ``shapes``, their laws and the least
-        ``distance`` [m].
+        ``shapes`` as by :func:`_shape`; ``pairs`` with the numbers of two ``shapes``, their laws, the least
+        ``distance`` [m] and that at the ``start``, and the ``face`` of a box by :func:`_face`.
     """
     model = _compiled(path, base_joint, floor=floor)
     data = mujoco.MjData(model)
@@ -53,14 +56,17 @@ def near_shapes(
     found: dict[tuple[int, int], dict[str, Any]] = {}
     _widen(model.geom_gap, model.geom_margin, _NEAR / 2 if _gap_widens() else _NEAR)
     _widen(model.pair_gap, model.pair_margin, _NEAR)
-    for _ in range(min(int(_SECONDS / model.opt.timestep), int(_MOST / max(model.nv, 1)))):
+    for step in range(min(int(_SECONDS / model.opt.timestep), int(_MOST / max(model.nv, 1)))):
         mujoco.mj_step(model, data)
         if not np.isfinite(data.qacc).all() or data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number:
             break
         for contact in data.contact[: data.ncon]:
             first, second = sorted(contact.geom.tolist())
-            laws = found.setdefault((first, second), _laws(contact))
+            face = _face(model, data, contact)
+            laws = found.setdefault((first, second), _laws(contact) | {"face": face, "start": _NEAR})
             laws["distance"] = min(laws["distance"], float(contact.dist))
+            laws["face"] = face if laws["face"] == face else []
+            laws["start"] = laws["start"] if step else min(laws["start"], float(contact.dist))
     geoms = sorted({geom for pair in found for geom in pair})
     pairs = [{"shapes": [geoms.index(geom) for geom in pair]} | laws for pair, laws in sorted(found.items())]
     return {"shapes": [_shape(model, geom) for geom in geoms], "pairs": pairs}
@@ -75,6 +81,22 @@ def _laws(contact: Any) -> dict[str, Any]:
         "margin": float(contact.includemargin),
         "distance": float(contact.dist),
     }
+
+
+def _face(model: Any, data: Any, contact: Any) -> list[int]:
+    """Axis and side of the face of a box of the world that another shape meets within its borders; empty: it does not.
+
+    The normal of such a contact is that of the face.
+    """
+    for geom, sign in zip(contact.geom.tolist(), (1, -1), strict=True):
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX and not model.body_weldid[model.geom_bodyid[geom]]:
+            axes, half = data.geom_xmat[geom].reshape(3, 3), model.geom_size[geom]
+            normal, place = sign * contact.frame[:3] @ axes, (contact.pos - data.geom_xpos[geom]) @ axes
+            axis = int(np.argmax(np.abs(normal)))
+            beyond = np.delete(np.abs(place) - half, axis).max()
+            if abs(normal[axis]) > _UPRIGHT and beyond < -_WITHIN:
+                return [axis, int(np.sign(normal[axis]))]
+    return []
 
 
 def _compiled(path: Path, base_joint: str, *, floor: bool) -> Any:
@@ -159,16 +181,31 @@ def _gap_widens() -> bool:
 
 
 def _shape(model: Any, geom: int) -> dict[str, Any]:
-    """A shape: name (empty: it has none), body (empty: the world), kind, MuJoCo's size, place and axes in the body."""
+    """A shape: name (empty: it has none), body (empty: the world), kind, MuJoCo's size, place and axes in the body.
+
+    ``corners``: those of the convex hull of a mesh, in its axes [m].
+    """
     axes = np.zeros(9)
     mujoco.mju_quat2Mat(axes, model.geom_quat[geom])
-    body = int(model.geom_bodyid[geom])
+    body, kind = int(model.geom_bodyid[geom]), _KINDS[int(model.geom_type[geom])]
     return {
         "name": model.geom(geom).name,
         "number": geom - int(model.body_geomadr[body]),
         "body": model.body(body).name if body else "",
-        "kind": _KINDS[int(model.geom_type[geom])],
+        "kind": kind,
         "size": model.geom_size[geom].tolist(),
+        "corners": _corners(model, int(model.geom_dataid[geom])) if kind == "mesh" else [],
         "position": model.geom_pos[geom].tolist(),
         "rotation": axes.reshape(3, 3).tolist(),
     }
+
+
+def _corners(model: Any, mesh: int) -> list[list[float]]:
+    """Corners of the convex hull of a mesh, by which MuJoCo lets it touch."""
+    first, vertices = int(model.mesh_graphadr[mesh]), model.mesh_vert[int(model.mesh_vertadr[mesh]) :]
+    if first < 0:
+        return []
+    count = int(model.mesh_graph[first])  # it is followed by that of faces, places of edges, and numbers of corners
+    numbers = model.mesh_graph[first + 2 + count : first + 2 + 2 * count]
+    corners: list[list[float]] = vertices[numbers].astype(float).tolist()
+    return corners

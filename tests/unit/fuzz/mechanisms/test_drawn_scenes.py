@@ -19,6 +19,17 @@ from proofroll_fuzz.mechanisms.families import FAMILIES
 from proofroll_fuzz.relations import write_scene
 
 SEEDS = range(10)
+# Feature of a scene of contact -> capability that it asks for; an engine without it has the scene told as unfit.
+SHAPES = {
+    "sphere": MechanismCapability.SPHERES,
+    "ellipsoid": MechanismCapability.ELLIPSOIDS,
+    "box": MechanismCapability.BOXES,
+    "capsule": MechanismCapability.CAPSULES,
+    "cylinder": MechanismCapability.CYLINDERS,
+    "bore": MechanismCapability.BORES,
+    "shaft": MechanismCapability.SHAFTS,
+    "bowl": MechanismCapability.BOWLS,
+}
 # Capability that no family has as a feature -> how it is drawn, or why not.
 WITHOUT_FEATURE: Mapping[str, str] = {
     MechanismCapability.CONTACT: "every scene of contact has it",
@@ -26,6 +37,13 @@ WITHOUT_FEATURE: Mapping[str, str] = {
     MechanismCapability.REDUNDANT: "planar loops have it; an analysis of the scene finds it, not its keys",
     MechanismCapability.ORIENTATION: "asked for; no part of a scene",
     MechanismCapability.COUPLINGS_OF_MANY: "not drawn: its rows are those of a coupling of two",
+    MechanismCapability.PLANES: "the ground of most scenes of contact",
+    MechanismCapability.VERTICES: "not drawn: a box has eight",
+    MechanismCapability.DISCS: "not drawn: a cylinder has two rims",
+    MechanismCapability.CONES: "not drawn: tables and bowls are their limits",
+    MechanismCapability.TORI: "not drawn: a shaft is the limit",
+    MechanismCapability.DECLARED_WALLS: "not drawn: code of a package, no table",
+    **{name: f"drawn as the feature {shape}" for shape, name in SHAPES.items()},
 }
 # Keys of the vocabulary that are not drawn, as table.key -> reason.
 NOT_DRAWN: Mapping[str, str] = {
@@ -88,6 +106,13 @@ def test_each_capability_is_drawn_or_excused(tmp_path: Path) -> None:
     for number, capability in enumerate(set(MechanismCapability) & features.keys()):
         tables = FAMILIES[features[capability]].draw(Choices(0), [capability])
         assert capability in read(tmp_path / str(number), tables).requires, capability
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_shape_is_asked_of_an_engine(shape: str, tmp_path: Path) -> None:
+    """A scene drawn with a shape needs the capability of that shape."""
+    tables = FAMILIES["contact"].draw(Choices(0), [shape])
+    assert SHAPES[shape] in read(tmp_path / shape, tables).requires
 
 
 def test_each_key_is_drawn_or_excused() -> None:

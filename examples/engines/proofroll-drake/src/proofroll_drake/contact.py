@@ -117,11 +117,9 @@ def _properties(friction: float) -> ProximityProperties:
 
 
 def _shape(shape: Any, sunk: float) -> Any:
-    """Drake's shape, enlarged by its depth ``sunk`` at the start [m]. Raises Refused for other kinds of shapes."""
-    if shape.kind == "sphere" and shape.radius:
+    """Drake's shape, enlarged by its depth ``sunk`` at the start [m]."""
+    if shape.kind == "sphere":
         return Sphere(shape.radius + sunk)
     if shape.kind == "ellipsoid":
         return Ellipsoid(np.array(shape.axes) + sunk)
-    if shape.kind == "plane":
-        return HalfSpace()
-    raise Refused(f"{shape.name}: Drake's points of contact are built of spheres with a radius, ellipsoids and planes")
+    return HalfSpace()

@@ -50,7 +50,8 @@ DISCRETE: frozenset[str] = CONTINUOUS | {
     _CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT,
     _CAPABILITY.COUPLINGS, _CAPABILITY.STOPS, _CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS,
 }  # fmt: skip
-CONTACT: frozenset[str] = CONTINUOUS | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION}
+_TOUCH = {_CAPABILITY.SPHERES, _CAPABILITY.ELLIPSOIDS, _CAPABILITY.PLANES}
+CONTACT: frozenset[str] = CONTINUOUS | _TOUCH | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION}
 _LOOPS = "a continuous plant of Drake has no constraints, and its drives are constant here; take formulation=discrete"
 _BESIDE = "Drake has loops and laws of joints beside its SAP solver alone"
 _NOWHERE = {
@@ -60,7 +61,10 @@ _NOWHERE = {
 LACKING: Mapping[str, Mapping[str, str]] = {
     "continuous": dict.fromkeys(DISCRETE - CONTINUOUS, _LOOPS) | _NOWHERE,
     "contact": dict.fromkeys(DISCRETE - CONTINUOUS, _BESIDE)
-    | {_CAPABILITY.CONTACT_REBOUNDS: "Drake's points of contact only dissipate"},
+    | {
+        _CAPABILITY.CONTACT_REBOUNDS: "Drake's points of contact only dissipate",
+        _CAPABILITY.VERTICES: "Drake's spheres have a radius",
+    },
     "discrete": _NOWHERE,
 }
 _SOFT = "Drake's SAP solver makes constraints as stiff as its step can carry, and no stiffer; the first step shows it"

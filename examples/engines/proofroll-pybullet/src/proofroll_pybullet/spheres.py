@@ -28,7 +28,14 @@ from proofroll_pybullet.world import World
 
 _CAPABILITY = MechanismCapability
 PROVIDES: frozenset[str] = frozenset(
-    {_CAPABILITY.FREE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
+    {
+        _CAPABILITY.FREE,
+        _CAPABILITY.CONTACT,
+        _CAPABILITY.CONTACT_FRICTION,
+        _CAPABILITY.CONTACT_REBOUNDS,
+        _CAPABILITY.SPHERES,
+        _CAPABILITY.PLANES,
+    }
 )
 _ALONE = "its bodies are free ones, each with its spheres"
 LACKING: Mapping[str, str] = {

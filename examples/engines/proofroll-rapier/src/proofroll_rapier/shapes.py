@@ -53,10 +53,8 @@ def _collider(item: Any) -> Any:
     elif item.kind == "box":
         made = colliders.cuboid(*(np.array(item.size) / 2))
         rotation = Rotation.from_euler("xyz", item.orientation).as_matrix()
-    elif item.kind in {"capsule", "cylinder"}:
+    else:
         stands = colliders.capsule_y if item.kind == "capsule" else colliders.cylinder
         made = stands(item.length / 2, item.radius)
         rotation = np.roll(frame_of_axis(np.array(item.axis)), -1, axis=1)  # those of Rapier stand on y
-    else:
-        raise Refused(f"{item.name}: this adapter builds no {item.kind}")
     return made.position(isometry(item.position, rotation))

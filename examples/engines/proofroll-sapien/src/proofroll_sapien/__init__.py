@@ -44,7 +44,8 @@ _CAPABILITY = MechanismCapability
 _PROVIDES = frozenset(
     {
         _CAPABILITY.FREE, _CAPABILITY.PLANAR, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION,
-        _CAPABILITY.CONTACT_REBOUNDS,
+        _CAPABILITY.CONTACT_REBOUNDS, _CAPABILITY.VERTICES, _CAPABILITY.SPHERES, _CAPABILITY.CAPSULES,
+        _CAPABILITY.BOXES, _CAPABILITY.PLANES,
     }
 )  # fmt: skip
 _ALONE = "this adapter's bodies are not joined: they are free, or move in a plane"
@@ -154,7 +155,7 @@ class Sapien:
                 frame = np.roll(frame_of_axis(shape.normal), 1, axis=1)  # PhysX's normal is x
                 found[shape].local_pose = sapien.Pose(shape.point, to_quaternion(frame))
             else:
-                raise Refused("only spheres, boxes, and planes of the world are built")
+                raise Refused("sides of capsules, and planes that move, are not built")
             found[shape].set_collision_groups(groups[shape])
         return found
 

@@ -18,6 +18,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 
 # Response to moments, in parts of that without contacts, that is round-off of what contacts hold.
 _HELD = 1e-9
+_UNIT = np.eye(3)
 _INDEPENDENT = 1e-15  # least response of independent rows, relative to the largest
 
 
@@ -65,9 +66,9 @@ class TurningFriction:
 
     def resisted(self, normal: Array, turning: Array) -> Array:
         """Resisted part of angular velocities, (3,) or (3, velocities); 0 where it is round-off of the whole."""
-        projection = np.outer(normal, normal)
-        part = (projection if self.spins else np.eye(3) - projection) @ turning
-        return part if part.dtype == object else _without_round_off(part, np.linalg.norm(turning, axis=0))
+        projection = normal[:, None] * normal
+        part = (projection if self.spins else _UNIT - projection) @ turning
+        return part if part.dtype == object else _without_round_off(part, np.sqrt((turning * turning).sum(axis=0)))
 
     def opposed(self, normal: Array, turning: Array, slide: Array) -> Array:
         """Angular velocity that the moment opposes [rad/s], (3,), at those of a relative to b and a slide [m/s].
@@ -97,7 +98,7 @@ class TurningFriction:
 
 def _without_round_off(part: Array, size: Any) -> Array:
     """A part of vectors of a size, (3,) or (3, vectors), without vectors that are round-off."""
-    return np.where(np.linalg.norm(part, axis=0) > ROUND_OFF * size, part, 0.0)
+    return np.where(np.sqrt((part * part).sum(axis=0)) > ROUND_OFF * size, part, 0.0)
 
 
 def largest_response(free: Array, into: Array, held: Array) -> float:

@@ -58,9 +58,11 @@ class Moving(NamedTuple):
 
     def velocity(self, place: Array) -> Array:
         """Velocity of the body's material at a place in the world [m/s]."""
-        (x, y, z), (a, b, c), (u, v, w) = place.tolist(), self.p.tolist(), self.v.tolist()
-        x, y, z = plain_cross(self.w.tolist(), (x - a, y - b, z - c))
-        return np.array((u + x, v + y, w + z))
+        return np.array(self.plain_velocity(place.tolist()))
+
+    def plain_velocity(self, place: Floats3) -> Floats3:
+        """:meth:`velocity` in plain floats or symbols."""
+        return plus(self.v.tolist(), plain_cross(self.w.tolist(), minus(place, self.p.tolist())))
 
 
 class Touching(NamedTuple):
@@ -263,14 +265,13 @@ def _touch(shape_a: Shape, a: Moving, shape_b: Shape, b: Moving) -> Touching:
         assert isinstance(shape_a, SphereShape)
         assert isinstance(shape_b, SphereShape)
         gap, n, n_rate, place, rate = _two_spheres(shape_a, a, shape_b, b)
-    point = np.array(place)
     return Touching(
         gap=gap,
         normal=np.array(n),
         normal_rate=np.array(n_rate),
-        place=point,
+        place=np.array(place),
         place_rate=np.array(rate),
-        slide=a.velocity(point) - b.velocity(point),
+        slide=np.array(minus(a.plain_velocity(place), b.plain_velocity(place))),
     )
 
 
@@ -296,7 +297,8 @@ def _on_wall(shape: ConvexShape, body: Moving, wall: Wall, wall_body: Moving) ->
 
 def _on_curve(sphere: SphereShape, body: Moving, wall: CurvedWall, wall_body: Moving) -> _Lying:
     """Numbers of :func:`_on_wall` on a curved wall."""
-    axes, spin, radius = (wall_body.R @ wall.frame).tolist(), wall_body.w.tolist(), sphere.radius
+    axes = wall.axes if wall_body is AT_REST else (wall_body.R @ wall.frame).tolist()
+    spin, radius = wall_body.w.tolist(), sphere.radius
     centre, velocity = _carried(body, sphere.centre)
     beside = minus(centre, wall_body.p.tolist())
     slides = minus(velocity, plus(wall_body.v.tolist(), plain_cross(spin, beside)))  # over the wall's body

@@ -159,7 +159,7 @@ def drive(mechanism: Mechanism, values: Iterable[float]) -> None:
 def placed_start(mechanism: Mechanism) -> Placed:
     """Motion of a mechanism at time 0."""
     motion = Tree(mechanism).at(*mechanism.start())
-    quaternions = np.array([to_quaternion(R) for R in motion.R_WB[:-1]])
+    quaternions = to_quaternion(motion.R_WB[:-1])
     state = (motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], quaternions)
     return Placed(mechanism, np.zeros(1), *(part[None] for part in state))
 

@@ -343,7 +343,7 @@ class JointCoordinates:
         return {
             "p_WB": motion.p_WB[:n],
             "v_WB": motion.v_WB[:n],
-            "q_WB": np.array([to_quaternion(R) for R in motion.R_WB[:n]]),
+            "q_WB": to_quaternion(motion.R_WB[:n]),
             "w_WB": motion.w_WB[:n],
             "q": q,
             "v": v,

@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.scene.joint import Joint
 from proofroll.elements.mechanism.scene.joint_kinds import AXES, DISTANCE, FACTS, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.prescribed import moved
-from proofroll.elements.mechanism.scene.rotations import from_quaternion
+from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_quaternion
 
 TURN = 2 * np.pi
 
@@ -101,10 +101,8 @@ class Placed:
             else:
                 q.append(np.sum(self._apart(joint)[0] * axis, -1))
         if joint.kind in WITH_QUATERNION:
-            from scipy.spatial.transform import Rotation
-
             q = [*np.einsum("ti,tij->jt", self._apart(joint)[0], A)] if joint.kind == JointKind.FREE else []
-            q += [*Rotation.from_matrix(turned).as_quat(canonical=True, scalar_first=True).T]
+            q += [*to_quaternion(turned).T]
         count = len(self.time)
         return np.reshape(q, (joint.nq, count)).T, np.reshape(v, (joint.nv, count)).T
 

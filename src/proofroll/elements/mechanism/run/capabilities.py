@@ -1,14 +1,16 @@
 """Capabilities that a mechanism requires of a formulation, and the check that it provides them."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from enum import StrEnum
 
+from proofroll.core.engine_abilities import needed
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.dynamics.analysis import lacks_inertia
 from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.scene.joint_kinds import FACTS
 from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.shapes.pair_rules import CURVED
 from proofroll.elements.mechanism.scene.signal import is_held, varies
 
 
@@ -48,6 +50,20 @@ class MechanismCapability(StrEnum):
     CONTACT_REBOUNDS = "rebounds of bodies from each other (restitution)"
     TURNING_FRICTION = "friction of contacts against rolling and spinning"
     SLIP_REBOUNDS = "slips that impacts reverse (tangential restitution)"
+    VERTICES = "contact of vertices"
+    SPHERES = "contact of spheres"
+    ELLIPSOIDS = "contact of ellipsoids"
+    DISCS = "contact of flat discs"
+    PLANES = "contact with planes"
+    BOXES = "contact of boxes"
+    CAPSULES = "contact of capsules"
+    CYLINDERS = "contact of cylinders"
+    BORES = "contact with bores"
+    SHAFTS = "contact with endless shafts"
+    BOWLS = "contact with bowls"
+    CONES = "contact with cones"
+    TORI = "contact with tori"
+    DECLARED_WALLS = "contact with walls by formula"
     ACTUATORS = "actuators of joints"
     SATURATION = "limits of efforts"
     COUPLINGS = "couplings of joints"
@@ -63,6 +79,32 @@ ALL_JOINTS = frozenset(MechanismCapability[kind.upper()] for kind in FACTS)
 ALL_LOOPS = frozenset(item for item in MechanismCapability if item.name.endswith("_LOOP"))
 _FORCES = ("SPRINGS", "SPRING_LAWS", "BUSHINGS", "APPLIED_FORCES", "JOINT_SPRINGS")
 FORCES = frozenset(MechanismCapability[name] for name in _FORCES)
+# Kind of a geometry -> the capability to let it touch; a sphere of radius 0 is a vertex.
+_SHAPES = {
+    "sphere": "SPHERES",
+    "ellipsoid": "ELLIPSOIDS",
+    "circle": "DISCS",
+    "plane": "PLANES",
+    "box": "BOXES",
+    "capsule": "CAPSULES",
+    "cylinder": "CYLINDERS",
+    "bore": "BORES",
+    "shaft": "SHAFTS",
+    "bowl": "BOWLS",
+    "cone": "CONES",
+    "torus": "TORI",
+    "declared": "DECLARED_WALLS",
+}
+CURVED_WALLS = frozenset(MechanismCapability[_SHAPES[kind]] for kind in CURVED)
+ALL_SHAPES = frozenset(MechanismCapability[name] for name in (*_SHAPES.values(), "VERTICES"))
+
+
+def _touching(mechanism: Mechanism) -> Iterator[str]:
+    """Capabilities that the geometries of pairs require."""
+    names = {name for pair in mechanism.pairs for name in pair.geometries}
+    for geometry in (geometry for geometry in mechanism.geometries if geometry.name in names):
+        is_vertex = geometry.kind == "sphere" and not geometry.radius
+        yield MechanismCapability["VERTICES" if is_vertex else _SHAPES[geometry.kind]]
 
 
 def required(mechanism: Mechanism) -> frozenset[str]:
@@ -71,6 +113,7 @@ def required(mechanism: Mechanism) -> frozenset[str]:
     needs: set[str] = {*mechanism.unmodelled}
     needs |= {capability[joint.kind.upper()] for joint in mechanism.joints}
     needs |= {capability[f"{loop.kind.upper()}_LOOP"] for loop in mechanism.loops}
+    needs |= {*_touching(mechanism)}
     joints, pairs, actuators = mechanism.joints, mechanism.pairs, mechanism.actuators
     loads = mechanism.signals[: len(mechanism.signals) - len(mechanism.prescribed)]
     asked: dict[str, bool] = {
@@ -111,6 +154,4 @@ def require(mechanism: Mechanism, provided: Collection[str], reasons: Mapping[st
     """
     missing = sorted(required(mechanism) - set(provided))
     if missing:
-        raise Refused(
-            "needs " + ", ".join(f"{need}, and {reasons[need]}" if need in reasons else need for need in missing)
-        )
+        raise Refused(needed(missing, reasons))

@@ -133,13 +133,16 @@ def from_quaternion(q: Any) -> Array:
 
 
 def to_quaternion(R: Array) -> Array:
-    """Unit quaternion ``(w, x, y, z)`` with w ≥ 0 of a rotation (Bar-Itzhack 2000: the largest eigenvector of K)."""
-    K = np.zeros((4, 4))
-    K[0, 0] = np.trace(R)
-    K[1:, 1:] = R + R.T - np.trace(R) * np.eye(3)
-    K[1:, 0] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    q: Array = np.linalg.eigh(K, UPLO="L")[1][:, -1]
-    return q if q[0] >= 0 else -q
+    """Unit quaternions ``(w, x, y, z)`` with w ≥ 0 of rotations, shape (…, 3, 3).
+
+    Each is the largest eigenvector of K (Bar-Itzhack 2000).
+    """
+    K = np.zeros((*R.shape[:-2], 4, 4))
+    K[..., 0, 0] = trace = np.trace(R, axis1=-2, axis2=-1)
+    K[..., 1:, 1:] = R + R.swapaxes(-1, -2) - trace[..., None, None] * _UNIT
+    K[..., 1:, 0] = (R[..., [2, 0, 1], [1, 2, 0]]) - R[..., [1, 2, 0], [2, 0, 1]]
+    q: Array = np.linalg.eigh(K, UPLO="L")[1][..., -1]
+    return np.where(q[..., :1] >= 0, q, -q)
 
 
 def quaternion_from_z(axis: Sequence[float]) -> tuple[float, float, float, float]:

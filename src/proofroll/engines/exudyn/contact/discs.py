@@ -14,7 +14,7 @@ from typing_extensions import override
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contact.start import extent, touches
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import ALL_SHAPES, MechanismCapability
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.scene.rotations import Array, cross
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
@@ -25,11 +25,13 @@ from proofroll.engines.exudyn.smooth import redundant
 from proofroll.engines.exudyn.smooth.redundant import Redundant
 
 _CAPABILITY = MechanismCapability
-PROVIDES = redundant.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.UNBOUNDED_FRICTION}
+_TOUCH = {_CAPABILITY.DISCS, _CAPABILITY.PLANES}
+PROVIDES = redundant.PROVIDES | _TOUCH | {_CAPABILITY.CONTACT, _CAPABILITY.UNBOUNDED_FRICTION}
 _HELD = "its joint holds a disc on its plane"
 _STICKS = "its joint never slips (friction = inf)"
 LACKING: Mapping[str, str] = {
     **redundant.LACKING,
+    **dict.fromkeys(ALL_SHAPES - _TOUCH, "Exudyn's joint rolls discs on planes"),
     _CAPABILITY.CONTACT_FRICTION: _STICKS,
     _CAPABILITY.CONTACT_REBOUNDS: _HELD,
     _CAPABILITY.SLIP_REBOUNDS: _HELD,
@@ -85,8 +87,8 @@ class Discs(Redundant):
         if isinstance(contact.shape_a, HalfSpace):
             sides, sign = sides[::-1], -1.0
         (body, circle), (ground, plane) = sides
-        if not isinstance(circle, CircleShape) or not isinstance(plane, HalfSpace):
-            raise Refused(f"{contact.name} is not of a circle and a plane, and Exudyn's joint rolls discs on planes")
+        assert isinstance(circle, CircleShape)
+        assert isinstance(plane, HalfSpace)
         if not np.isinf(contact.friction):
             raise Refused(f"{contact.name} has no friction, and {_STICKS}")
         if ground != WORLD:

@@ -22,13 +22,13 @@ from proofroll.elements.mechanism.contact.modes import OPEN
 from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction, rolling_levers
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import ALL_SHAPES, CURVED_WALLS, MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import StepEvents, state_of
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.scene.rotations import Array, Floats3, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
-from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
+from proofroll.elements.mechanism.scene.shapes.shapes import CapsuleShape, HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
 from proofroll.elements.mechanism.scene.shapes.walls.curved import PlacedWall
 from proofroll.engines.exudyn.contact.hollow_spheres import HollowSphere, MovingPlane, hollow_centre, hollow_radius
@@ -40,9 +40,11 @@ from proofroll.engines.exudyn.smooth.redundant import Redundant
 
 _CAPABILITY = MechanismCapability
 _OF_CONTACT = {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.UNBOUNDED_FRICTION}
-PROVIDES = redundant.PROVIDES | _OF_CONTACT | {_CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
+_TOUCH = CURVED_WALLS | {_CAPABILITY.SPHERES, _CAPABILITY.CAPSULES, _CAPABILITY.PLANES}
+PROVIDES = redundant.PROVIDES | _OF_CONTACT | _TOUCH | {_CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
 LACKING: Mapping[str, str] = {
     **redundant.LACKING,
+    **dict.fromkeys(ALL_SHAPES - _TOUCH, "Exudyn's contacts are of spheres with a radius"),
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
     _CAPABILITY.SLIP_REBOUNDS: "this formulation has no rebounds",
     _CAPABILITY.CONTACT_REBOUNDS: "its restitution is a damping that comes near it with ever shorter steps alone",
@@ -353,11 +355,6 @@ class Spheres(Redundant):
 
 
 def _check(contact: BodyContact) -> None:
-    """Raises Refused for shapes that Exudyn's contacts do not have."""
-    for shape in (contact.shape_a, contact.shape_b):
-        if isinstance(shape, SphereShape) and not shape.radius:
-            raise Refused(f"a corner touches in {contact.name}; Exudyn's contacts are of spheres with a radius")
-        if not isinstance(shape, SphereShape | HalfSpace | CurvedWall):
-            raise Refused(
-                f"{contact.name} has a shape that is neither sphere nor wall; this formulation has no contact for it"
-            )
+    """Raises Refused for a capsule that touches with its side."""
+    if any(isinstance(shape, CapsuleShape) for shape in (contact.shape_a, contact.shape_b)):
+        raise Refused(f"the side of a capsule touches in {contact.name}; Exudyn's contacts are of spheres and walls")

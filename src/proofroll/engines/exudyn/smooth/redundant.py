@@ -172,14 +172,15 @@ class Redundant(ExudynModel):
         for number, made in enumerate(self._joints):
             force[number], torque[number] = self._connections.reaction(made)
         pushes = self._laws.pushes()
+        axes = {n: self._connections.axes(self._joints[n])[0][:, 2] for n in {law.number for law, _ in pushes}}
         for law, push in pushes:
-            vector = push * self._connections.axes(self._joints[law.number])[0][:, 2]
+            vector = push * axes[law.number]
             (force if self._mechanism.joints[law.number].kind == JointKind.PRISMATIC else torque)[law.number] += vector
         return MechanismSample(
             p_WB=self._over_bodies(Output.Position),
             v_WB=self._over_bodies(Output.Velocity),
             w_WB=self._over_bodies(Output.AngularVelocity),
-            q_WB=np.array([to_quaternion(R.reshape(3, 3)) for R in self._over_bodies(Output.RotationMatrix)]),
+            q_WB=to_quaternion(self._over_bodies(Output.RotationMatrix).reshape(-1, 3, 3)),
             joint_force=force,
             joint_torque=torque,
             **self._laws.named(pushes),

@@ -12,7 +12,7 @@ from proofroll.core.arrays import longest
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import ALL_SHAPES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.sampling import DEPENDENT, MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -40,7 +40,7 @@ _SOFT = (
     "would change that much"
 )
 PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-PROVIDES |= {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
+PROVIDES |= ALL_SHAPES | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
 LACKING: Mapping[str, str] = {
     **mechanism.LACKING,
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",

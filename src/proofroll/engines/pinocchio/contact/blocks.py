@@ -27,6 +27,7 @@ _TOGETHER = 2
 _PATIENCE = 2 * _TOGETHER
 _ACCEPTED = 1e-5  # change that is taken where no solver reaches the tolerance
 _TURNS, _LONGEST_TURN = 40, 0.7  # steps of a search for a direction, and the longest of them [rad]
+_FLAT = 1e-12  # determinant of a contact's mobility, relative to its largest cubed, that may be round-off
 _ALONG = 1e-10  # slip across a direction, relative to the largest speed, that is found
 
 
@@ -220,6 +221,9 @@ def _sticking(G: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[float, 
     c00, c01, c02 = g11 * g22 - g12 * g12, g02 * g12 - g01 * g22, g01 * g12 - g02 * g11
     c11, c12, c22 = g00 * g22 - g02 * g02, g01 * g02 - g00 * g12, g00 * g11 - g01 * g01
     size = -(g00 * c00 + g01 * c01 + g02 * c02)
+    if -size <= _FLAT * max(g00, g11, g22) ** 3:  # a body that moves in a plane alone: it gives way in two directions
+        x, y, normal = np.linalg.lstsq(np.array(G), -np.array(b), rcond=_FLAT)[0].tolist()
+        return x, y, normal
     return (
         (b[0] * c00 + b[1] * c01 + b[2] * c02) / size,
         (b[0] * c01 + b[1] * c11 + b[2] * c12) / size,

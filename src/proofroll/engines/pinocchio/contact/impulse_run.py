@@ -1,5 +1,6 @@
 """Formulation ``impulses``: run of a mechanism with contacts, dry friction and stops, and its samples."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -50,12 +51,13 @@ class ImpulseRun(MechanismRun):
         for count in range(whole_steps(start, t, self._dt)):
             steps.t = start + count * self._dt
             steps.step()
-            if not np.isfinite(steps.v.sum()):
+            if not math.isfinite(steps.v.sum()):
                 raise Diverged(f"the state is not finite at t = {steps.t:.6g} s")
         steps.t = t
 
     def _renew(self) -> None:
-        """Keeps the stepper, which evaluates all forces anew in each step."""
+        """Keeps the stepper, which evaluates all forces anew."""
+        self.steps.coming = None
 
     def _kick(self) -> Impulses:
         """Joint accelerations v̇, forces and moments of contacts [N, N m], of joint rows and motions, in the next step.
@@ -64,7 +66,8 @@ class ImpulseRun(MechanismRun):
         """
         steps = self.steps
         if steps.t:
-            kick, span = steps.kick(steps.q, steps.v), self._dt
+            steps.coming = steps.coming or steps.kick(steps.q, steps.v)
+            kick, span = steps.coming, self._dt
         else:
             span = _PART * self._dt
             kick = steps.beginning(span, convex=self._settings.convex)
@@ -74,7 +77,7 @@ class ImpulseRun(MechanismRun):
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, accelerations, joint forces in the next step, and empty loop forces."""
         q, v, kick = self.steps.q, self.steps.v, self._kick()
-        touching = self.steps.terms(q, v, self._dt).touching
+        touching = self.steps.touched(self.steps.ahead, q, v, [None] * len(self.steps.contacts))
         self.tree.now, self.dynamics.on_motions = self.steps.t, kick.driving
         data = self._placed(kick.v)
         forces = self.tree.pulls(data)
@@ -88,7 +91,7 @@ class ImpulseRun(MechanismRun):
 
     def _placed(self, acceleration: Array) -> Any:
         """Data of the present state with an acceleration."""
-        data = self._model.createData()
+        data = self._data
         pin.forwardKinematics(self._model, data, self.steps.q, self.steps.v, acceleration)
         pin.updateFramePlacements(self._model, data)
         return data

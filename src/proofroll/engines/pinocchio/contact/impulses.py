@@ -7,7 +7,7 @@ contacts separate.
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import accumulate, pairwise, starmap
+from itertools import accumulate, compress, pairwise, starmap
 from typing import Any
 
 import numpy as np
@@ -16,15 +16,22 @@ import pinocchio as pin
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers
 from proofroll.elements.mechanism.contact.start import natural_scale
-from proofroll.elements.mechanism.contact.touching import AT_REST, ONE_POINT, Moving, Touching, touch
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.contact.touching import ONE_POINT, Touching, touch
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, ALL_SHAPES, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK
 from proofroll.elements.mechanism.scene.rotations import Array, carried, frame_of_axis
 from proofroll.engines.pinocchio.contact.blocks import Block, BlockSolver
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
-from proofroll.engines.pinocchio.contact.step_terms import LARGEST_FRICTION, Impulses, SolverParts, StepTerms, solver_of
+from proofroll.engines.pinocchio.contact.step_terms import (
+    LARGEST_FRICTION,
+    Impulses,
+    MovingBodies,
+    SolverParts,
+    StepTerms,
+    solver_of,
+)
 from proofroll.engines.pinocchio.contact.turning_moments import Pressed, TurningImpulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
@@ -33,6 +40,7 @@ _CAPABILITY = MechanismCapability
 PROVIDES: frozenset[str] = (
     ALL_JOINTS
     | FORCES
+    | ALL_SHAPES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
     | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
     | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
@@ -55,6 +63,7 @@ _NEAR = 2.0
 _SMALL = 1e-9
 # Ratio of friction to its bound above which an impulse lies on the cone.
 _INSIDE = 1 - 1e-6
+_NO_CHANGE: Sequence[float] = (0.0, 0.0, 0.0)  # of slip and gap velocities
 # Ratio of the contact's mobility in two directions of the surface above which PGS returns a wrong impulse.
 _UNEQUAL = 2.0
 # Largest coefficient of the first cone, and factor on it while an impulse lies on it. Narrower cones than needed cost
@@ -76,6 +85,8 @@ class ImpulseSteps:
         events: of the contacts.
         joints: joint rows, numbered after the contacts.
         blocks: solver that goes on where Pinocchio's ADMM stops.
+        ahead: bodies later in a step, or in a sample.
+        coming: impulses of the next step, where a sample has found them.
     """
 
     def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
@@ -84,8 +95,11 @@ class ImpulseSteps:
         Raises:
             Refused: Pinocchio's solver returns wrong impulses for such contacts, or one point does not hold a body.
         """
-        self._tree, self._model, self._data = tree, tree.model, tree.model.createData()
-        self._ahead = tree.model.createData()  # later in a step
+        bodies = {body for contact in tree.mechanism.contacts for body in (contact.body_a, contact.body_b)}
+        self._tree, self._model, self._bodies = tree, tree.model, MovingBodies(tree, bodies)
+        self._data, self.ahead = self._bodies.data, MovingBodies(tree, bodies)
+        self._placed = [self._data.oMi[joint] for joint in range(tree.model.njoints)]  # where they are at any time
+        self.coming: Impulses | None = None
         self._settings, self._dt = settings, float(settings.dt or 0.0)
         self._midpoint = settings.integrator == "midpoint"
         mechanism = tree.mechanism
@@ -93,12 +107,12 @@ class ImpulseSteps:
         self.events = step_events.StepEvents(self.contacts, self._dt)
         self.q, self.v, self.t, self._gravity = tree.q0, tree.v0, 0.0, float(np.linalg.norm(mechanism.gravity))
         held = step_events.least_slip(mechanism.gravity, self._dt)
-        self._held = np.array([held if contact.friction else -1.0 for contact in self.contacts])
+        self._held = [held if contact.friction else -1.0 for contact in self.contacts]
         self._touching, self._index = natural_scale(mechanism).gap, mechanism.body_index
         self.restitution = np.array([contact.restitution for contact in self.contacts])
         self.joints = JointRows(tree)
         stops = [item.joint.restitution for item in self.joints.stops]
-        self._returned = np.concatenate([self.restitution, np.zeros(len(self.joints.friction)), stops])
+        self._returned = [*self.restitution.tolist(), *(0.0 for _ in self.joints.friction), *stops]
         self._moments = TurningImpulses(tree, float(settings.solver_tolerance or 0.0))
         self._pressed_by = [friction.pressed_by for friction in self._moments.frictions]
         self._solvers: dict[tuple[int, ...], SolverParts] = {}
@@ -111,13 +125,14 @@ class ImpulseSteps:
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
         try:
             terms = self.terms(self.q, self.v, self._dt)
-            for k, point in enumerate(terms.touching):
-                self._check(k, terms.J[k] @ terms.inverse @ terms.J[k].T, point.flat and point.gap <= self._touching)
+            for k, (point, J) in enumerate(zip(terms.touching, terms.J, strict=True)):
+                mobility = (J @ terms.inverse @ J.T).diagonal().tolist()
+                self._check(k, mobility, point.flat and point.gap <= self._touching)
         except Diverged as error:
             raise Refused(str(error)) from None
 
-    def _check(self, k: int, G: Array, flat: bool) -> None:
-        """Checks that a point holds contact ``k``, with the mobility ``G``, shape (3, 3), and that PGS is right there.
+    def _check(self, k: int, mobility: Sequence[float], flat: bool) -> None:
+        """Checks that a point holds contact ``k``, with its mobility along its three rows, and that PGS is right there.
 
         Raises:
             Diverged: a body stands on an edge, or PGS returns a wrong impulse.
@@ -126,8 +141,7 @@ class ImpulseSteps:
             raise Diverged(f"{self.contacts[k].name} {ONE_POINT}")
         if self._settings.solver != "pgs" or not self.contacts[k].friction:
             return
-        G_1, G_2 = float(G[0, 0]), float(G[1, 1])
-        if max(G_1, G_2) > _UNEQUAL * min(G_1, G_2):
+        if max(mobility[:2]) > _UNEQUAL * min(mobility[:2]):
             raise Diverged(
                 f"Pinocchio's PGS returns a wrong impulse where a contact gives way {_UNEQUAL:g} times as much in one "
                 f"direction as across it, as {self.contacts[k].name} does at {self.t:g} s; set solver=admm"
@@ -139,7 +153,7 @@ class ImpulseSteps:
         Raises:
             Diverged: Pinocchio's solver does not find the impulses.
         """
-        kick = self.kick(self.q, self.v)
+        kick, self.coming = self.coming or self.kick(self.q, self.v), None
         if self.events:
             self.events.observe(self.t + self._dt, kick.states)
         if self._midpoint:
@@ -155,25 +169,27 @@ class ImpulseSteps:
         if self._midpoint:
             q = pin.integrate(self._model, q, late * v)
         terms = self.terms(q, v, self._dt, late)
-        turning = np.zeros((len(terms.touching), 3))
-        if self._midpoint or self._returned.any():
+        turning = [_NO_CHANGE] * len(terms.touching)
+        if self._midpoint or any(self._returned):
             turning = self._turning(q, v, terms, self._dt - late)
-        shifts = self._shifts(terms.J, q, v, terms.touching, turning)
+        shifts = self._shifts(terms, q, v, turning)
         return self._turned(q, v, terms, shifts, self._dt, convex=self._settings.convex)
 
     def beginning(self, span: float, *, convex: bool) -> Impulses:
         """Impulses of a short time from now on, with the turning of the contacts (J̇v); open gaps stay open."""
         terms = self.terms(self.q, self.v, span)
-        touching, shifts = terms.touching, np.zeros((len(self._returned), 3))
-        shifts[: len(touching)] = self._turning(self.q, self.v, terms, span)
-        apart = [touch.absent or touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
-        shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
+        shifts = [change for changes in self._turning(self.q, self.v, terms, span) for change in changes]
+        shifts += [0.0] * len(self.joints.J)
+        apart = [touch.absent or touch.gap > self._touching for touch in terms.touching]
+        apart += [False] * len(self.joints.friction) + [not item.closed(self.q) for item in self.joints.stops]
+        for rows in compress(self._rows, apart):
+            shifts[rows[-1]] = math.inf
         return self._turned(self.q, self.v, terms, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:
         """Normals, positions and widest cones of contact points in Pinocchio, with gaps of the shapes at its poses."""
-        J, _, inverse, touching, frames = self.terms(self.q, self.v, self._dt)
-        world = np.array(frames) @ J
+        terms = self.terms(self.q, self.v, self._dt)
+        world, inverse, touching = np.array(terms.frames) @ terms.J, terms.inverse, terms.touching
         solver, data = self._solver(self._all), self._data
         normal, place = np.zeros((2, len(touching), 3))
         for k, point in enumerate(solver.points):
@@ -194,7 +210,7 @@ class ImpulseSteps:
     def terms(self, q: Array, v: Array, span: float, late: float = 0.0) -> StepTerms:
         """Terms of a step of length ``span`` [s]; ``q`` belongs to the time ``late`` [s] after its start."""
         tree, model, data = self._tree, self._model, self._data
-        touching = self._touched(data, q, v, [None] * len(self.contacts))
+        touching = self.touched(self._bodies, q, v, [None] * len(self.contacts))
         tree.now = self.t + late
         pulls = tree.pulls(data) if tree.pushed else None
         tau = tree.drives(q, v)
@@ -205,11 +221,11 @@ class ImpulseSteps:
         if len(tree.geared):
             free, inverse = self._driven(q, free, inverse, span, late)
         pin.computeJointJacobians(model, data, q)
-        J = np.zeros((len(touching), 3, model.nv))
         frames, all_of = [frame_of_axis(point.normal) for point in touching], self._solver(self._all)
-        for k, (point, frame) in enumerate(zip(touching, frames, strict=True)):
-            J[k] = self._posed(all_of, k, point, frame)
-        return StepTerms(J=J, free=free, inverse=inverse, touching=touching, frames=frames)
+        contact_rows = [self._posed(all_of, k, *placed) for k, placed in enumerate(zip(touching, frames, strict=True))]
+        rows = np.concatenate([*contact_rows, self.joints.J])
+        J = rows[: 3 * len(frames)].reshape(-1, 3, model.nv)
+        return StepTerms(rows=rows, J=J, free=free, inverse=inverse, touching=touching, frames=frames)
 
     def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
         """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
@@ -229,49 +245,38 @@ class ImpulseSteps:
 
     def unsure(self, span: float) -> Array:
         """Velocities by which errors of each row within the tolerance change those after a ``span`` [s], (rows, nv)."""
-        J, free, inverse, _, _ = self.terms(self.q, self.v, span)
-        rows = np.concatenate([J.reshape(-1, len(free)), self.joints.J])
+        terms = self.terms(self.q, self.v, span)
+        rows, free, inverse = terms.rows, terms.free, terms.inverse
         speed = float(np.abs(rows @ free).max(initial=0.0)) * float(self._settings.solver_tolerance or 0.0)
         ways = rows @ inverse
         ease = np.einsum("ri,ri->r", rows, ways)
         changes: Array = speed * ways[ease > 0] / ease[ease > 0, None]
         return changes
 
-    def _touched(self, data: Any, q: Array, v: Array, features: Sequence[int | None]) -> list[Touching]:
+    def touched(self, bodies: MovingBodies, q: Array, v: Array, features: Sequence[int | None]) -> list[Touching]:
         """Geometry of the contacts in a state, each with the features that touch; None: the nearest."""
-        pin.forwardKinematics(self._model, data, q, v)
-        pin.updateFramePlacements(self._model, data)
+        moving = bodies.at(q, v)
         return [
-            touch(contact, self._moving(data, contact.body_a), self._moving(data, contact.body_b), feature)
+            touch(contact, moving[contact.body_a], moving[contact.body_b], feature)
             for contact, feature in zip(self.contacts, features, strict=True)
         ]
 
-    def _turning(self, q: Array, v: Array, terms: StepTerms, span: float) -> Array:
+    def _turning(self, q: Array, v: Array, terms: StepTerms, span: float) -> list[Sequence[float]]:
         """Changes of slip and gap velocities within a ``span`` [s] in which joint velocities are constant (J̇v)."""
         later = pin.integrate(self._model, q, span * v)
-        touching_later = self._touched(self._ahead, later, v, [contact.feature for contact in terms.touching])
-        changes = [
-            frame.T @ (carried(later_point.slide, later_point.normal, point.normal) - point.slide)
+        touching_later = self.touched(self.ahead, later, v, [contact.feature for contact in terms.touching])
+        return [
+            (frame.T @ (carried(later_point.slide, later_point.normal, point.normal) - point.slide)).tolist()
             for frame, point, later_point in zip(terms.frames, terms.touching, touching_later, strict=True)
         ]
-        return np.reshape(changes, (len(changes), 3))
-
-    def _moving(self, data: Any, body: str) -> Moving:
-        k = self._index[body]
-        if k < 0:
-            return AT_REST
-        frame = self._tree.body[k]
-        velocity, pose = self._tree.velocity(data, frame), data.oMf[frame]
-        return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)
 
     def _posed(self, solver: SolverParts, number: int, contact_point: Touching, frame: Array) -> Array:
         """Poses the ``number``-th point of a solver and returns its rows, shape (3, nv)."""
-        point, data = solver.points[number], self._data
-        place = pin.SE3(frame, contact_point.place)
-        point.joint1_placement = data.oMi[point.joint1_id].actInv(place)
-        point.joint2_placement = data.oMi[point.joint2_id].actInv(place)
-        point.calc(self._model, data, solver.point_datas[number])
-        rows: Array = point.jacobian(self._model, data, solver.point_datas[number])
+        point, place = solver.points[number], pin.SE3(frame, contact_point.place)
+        point.joint1_placement = self._placed[point.joint1_id].actInv(place)
+        point.joint2_placement = self._placed[point.joint2_id].actInv(place)
+        point.calc(self._model, self._data, solver.point_datas[number])
+        rows: Array = point.jacobian(self._model, self._data, solver.point_datas[number])
         return rows.reshape(3, -1)  # of a model of one velocity Pinocchio gives a vector
 
     def _solver(self, which: tuple[int, ...]) -> SolverParts:
@@ -289,11 +294,16 @@ class ImpulseSteps:
                     models.append(rows[k - count].model)
                 datas.append(models[len(models) - 1].createData())
             points = [models[i].extract() for i in range(len(which))]
-            settings, size = self._settings, sum(3 if k < count else 1 for k in which)
-            solve, options, result = solver_of(settings.solver or "admm", float(settings.solver_tolerance or 0.0), size)
-            made = [datas[i].extract() for i in range(len(which))]
+            tolerance, kind = float(self._settings.solver_tolerance or 0.0), self._settings.solver or "admm"
+            chosen = [row for k in which for row in self._rows[k]]
             self._solvers[which] = SolverParts(
-                points=points, point_datas=made, models=models, datas=datas, solve=solve, options=options, result=result
+                points=points,
+                point_datas=[datas[i].extract() for i in range(len(which))],
+                ends=list(accumulate(len(self._rows[k]) for k in which)),
+                rows=slice(None) if len(which) == len(self._rows) else chosen,
+                models=models,
+                datas=datas,
+                solver=solver_of(kind, tolerance, len(chosen)),
             )
         return self._solvers[which]
 
@@ -305,47 +315,50 @@ class ImpulseSteps:
         k = self._index[body]
         return 0 if k < 0 else int(self._model.frames[self._tree.body[k]].parentJoint)
 
-    def _shifts(self, J: Array, q: Array, v: Array, touching: Sequence[Touching], turning: Array) -> Array:
-        """Terms added to slip and gap velocities [m/s], shape (contacts + joint rows, 3); inf: the gap cannot close.
+    def _shifts(self, terms: StepTerms, q: Array, v: Array, turning: Sequence[Sequence[float]]) -> list[float]:
+        """Terms added to slip and gap velocities [m/s], one for each row; inf along a normal: the gap cannot close.
 
         ``turning``: changes of these velocities within the step, which do not matter in an impact.
         """
-        begin, dt = len(touching) + len(self.joints.friction), self._dt
-        shifts = np.zeros((len(self._returned), 3))
-        gaps = [(k, touch.gap, float(J[k, 2] @ v)) for k, touch in enumerate(touching) if not touch.absent]
-        shifts[[k for k, touch in enumerate(touching) if touch.absent], 2] = np.inf
-        speeds = self.joints.J[len(self.joints.friction) :] @ v
-        gaps += [(k, item.gap(q), float(speeds[k - begin])) for k, item in enumerate(self.joints.stops, begin)]
-        for k, gap, approach in gaps:
-            e, bend = float(self._returned[k]), abs(turning[k, 2]) if k < len(touching) else 0.0
+        count, dt, speeds = len(terms.touching), self._dt, (terms.rows @ v).tolist()
+        begin, shifts = count + len(self.joints.friction), [0.0] * len(speeds)
+        gaps = [math.inf if touch.absent else touch.gap for touch in terms.touching]
+        numbered = [*enumerate(gaps), *enumerate((item.gap(q) for item in self.joints.stops), begin)]
+        for k, gap in numbered:
+            row = self._rows[k][-1]
+            e, approach, bend = self._returned[k], speeds[row], abs(turning[k][2]) if k < count else 0.0
             hits = e and -e * approach > _SOFT * (self._gravity * dt + bend)
-            shifts[k, 2] = np.inf
+            shifts[row] = math.inf
             if self._midpoint:
                 if gap <= max(self._touching, _NEAR * self._gravity * dt**2):
                     back = max(_CLOSED * gap / dt, -_SOFT * self._gravity * dt) if k >= begin else _CLOSED * gap / dt
-                    shifts[k, 2] = e * approach if hits else back
-                    if k < len(touching) and not hits:
-                        shifts[k] += turning[k]
+                    shifts[row] = e * approach if hits else back
+                    if k < count and not hits:
+                        shifts[row - 2 : row + 1] = turning[k][0], turning[k][1], back + turning[k][2]
             else:
                 hits = hits and gap + dt * (approach - dt * self._gravity) <= 0
-                shifts[k, 2] = e * approach if hits else gap / dt
-            if hits and k < len(touching) and self.contacts[k].tangential_restitution:
-                shifts[k, :2] = self.contacts[k].tangential_restitution * (J[k, :2] @ v)
+                shifts[row] = e * approach if hits else gap / dt
+            if hits and k < count and self.contacts[k].tangential_restitution:
+                rebound = self.contacts[k].tangential_restitution
+                shifts[row - 2 : row] = rebound * speeds[row - 2], rebound * speeds[row - 1]
         return shifts
 
-    def _turned(self, q: Array, v: Array, terms: StepTerms, shifts: Array, span: float, *, convex: bool) -> Impulses:
+    def _turned(
+        self, q: Array, v: Array, terms: StepTerms, shifts: Sequence[float], span: float, *, convex: bool
+    ) -> Impulses:
         """Impulses of a step that begins with the velocity ``v``, with those of friction against turning.
 
         An impact has no moment of friction.
         """
         if not self._moments.frictions:
             return self._solved(terms, shifts, span, convex=convex)
-        J, free, inverse, touching, _ = terms
+        J, free, inverse, touching = terms.J, terms.free, terms.inverse, terms.touching
         rows, count = self._moments.rows(self._data, terms.touching, terms.frames, J), len(touching)
         approach, soft_speed = J[:, 2] @ v, -_SOFT * self._gravity * span
         soft = approach >= soft_speed
         if not soft.all():  # a curved wall turns away from a fast ball
-            soft = approach >= soft_speed - _SOFT * np.abs(self._turning(q, v, terms, span)[:, 2])
+            bends = np.array([abs(change) for _, _, change in self._turning(q, v, terms, span)])
+            soft = approach >= soft_speed - _SOFT * bends
         kicks = list[Impulses]()
 
         def pressed(impulses: Array) -> Pressed:
@@ -363,51 +376,49 @@ class ImpulseSteps:
         driving = kicks[0].driving - self._motions[1].T @ impulses
         return kicks[0]._replace(moment=by_contact, driving=driving)
 
-    def _solved(self, terms: StepTerms, shifts: Array, span: float, *, convex: bool) -> Impulses:
+    def _solved(self, terms: StepTerms, shifts: Sequence[float], span: float, *, convex: bool) -> Impulses:
         """Impulses of dry friction and of all contacts and stops that would close, also due to other impulses."""
-        J, free, inverse, touching, frames = terms
-        count, v, own_rows = len(touching), free, self._rows
-        all_rows = np.concatenate([J.reshape(3 * count, len(free)), self.joints.J])
-        all_shifts = np.concatenate([shifts[:count].ravel(), shifts[count:, 2]])
-        added, rubs = all_shifts.tolist(), count + len(self.joints.friction)
-        gaps = [k for k in (*self._all, *range(rubs, len(own_rows))) if math.isfinite(added[own_rows[k][-1]])]
+        rows, free, frames = terms.rows, terms.free, terms.frames
+        count, v, own_rows, added = len(frames), free, self._rows, np.array(shifts)
+        rubs = count + len(self.joints.friction)
+        gaps = [k for k in (*self._all, *range(rubs, len(own_rows))) if math.isfinite(shifts[own_rows[k][-1]])]
         impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(own_rows) - count), tuple(range(count, rubs))
         states = [OPEN] * count
         grown, pushed = bool(which), np.zeros(len(free))
         alone, motor_responses = self._motions
+        at_free = rows @ free
+        speeds = at_free.tolist()
         while True:
-            speeds, closing = (all_rows @ v).tolist(), set[int]()
+            closing = set[int]()
             for k in gaps:
-                of_row = [speeds[row] for row in own_rows[k]]
+                own = own_rows[k]
+                of_row = speeds[own[0] : own[-1] + 1]
                 # a speed that is round-off of its rows would be the unit of impulses, in which slips are huge
-                if of_row[-1] + added[own_rows[k][-1]] < -_SMALL * max(map(abs, of_row)):
+                if of_row[-1] + shifts[own[-1]] < -_SMALL * max(map(abs, of_row)):
                     closing.add(k)
-            if closing <= set(which) and not grown:
-                driving = alone - motor_responses.T @ pushed
+            if not grown and closing.issubset(which):
+                driving = alone - motor_responses.T @ pushed if alone.size else alone
                 for k, held in enumerate(self._held):
-                    slips = [speeds[row] + added[row] for row in own_rows[k][:2]]
-                    states[k] = STICK if states[k] == SLIP and math.hypot(*slips) <= held else states[k]
+                    if states[k] == SLIP:
+                        slips = [speeds[row] + shifts[row] for row in own_rows[k][:2]]
+                        states[k] = STICK if math.hypot(*slips) <= held else SLIP
                 moment, seen = np.zeros((count, 3)), tuple(states)
                 return Impulses(v=v, impulse=impulse, states=seen, moment=moment, along=along_rows, driving=driving)
-            which, grown = tuple(sorted({*which, *closing})), False
-            chosen = [row for k in which for row in own_rows[k]]
-            rows = all_rows[chosen]
-            to_joints = inverse @ rows.T
-            g = rows @ free + all_shifts[chosen]
-            got = self._by_any(which, rows @ to_joints, g, terms, span, convex=convex)
-            v, pushed = free + to_joints @ got, rows.T @ got
+            which, grown = tuple(sorted(closing.union(which))), False
+            parts = self._solver(which)
+            chosen, g = rows[parts.rows], (at_free + added)[parts.rows]
+            to_joints = terms.inverse @ chosen.T
+            got = self._by_any(which, chosen @ to_joints, g, terms, span, convex=convex)
+            v, pushed = free + to_joints @ got, chosen.T @ got if alone.size else pushed
+            speeds, sizes = (rows @ v).tolist(), got.tolist()
             impulse[:], along_rows[:] = 0.0, 0.0
-            for end, k in zip(self._ends(which), which, strict=True):
+            for end, k in zip(parts.ends, which, strict=True):
                 if k < count:
                     impulse[k] = frames[k] @ got[end - 3 : end]
-                    F1, F2, N = got[end - 3 : end].tolist()
+                    F1, F2, N = sizes[end - 3 : end]
                     states[k] = step_events.state_of(N, math.hypot(F1, F2), _INSIDE * self.contacts[k].friction * N)
                 else:
-                    along_rows[k - count] = got[end - 1]
-
-    def _ends(self, which: tuple[int, ...]) -> list[int]:
-        """Ends of some contacts and joint rows among the rows of these alone."""
-        return list(accumulate(len(self._rows[k]) for k in which))
+                    along_rows[k - count] = sizes[end - 1]
 
     def _by_any(
         self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool
@@ -415,18 +426,20 @@ class ImpulseSteps:
         """Impulses as by :meth:`_found`, or by blocks, which go first from where Pinocchio's ADMM stopped.
 
         Raises:
-            Diverged: neither finds them.
+            Diverged: neither finds them, or a velocity is not finite.
         """
+        if not (np.isfinite(g).all() and np.isfinite(G).all()):
+            raise Diverged(f"the state is not finite at t = {self.t:.6g} s")
         if not self.blocks.solved:
             try:
                 return self._found(which, G, g, terms, span, convex=convex)
             except Diverged:
                 if convex or self._settings.solver != "admm":
                     raise
-        count, rubbing, parts = len(self.contacts), self.joints.friction, dict[int, Block]()
-        for k, end in zip(which, self._ends(which), strict=True):
+        count, rubbing, parts, diagonal = len(self.contacts), self.joints.friction, dict[int, Block](), G.diagonal()
+        for k, end in zip(which, self._solver(which).ends, strict=True):
             if k < count:
-                self._check(k, G[end - 3 : end, end - 3 : end], terms.touching[k].flat)
+                self._check(k, diagonal[end - 3 : end].tolist(), terms.touching[k].flat)
                 parts[k] = Block(end - 3, self._friction(k))
             else:
                 rubs = k < count + len(rubbing)
@@ -444,19 +457,19 @@ class ImpulseSteps:
         Raises:
             Diverged: Pinocchio's solver does not find them.
         """
-        count, solver, ends = len(self.contacts), self._solver(which), self._ends(which)
+        count, solver = len(self.contacts), self._solver(which)
         # Pinocchio's tolerances and regularisations are numbers without scale: 1e-8, below which its ADMM adapts
         # its penalty the wrong way, would be a large part of the impulses of short steps or light bodies. In these
         # units of speed and impulse the problem is the same for all masses, steps and lengths.
-        speeds = np.abs(g).tolist()
+        speeds, mobility = [abs(speed) for speed in g.tolist()], G.diagonal().tolist()
         fastest = max(speeds)
-        speed = max(*(speeds[end - 1] for end in ends), _SMALL * fastest) or 1.0
-        unit = speed / float(G.diagonal().max())
+        speed = max(*(speeds[end - 1] for end in solver.ends), _SMALL * fastest) or 1.0
+        unit = speed / max(mobility)
         points = []
-        for row, (end, k) in enumerate(zip(ends, which, strict=True)):
+        for row, (end, k) in enumerate(zip(solver.ends, which, strict=True)):
             if k < count:
                 point, mu = solver.points[row], self._friction(k)
-                self._check(k, G[end - 3 : end, end - 3 : end], terms.touching[k].flat)
+                self._check(k, mobility[end - 3 : end], terms.touching[k].flat)
                 if which != self._all:  # else as of the terms
                     self._posed(solver, row, terms.touching[k], terms.frames[k])
                 points.append((point, end, mu))
@@ -464,26 +477,27 @@ class ImpulseSteps:
             elif k < count + len(self.joints.friction):
                 solver.points[row].setTimeStep(span / unit)  # bounds are forces; the default step would be 1 s
                 solver.points[row].calc(self._model, self._data, solver.point_datas[row])
-        solver.options.solve_ncp = not convex
+        solve, options, result = solver.solver
+        options.solve_ncp = not convex
         tolerance = float(self._settings.solver_tolerance or 0.0)
         # a product of impulses and velocities, which both have the tolerance; velocities are 1 along normals
         least = tolerance * max(1.0, fastest / speed)
-        solver.options.absolute_complementarity_tol = least
-        operator = pin.DelassusOperatorDense(G * (unit / speed))
+        options.absolute_complementarity_tol = least
+        operator, in_units = pin.DelassusOperatorDense(G * (unit / speed)), g / speed
         while True:
-            solver.result.reset()
-            if not solver.solve.solve(operator, g / speed, solver.models, solver.datas, solver.options, solver.result):
+            result.reset()
+            if not solve.solve(operator, in_units, solver.models, solver.datas, options, result):
                 raise Diverged(
                     f"Pinocchio's {self._settings.solver} solver did not reach "
                     f"solver_tolerance={self._settings.solver_tolerance:g} at {self.t:g} s; a larger one may do"
                 )
-            impulses = np.array(solver.result.retrieveConstraintImpulses())
+            impulses = result.retrieveConstraintImpulses()
             sizes, narrow = impulses.tolist(), []
             for point, end, mu in points:
                 bound = point.getFriction() * sizes[end - 1]
                 if point.getFriction() < mu and math.hypot(*sizes[end - 3 : end - 1]) + least >= bound > least:
                     narrow.append((point, mu))
             if not narrow:
-                return unit * impulses
+                return np.asarray(unit * impulses)
             for point, mu in narrow:
                 point.setFriction(min(_WIDER * point.getFriction(), mu))

@@ -1,12 +1,15 @@
 """Terms of a step's equations with contacts, Pinocchio's solvers, and the impulses that these find."""
 
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import pinocchio as pin
 
-from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism import WORLD
+from proofroll.elements.mechanism.contact.touching import AT_REST, Moving, Touching
 from proofroll.elements.mechanism.run.contacts.step_events import States
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
 # Pinocchio's cone needs a number for unbounded friction. PGS accepts any; the iterations of ADMM grow with it.
 LARGEST_FRICTION = {"pgs": 1e6, "admm": 1e2}
@@ -38,6 +41,7 @@ class StepTerms(NamedTuple):
     """Terms of a step's equations.
 
     Attributes:
+        rows: of contacts and joints, (rows, nv).
         J: contact rows, (contacts, 3, nv): slip velocities along the normal's :func:`frame_of_axis`, the normal last.
         free: velocity after the step without impulses, (nv,).
         inverse: of the mass matrix, (nv, nv).
@@ -45,6 +49,7 @@ class StepTerms(NamedTuple):
         frames: of their normals.
     """
 
+    rows: Array
     J: Array
     free: Array
     inverse: Array
@@ -52,16 +57,43 @@ class StepTerms(NamedTuple):
     frames: list[Array]
 
 
+class MovingBodies:
+    """Bodies that touch, as Pinocchio's ``data`` places and moves them."""
+
+    def __init__(self, tree: JointTree, bodies: Collection[str]) -> None:
+        self._tree, self.data = tree, tree.model.createData()
+        frames = [(body, tree.body[tree.mechanism.body_index[body]]) for body in bodies if body != WORLD]
+        # their numbers are those of the data at any time: each look at a vector of Pinocchio costs a microsecond
+        poses = [self.data.oMf[frame] for _, frame in frames]
+        self._views = [(*named, pose.translation, pose.rotation) for named, pose in zip(frames, poses, strict=True)]
+
+    def at(self, q: Array, v: Array) -> dict[str, Moving]:
+        """Motion of each body, valid until the next call, with positions and velocities of all joints in ``data``."""
+        model, data, velocity = self._tree.model, self.data, self._tree.velocity
+        pin.forwardKinematics(model, data, q, v)
+        pin.updateFramePlacements(model, data)
+        moving = {WORLD: AT_REST}
+        for body, frame, p, R in self._views:
+            twist = velocity(data, frame)
+            moving[body] = Moving(p, R, twist.linear, twist.angular)
+        return moving
+
+
 class SolverParts(NamedTuple):
-    """Pinocchio's objects for a subset of contacts and joint rows: constraints, solver, its options and result."""
+    """Pinocchio's objects for a subset of contacts and joint rows: constraints, and what :func:`solver_of` gives.
+
+    Attributes:
+        ends: end of each contact and joint row among the rows of the subset.
+        rows: these among all rows.
+    """
 
     points: list[Any]
     point_datas: list[Any]
+    ends: list[int]
+    rows: list[int] | slice
     models: Any
     datas: Any
-    solve: Any
-    options: Any
-    result: Any
+    solver: tuple[Any, Any, Any]
 
 
 def solver_of(kind: str, tolerance: float, size: int = 3) -> tuple[Any, Any, Any]:

@@ -98,7 +98,7 @@ class TurningImpulses:
                 if moves or math.hypot(*moments[k].tolist()) > bound:
                     turning = opposed @ (v + outcome.v)
                     moments[k] = -bound * turning / (math.hypot(*turning.tolist()) or 1.0)
-            impulses = np.einsum("kin,ki->n", rows[0], moments)
+            impulses = moments.ravel() @ rows[0].reshape(moments.size, -1)
             if np.abs(moments - last).max() <= _SETTLED * self._tolerance * bounds.max():
                 return moments, impulses
         raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")

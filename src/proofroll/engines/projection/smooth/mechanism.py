@@ -16,6 +16,7 @@ from proofroll.elements.mechanism.dynamics.switches import switched_joints
 from proofroll.elements.mechanism.run.capabilities import (
     ALL_JOINTS,
     ALL_LOOPS,
+    ALL_SHAPES,
     FORCES,
     MechanismCapability,
     require,
@@ -41,6 +42,7 @@ from proofroll.engines.projection.smooth.recursion import compiled
 PROVIDES = frozenset(
     ALL_JOINTS
     | ALL_LOOPS
+    | ALL_SHAPES
     | FORCES
     | {
         MechanismCapability.REDUNDANT,

@@ -15,7 +15,10 @@ from proofroll.papers.blajer_2006.ball.cylinder import UprightCylinder
 
 _CAPABILITY = MechanismCapability
 # What a formulation of one ball provides that rolls in an upright cylinder, without and with its orientation.
-ROLLS: frozenset[str] = frozenset({_CAPABILITY.CONTACT, _CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION})
+ROLLS: frozenset[str] = frozenset({
+    _CAPABILITY.CONTACT, _CAPABILITY.SPHERES, _CAPABILITY.BORES, _CAPABILITY.UNBOUNDED_FRICTION,
+    _CAPABILITY.TURNING_FRICTION,
+})  # fmt: skip
 ALL_OF_A_BALL: frozenset[str] = ROLLS | {_CAPABILITY.ORIENTATION}
 # Why such a formulation has no other bodies.
 NO_OTHER_BODIES: Mapping[str, str] = {

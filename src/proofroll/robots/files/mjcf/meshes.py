@@ -1,7 +1,7 @@
-"""Removal of meshes and height fields of an MJCF that give no mass."""
+"""Removal of meshes and height fields of an MJCF that give no mass, or do not collide where contacts are kept."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -18,12 +18,15 @@ def remove_height_fields(root: Element, shapes: Sequence[Classed]) -> None:
     _forget(root, "hfield", set())
 
 
-def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside: Path) -> Iterator[LintRemark]:
-    """Removes meshes that give no mass or do not exist; names the others by their absolute paths.
+def remove_meshes(
+    root: Element, shapes: Sequence[Classed], folder: Path, inside: Path, solid: Container[Element] = ()
+) -> Iterator[LintRemark]:
+    """Removes meshes that neither give mass nor are solid, or do not exist; names the others by their absolute paths.
 
     Args:
         root: content of the file.
         shapes: its geoms.
+        solid: geoms that collide and stay, if their mesh exists.
         folder: folder of the file, to which paths are relative.
         inside: folder in which all files must lie.
 
@@ -48,8 +51,11 @@ def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside
         if mesh_name is None:
             continue
         weighed = body.tag == "body" and (inferred or body.find("inertial") is None)
-        target = required_file(meshes, named[mesh_name], inside) if weighed and mesh_name in named else None
-        if weighed and (mesh_name in inline or (target is not None and target.is_file())):
+        if weighed and mesh_name in named:
+            required_file(meshes, named[mesh_name], inside)
+        target = files.get(mesh_name)
+        there = mesh_name in inline or (target is not None and target.is_file())
+        if there and (weighed or shape.element in solid):
             used.add(mesh_name)
         else:
             shape.parent.remove(shape.element)

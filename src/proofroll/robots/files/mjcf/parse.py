@@ -130,8 +130,9 @@ def _add(
                 parent.remove(child)
         parent.attrib.pop("material", None)
     remove_height_fields(root, shapes)
-    remarks = [*remove_meshes(root, shapes, file.parent, inside), *_gravity_compensations(root)]
-    remarks += _lost_shapes(root, shapes) if contacts else []
+    solid = _solid(root, shapes) if contacts else set[Element]()
+    remarks = [*remove_meshes(root, shapes, file.parent, inside, solid), *_gravity_compensations(root)]
+    remarks += _lost_shapes(root, shapes, solid) if contacts else []
     parts[f"{len(parts)}.xml"] = root
     for model in root.iter("model"):
         target = required_file(file.parent, model, inside)
@@ -197,19 +198,29 @@ def _merge_worlds(root: Element) -> None:
         root.remove(world)
 
 
-def _lost_shapes(root: Element, shapes: Sequence[Classed]) -> Iterator[LintRemark]:
-    """Yields a remark for each shape that collides and is no longer in the copy; removes the pairs that name it."""
+def _solid(root: Element, shapes: Sequence[Classed]) -> set[Element]:
+    """Geoms that collide, with any other or in a pair of their own."""
+    paired: set[str | None] = {
+        pair.get(end) for contact in root.findall("contact") for pair in contact for end in ("geom1", "geom2")
+    }
+    return {
+        shape.element
+        for shape in shapes
+        if any(shape.given.get(key, "1") != "0" for key in ("contype", "conaffinity"))
+        or shape.element.get("name") in paired - {None}
+    }
+
+
+def _lost_shapes(root: Element, shapes: Sequence[Classed], solid: set[Element]) -> Iterator[LintRemark]:
+    """Yields a remark for each solid shape that is no longer in the copy; removes the pairs that name it."""
     kept = set(root.iter("geom"))
     lost = [shape for shape in shapes if shape.element not in kept]
     names = {shape.element.get("name") for shape in lost} - {None}
-    paired: set[str | None] = set()
     for contact in root.findall("contact"):
         for pair in [pair for pair in contact.findall("pair") if names & {pair.get("geom1"), pair.get("geom2")}]:
-            paired |= {pair.get("geom1"), pair.get("geom2")}
             contact.remove(pair)
     for shape in lost:
-        collides = any(shape.given.get(key, "1") != "0" for key in ("contype", "conaffinity"))
-        if collides or shape.element.get("name") in paired - {None}:
+        if shape.element in solid:
             kind = "mesh" if shape.given.get("mesh") else "height field"
             yield LintRemark("note", f"{kind} of {shape.body.get('name', 'the world')}", NO_SHAPE)
 

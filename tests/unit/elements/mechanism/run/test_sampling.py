@@ -8,7 +8,7 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.run.capabilities import MechanismCapability, require, required
+from proofroll.elements.mechanism.run.capabilities import ALL_SHAPES, MechanismCapability, require, required
 from proofroll.elements.mechanism.run.sampling import mechanism_of, row_rank
 
 
@@ -30,6 +30,7 @@ def test_a_mechanism_requires_what_it_holds_and_no_more():
     assert MechanismCapability.REBOUNDS in required(wheel(**stops, restitution=0.5))
     of_contact = {"CONTACT", "CONTACT_FRICTION", "UNBOUNDED_FRICTION", "STATIC_FRICTION"}
     of_contact |= {"CONTACT_REBOUNDS", "SLIP_REBOUNDS", "TURNING_FRICTION"}
+    of_contact |= {item.name for item in ALL_SHAPES}
     of_drives = {"ACTUATORS", "SATURATION", "COUPLINGS", "COUPLINGS_OF_MANY", "MASSLESS", "SIGNALS", "HELD", "MOTIONS"}
     assert of_contact | of_drives | {
         "JOINT_SPRINGS",

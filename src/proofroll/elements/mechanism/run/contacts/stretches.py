@@ -47,6 +47,8 @@ def held_in_flight(dataset: xr.Dataset) -> xr.Dataset:
     kinds = {EventKind.LIFT_OFF: True, EventKind.IMPACT: False, EventKind.BOUNCE: True, EventKind.SETTLE: False}
     changes = [(event.time, kinds[EventKind(event.kind)]) for event in events_of(dataset) if event.kind in kinds]
     instants, flies = [time for time, _ in changes], np.array([False, *(flies for _, flies in changes)])
+    if not flies.any():
+        return dataset
     held = {}
     for axis, prefix in (("time", ""), (BETWEEN, f"{BETWEEN}.")):  # and samples off the grid
         for name in (prefix + name for name in ("gap", "slip", "slip2", "slip3") if prefix + name in dataset):

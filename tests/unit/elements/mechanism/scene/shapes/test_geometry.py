@@ -167,12 +167,14 @@ def test_a_box_touches_with_its_vertices() -> None:
 
 
 def test_contact_is_asked_of_a_formulation() -> None:
-    """A sled asks for contact and its friction; a pair with restitution for rebounds too."""
+    """A sled asks for contact, its friction and what touches; a pair with restitution for rebounds too."""
     sled = mechanism_named("sled")
     assert required(sled) == {
         MechanismCapability.FREE,
         MechanismCapability.CONTACT,
         MechanismCapability.CONTACT_FRICTION,
+        MechanismCapability.SPHERES,
+        MechanismCapability.PLANES,
     }
     bouncing = made(PLANE, BALL, pairs=({**PAIR, "friction": 0, "restitution": 0.5},))
     asked = required(bouncing)

@@ -50,6 +50,11 @@ class CurvedWall:
         """The wall's axes in the body's frame, as columns."""
         return frame_of_axis(self.axis)
 
+    @cached_property
+    def axes(self) -> Any:
+        """Rows of :attr:`frame` in plain floats."""
+        return self.frame.tolist()
+
     def seen(self, x: float, y: float, z: float) -> Seen:
         """The wall as seen from a place, in floats or symbols; its normal is zero where several points are nearest."""
         if not isinstance(x + y + z, float):

@@ -23,10 +23,10 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.prescribed import moved
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.files.scene_file import load_scene
-from proofroll.mechanism_studies.linearised import Apart, InTree, Spectrum, apart, at_rest, spectrum
 from proofroll.running.simulation import build
 from proofroll.studies.comparison.default_comparison import able
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll_balance.linearised import Apart, InTree, Spectrum, apart, at_rest, spectrum
 
 # Displacement for an engine's accelerations: of doubles with softened rows and own differences of 1e-10.
 _STEP = 1e-2
@@ -209,11 +209,11 @@ class _InEngine:
         self._made, self._mechanism, self._place, self._tree = made, mechanism, place, Tree(mechanism)
 
     def directions(self) -> Array:
-        """See :class:`~proofroll.mechanism_studies.linearised.Displaced`."""
+        """See :class:`~proofroll_balance.linearised.Displaced`."""
         return self._place.directions()
 
     def accelerations(self, displaced: Array, velocities: Array) -> Array:
-        """See :class:`~proofroll.mechanism_studies.linearised.Displaced`."""
+        """See :class:`~proofroll_balance.linearised.Displaced`."""
         q = self._place.pose(displaced)
         built = self._made(started(self._mechanism, q, velocities)).built()
         if built.acceleration is None or built.angular_acceleration is None:

@@ -14,9 +14,9 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.files.scene_file import load_scene
-from proofroll.mechanism_studies.balance import balance, stilled
-from proofroll.mechanism_studies.linearised import Apart, InTree, apart, at_rest, spectrum
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll_balance.balance import balance, stilled
+from proofroll_balance.linearised import Apart, InTree, apart, at_rest, spectrum
 
 G = 9.81
 FOUR_BAR = """

@@ -13,7 +13,7 @@ from proofroll.core.number_format import with_bar
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from proofroll.mechanism_studies.balance import Balance
+    from proofroll_balance.balance import Balance
 
 
 _FAINT = 1e-10  # relative to the largest value of its unit: what is shown as zero
@@ -35,7 +35,7 @@ def balance(
     drive.<joint>; the reaction of a fixed one is force.<joint> and torque.<joint>, on its child, along the axes of the
     world.
     """
-    from proofroll.mechanism_studies.balance import balance as found
+    from proofroll_balance.balance import balance as found
 
     scene = options.controlled(scene, control)
     with options.spinner(scene) as says:

@@ -1,1 +1,0 @@
-"""Studies of mechanisms that no harness knows: equilibrium, and linearisation about it."""
