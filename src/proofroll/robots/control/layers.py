@@ -242,12 +242,7 @@ def _rows_are_steps(record: ControlRecord, law: ControlLaw) -> bool:
 
 
 def _of_another_robot(
-    record: ControlRecord,
-    evidence: _Evidence,
-    efforts: Array,
-    fit: AirFit,
-    usable: NDArray[np.bool_],
-    time: SearchTime,
+    record: ControlRecord, evidence: _Evidence, efforts: Array, fit: AirFit, usable: NDArray[np.bool_], time: SearchTime
 ) -> tuple[AirFit, str]:
     """Fit with the robot that an importer makes of the file and that explains the record by the fewest causes.
 
@@ -431,10 +426,8 @@ def _ramped(evidence: _Evidence, most: float) -> Iterator[tuple[int, LayerCause]
         rows_told = np.isfinite(targets).all(axis=1)
         residual = float((np.abs(targets - recorded)[rows_told] / np.abs(recorded).max(axis=0)).max())
         if residual <= most:
-            yield (
-                0,
-                LayerCause("ramped", "targets go along a straight line from one instant to the next", None, residual),
-            )
+            words = "targets go along a straight line from one instant to the next"
+            yield 0, LayerCause("ramped", words, None, residual)
 
 
 def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:

@@ -231,23 +231,17 @@ class ControlLaw:
     @property
     def observing(self) -> tuple[object, ...]:
         """Settings on which :meth:`observed` depends besides a state."""
-        turns = (
-            self.scalar_last,
-            self.conjugated,
-            self.turned_back,
-            self.gravity_sign,
-            self.velocity_turns,
-            self.spin_turns,
+        names = (
+            "conjugated",
+            "turned_back",
+            "gravity_sign",
+            "velocity_turns",
+            "spin_turns",
+            "observed_order",
+            "factors",
         )
-        return (
-            *turns,
-            self.observed_order,
-            self.factors,
-            self.pose_observed,
-            self.at_centre,
-            self.observed_lag,
-            self.exchanged,
-        )
+        names += ("scalar_last", "pose_observed", "at_centre", "observed_lag", "exchanged")
+        return tuple(getattr(self, name) for name in names)
 
     def smoothed(self, action: Array, previous: Array) -> Array:
         """Part of an action that counts, clipped, beside what counted at the instant ``previous``."""

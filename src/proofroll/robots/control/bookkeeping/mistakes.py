@@ -193,13 +193,9 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
     yield _seen("spin_frame", f"{spin} observed in the world's axes", spin_turns=0)
     yield _seen("spin_frame", f"{spin} observed turned from the world's axes to the base's twice", spin_turns=2)
     if law.centre.any():
-        yield _seen("velocity_point", f"{velocity} observed at its centre of mass", at_centre=True)
-        yield _seen(
-            "velocity_point",
-            f"{velocity} observed at its centre of mass, in the base's axes",
-            at_centre=True,
-            velocity_turns=1,
-        )
+        point = f"{velocity} observed at its centre of mass"
+        yield _seen("velocity_point", point, at_centre=True)
+        yield _seen("velocity_point", f"{point}, in the base's axes", at_centre=True, velocity_turns=1)
     for part, words in ((-1.0, "relative to the default pose"), (1.0, "with the default pose added")):
         if law.pose.any():
             yield _seen("observed_pose", f"coordinates are observed {words}", pose_observed=part)
