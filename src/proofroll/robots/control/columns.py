@@ -88,7 +88,8 @@ class _Reading:
     def beside(self, record: ControlRecord, cause: LayerCause, off: _Off, column: str, tried: int) -> _Reading:
         """The reading with one mistake more, of those ``tried``, in a column that contradicts itself so much."""
         worst, column = max((self.worst, self.column), (off, column))
-        return _Reading(record, (*self.causes, cause), worst, column, self.tried + tried)
+        causes, count = (*self.causes, cause), self.tried + tried
+        return _Reading(record=record, causes=causes, worst=worst, column=column, tried=count)
 
 
 def state_readings(record: ControlRecord, law: ControlLaw) -> list[StateReading]:

@@ -127,7 +127,7 @@ class InAir:
         ranges: joint -> its limits [rad or m].
         assumed: clause on rows that are steps if the program has its usual ones; empty: they are not, or it is known.
         fits: of records to robots that were compared before, by their identities.
-        layers: that were judged before, each with the record without the mistakes of columns found so far.
+        layers: name -> a layer that was judged before, and the record with its columns corrected.
     """
 
     held: HeldRobot

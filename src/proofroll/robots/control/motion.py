@@ -96,7 +96,14 @@ def motion_layer(
     least = search.before
     fit = "" if search.right else forces(record)
     fitted = [] if isinstance(fit, str) else [cause for cause in fit.causes if cause.id in _ONLY_FORCES]
-    layer = Layer("motion", least, min(seen.bar, 0.5 * least), "the state", float(seen.time[-1]), causes=tuple(fitted))
+    layer = Layer(
+        name="motion",
+        residual=least,
+        bar=min(seen.bar, 0.5 * least),
+        column="the state",
+        time=float(seen.time[-1]),
+        causes=tuple(fitted),
+    )
     if any(cause.id != "damping" for cause in fitted):
         return layer
     causes = (*(item.cause for item in search.explanations), *fitted)

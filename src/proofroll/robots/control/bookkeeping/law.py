@@ -77,7 +77,7 @@ class ControlLaw:
         at_centre: True if the velocity of the base is observed there.
         factors: on observed q, v, linear velocity, angular velocity and last action, shape (5,).
         pose_observed: part of the pose that is added to observed coordinates; -1: they are relative to it.
-        exchanged: two parts of an observation of which each has the place of the other; empty: none.
+        exchanged: names of two parts of an observation that have each other's place; empty: none.
         clip: largest size of an action.
         smoothing: part of an action that counts, beside what counted at the instant before; 1: all.
         hold_effort: True if efforts hold between instants, False if they follow the state.
@@ -231,17 +231,9 @@ class ControlLaw:
     @property
     def observing(self) -> tuple[object, ...]:
         """Settings on which :meth:`observed` depends besides a state."""
-        names = (
-            "conjugated",
-            "turned_back",
-            "gravity_sign",
-            "velocity_turns",
-            "spin_turns",
-            "observed_order",
-            "factors",
-        )
-        names += ("scalar_last", "pose_observed", "at_centre", "observed_lag", "exchanged")
-        return tuple(getattr(self, name) for name in names)
+        rotations = ("scalar_last", "conjugated", "turned_back", "gravity_sign", "velocity_turns", "spin_turns")
+        others = ("observed_order", "factors", "pose_observed", "at_centre", "observed_lag", "exchanged")
+        return tuple(getattr(self, name) for name in (*rotations, *others))
 
     def smoothed(self, action: Array, previous: Array) -> Array:
         """Part of an action that counts, clipped, beside what counted at the instant ``previous``."""
