@@ -209,7 +209,7 @@ class MotionSearch:
         whole = [item for item, count in steps if item.id != "rate" or abs(count - round(count)) <= 1e-6 * count]
         several: dict[str, MistakeExplanation] = {}
         enough = screen.unexplained
-        for item in screen.best(whole):
+        for item in screen.best(whole, self._time):
             if item.left > enough or self._time.over:
                 break
             words = item.mistake.words
