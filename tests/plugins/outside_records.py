@@ -105,6 +105,7 @@ class Loop:
     no_load_speed: float = np.inf
     late_steps: int = 0
     normalised: bool = False
+    exchanged: Sequence[str] = ()
 
     def record(self, program: Callable[[Loop], Simulator]) -> dict[str, np.ndarray]:
         """Columns over time of a run, each named as in the documentation."""
@@ -138,6 +139,7 @@ class Loop:
                     "w_WB_B": factor["w_WB_B"] * spin,
                     "gravity_B": self.seen_gravity * (R.T @ np.array([0, 0, self.gravity_sign])),
                 }
+                seen |= {name: seen[other] for name, other in zip(self.exchanged, self.exchanged[::-1], strict=True)}
                 state, last = now, factor["last"] * action
                 previous, action = (
                     action,
@@ -348,6 +350,7 @@ MISTAKES: Mapping[str, tuple[str, str, dict[str, Any]]] = {
     "damping": ("damping", "acceleration", {"damping": 0.02}),
     "dry friction": ("friction", "acceleration", {"friction": 0.03}),
     "payload": ("payload", "acceleration", {"payload": 0.15}),
+    "terms in another order": ("observed_terms", "observation", {"exchanged": ("w_WB_B", "gravity_B")}),
 }
 ONE, HIPS = np.arange(6) == 2, np.array([True, False, False, True, False, False])  # FL_KFE; FL_HAA and FR_HAA
 # Mistake -> its id, layer, attributes of a loop, and what is said of it: numbers of single joints, and others that a

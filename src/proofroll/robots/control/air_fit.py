@@ -95,7 +95,8 @@ def acceleration_fit(
         efforts: of the joints from each row on, (times, n).
         steady: True at rows at which no target changes, (times,).
         usable: True at rows at which nothing else acts, (times,); None: all are.
-        together: True if several numbers are tried together where no single one explains what is left.
+        together: True if several numbers are tried together where no single one explains what is left; False: a record
+            that no single one explains has no fit.
     """
     robot = AirRobot.bare(held.mechanism, law)
     motion = motion_of(record, robot)
@@ -121,9 +122,9 @@ def acceleration_fit(
             for scheme in (*schemes, *([] if central else rarer)):
                 if scheme in rarer and any(item.rows.exact for item in trials):
                     break
-                begun = table.rows(first, rated, scheme, central=central) if trials else None
-                hopeful = begun is None or _promising(begun, law)
-                if scheme in rarer and not hopeful:
+                begun = table.rows(first, rated, scheme, central=central) if trials or not together else None
+                hopeful = begun is None or _promising(begun, law, together=together)
+                if not hopeful and (scheme in rarer or not together):
                     continue
                 trials.append(_Trial(scheme, table.rows(rows, rated, scheme, central=central), hopeful))
                 if trials[-1].rows.exact and not any(scheme):
@@ -131,7 +132,7 @@ def acceleration_fit(
     except (Diverged, Refused) as error:
         return str(error)
     if not trials:
-        return "too few rows are left"
+        return "too few rows are left" if together else "no single number explains a few rows"
     return _judged(trials, law, robot, together=together)
 
 
@@ -140,9 +141,9 @@ def _spread(rows: Any, most: int) -> Any:
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
 
 
-def _promising(rows: AirRows, law: ControlLaw) -> bool:
+def _promising(rows: AirRows, law: ControlLaw, *, together: bool) -> bool:
     """True if a scheme may explain a record by what it leaves at a few rows, with or without a cause."""
-    return rows.exact or bool(_causes(rows, law)) or may_be_explained(rows, law.joints)
+    return rows.exact or bool(_causes(rows, law)) or (together and may_be_explained(rows, law.joints))
 
 
 def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, together: bool) -> AirFit:

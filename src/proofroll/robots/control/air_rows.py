@@ -317,8 +317,8 @@ class AirTable:
             acting = np.einsum("tij,tj->ti", M, stepped)
         if scheme.whole:
             of_world = moving.axes is not None
-            pairs = zip(rows.tolist(), rate, strict=True)
-            acting = acting - h * np.array([self._slope(*pair, of_world=of_world) for pair in pairs])
+            slopes = [self._slope(row, item, of_world=of_world) for row, item in zip(rows.tolist(), rate, strict=True)]
+            acting = acting - h * np.array(slopes)
         if scheme.damped:
             acting = acting + h * robot.damping * rate
         if scheme.implicit:
@@ -330,27 +330,23 @@ class AirTable:
         parts = 2 * self.placed + 2 * self.rated / (1e-300 + np.abs(v).max(axis=1)) + ROUND_OFF
         noise = np.sqrt(squares + (parts * sum(sizes))[:, None] ** 2)
         damped_v = at_v + (h * rate[:, driven] if scheme.damped or scheme.whole else 0.0)
-        armature = law.armature if law.armature.any() else np.ones(len(driven))
-        columns = {
-            "gravity": weight,
-            "effort": robot.load(effort),
-            "armature": -robot.load(armature) * rate,
-            "damping": -robot.load(damped_v),
-            "friction": -robot.load(np.sign(at_v)),
-            "drag": -self._drag(forces, v),
-            "implicit": -robot.load(h * law.kd) * rate,
-        }
         of_joints = {"torque": np.ones(at_v.shape), "friction": -np.sign(at_v), "damping": -damped_v}
         of_joints |= {"stiffness": -q[:, robot.driven[:, 0]], "armature": -rate[:, driven]}
+        by_joint = {
+            name: whitened(robot.load(values[:, None] * np.eye(len(driven))).swapaxes(1, 2))
+            for name, values in of_joints.items()
+        }
+        of_all = {"gravity": weight, "effort": robot.load(effort), "drag": -self._drag(forces, v)}
+        columns = {name: whitened(values) for name, values in of_all.items()}
+        columns |= {name: by_joint[name].sum(axis=1) for name in ("damping", "friction")}
+        columns["armature"] = by_joint["armature"] @ (law.armature if law.armature.any() else np.ones(len(driven)))
+        columns["implicit"] = by_joint["armature"] @ (h * law.kd)
         bodies = -np.moveaxis(self._of_bodies(forces, rate), 1, 0)
         size = rms(whitened(masses - inner))
         return AirRows(
             left=whitened(acting),
-            columns={name: whitened(values) for name, values in columns.items()},
-            by_joint={
-                name: whitened(robot.load(values[:, None] * np.eye(len(driven))).swapaxes(1, 2))
-                for name, values in of_joints.items()
-            },
+            columns=columns,
+            by_joint=by_joint,
             added={body.name: whitened(values) for body, values in zip(robot.mechanism.bodies, bodies, strict=True)},
             rounding=rms(noise),
             late=whitened(np.einsum("tij,tj->ti", M, following - rate) / 2),

@@ -17,7 +17,6 @@ from proofroll.robots.model import Array
 
 _MOST = 0.5  # part of the equations that numbers may be
 _OF_A_POINT = 4  # numbers of a mass at a point
-_SCREENED = 1e-3  # part of what is off that the quick look may leave
 _LISTED = 4  # joints whose numbers are told one by one
 _REST = "torque"  # number of a joint that a spring needs, too: its rest is not known
 
@@ -49,18 +48,13 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         right: number -> its right value, for those that are parts of the right ones.
     """
     rows, groups = _moving(rows, joints)
-    sets, screen = _sets(groups, rows), _Screen(groups, rows.left)
     carried: list[LayerCause] | None = None
-    for numbers in sorted(sets, key=lambda item: sum(groups[k].columns.shape[1] for k in item)):
-        chosen = [groups[k] for k in numbers]
-        count = sum(group.columns.shape[1] for group in chosen)
-        if count > _OF_A_POINT and carried is None and (carried := _carried(rows)):
+    for chosen in _closing(groups, rows):
+        columns = _columns(chosen)
+        if columns.shape[1] > _OF_A_POINT and carried is None and (carried := _carried(rows)):
             return carried
-        if count > _MOST * len(rows.left) or screen.left(numbers) > max(SAFETY * rows.rounding, _SCREENED * rows.off):
-            continue
-        columns = np.concatenate([group.columns for group in chosen], axis=1)
         values, remainder = _solved(columns, rows.left)
-        if rms(remainder) <= SAFETY * rows.rounding:
+        if columns.shape[1] <= _MOST * len(rows.left) and rms(remainder) <= SAFETY * rows.rounding:
             return [*_told(rows, chosen, columns, values, right)]
     return []
 
@@ -68,7 +62,7 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
 def may_be_explained(rows: AirRows, joints: Sequence[str]) -> bool:
     """True if two groups of numbers may leave no more than rounding."""
     rows, groups = _moving(rows, joints)
-    return any(_close([groups[k] for k in item], rows) for item in _sets(groups, rows))
+    return next(_closing(groups, rows), None) is not None
 
 
 def _moving(rows: AirRows, joints: Sequence[str]) -> tuple[AirRows, list[_Group]]:
@@ -77,21 +71,24 @@ def _moving(rows: AirRows, joints: Sequence[str]) -> tuple[AirRows, list[_Group]
     return rows, [*_groups(rows, joints)]
 
 
-def _sets(groups: Sequence[_Group], rows: AirRows) -> list[tuple[int, ...]]:
-    """Indices of one group or two that may leave no more than rounding.
+def _closing(groups: Sequence[_Group], rows: AirRows) -> Iterator[list[_Group]]:
+    """One group or two, of fewest numbers first, that leave no more than rounding at every second equation.
 
     All groups but the scale of efforts leave least; with it, all of them together are the equations themselves.
     """
-    sets = [*((k,) for k in range(len(groups))), *itertools.combinations(range(len(groups)), 2)]
-    scaled = {k for k, group in enumerate(groups) if group.kind == "effort"}
-    if _close([group for group in groups if group.kind != "effort"], rows):
-        return sets
-    return [item for item in sets if scaled & {*item}]
+    others = [group for group in groups if group.kind != "effort"]
+    sets = [*itertools.combinations(groups, 1), *itertools.combinations(groups, 2)]
+    if not _close(others, rows):
+        sets = [chosen for chosen in sets if any(group.kind == "effort" for group in chosen)]
+    yield from ([*chosen] for chosen in sorted(sets, key=lambda item: _columns(item).shape[1]) if _close(chosen, rows))
+
+
+def _columns(groups: Sequence[_Group]) -> Array:
+    return np.concatenate([group.columns for group in groups], axis=1)
 
 
 def _close(groups: Sequence[_Group], rows: AirRows) -> bool:
-    """True if groups of numbers, all together, leave no more than rounding; every second equation tells that."""
-    columns = np.concatenate([group.columns for group in groups], axis=1)
+    columns = _columns(groups)
     every = 2 if len(rows.left) > 4 * columns.shape[1] else 1
     _, remainder = _solved(columns[::every], rows.left[::every])
     return rms(remainder) <= math.sqrt(every) * SAFETY * rows.rounding
@@ -108,23 +105,6 @@ def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
         yield _Group(name, whole, tuple(joints) * (1 + len(rests)))
     for body, columns in rows.added.items():
         yield _Group(FITTED, columns, (body,) * columns.shape[1])
-
-
-class _Screen:
-    """Remainders of groups of columns, from products of all columns: quick, and exact to half the digits."""
-
-    def __init__(self, groups: Sequence[_Group], left: Array) -> None:
-        scaled, _ = _scaled(np.concatenate([group.columns for group in groups], axis=1))
-        self._products, self._along, self._left = scaled.T @ scaled, scaled.T @ left, left
-        ends = np.cumsum([0, *(group.columns.shape[1] for group in groups)])
-        self._places = [np.arange(begin, end) for begin, end in itertools.pairwise(ends.tolist())]
-
-    def left(self, numbers: Sequence[int]) -> float:
-        """Root mean square of what some groups leave."""
-        place = np.concatenate([self._places[k] for k in numbers])
-        values = np.linalg.lstsq(self._products[np.ix_(place, place)], self._along[place], rcond=ROUND_OFF)[0]
-        square = float(self._left @ self._left - values @ self._along[place])
-        return float(np.sqrt(max(square, 0.0) / len(self._left)))
 
 
 def _scaled(columns: Array) -> tuple[Array, Array]:

@@ -85,6 +85,12 @@ class _Reading:
     column: str = ""
     tried: int = 0
 
+    def beside(self, record: ControlRecord, cause: LayerCause, off: _Off, column: str, tried: int) -> _Reading:
+        """The reading with one mistake more, of those ``tried``, in a column that contradicts itself so much."""
+        worst, column = max((self.worst, self.column), (off, column))
+        causes, count = (*self.causes, cause), self.tried + tried
+        return _Reading(record=record, causes=causes, worst=worst, column=column, tried=count)
+
 
 def state_readings(record: ControlRecord, law: ControlLaw) -> list[StateReading]:
     """Records whose velocities are the rates of their places, with the layer that says what was wrong.
@@ -154,19 +160,12 @@ def untold_lags(record: ControlRecord) -> Iterator[str]:
                 yield _NAMES.get(name, name)
 
 
-def readings_of_late_efforts(readings: Sequence[StateReading]) -> Iterator[StateReading]:
-    """The readings with efforts that are a row late, as where a program returns those of its last step."""
-    for reading in readings:
-        efforts = _sizes(reading.record, "effort.")
-        if not efforts:
-            continue
+def readings_of_late_efforts(record: ControlRecord) -> Iterator[StateReading]:
+    """Reading of a record with efforts that are a row late, as where a program returns those of its last step."""
+    if efforts := _sizes(record, "effort."):
         words = "the columns effort.JOINT are one row late: each row has those of the step before it"
-        column, sooner = max(efforts, key=efforts.__getitem__), partial(_moved, "effort.", 1)
-        late = _silent(sooner(reading.record), "late_effort", words, efforts[column], column)
-        if reading.layer is not None and late.layer is not None:
-            late = late._replace(layer=replace(reading.layer, causes=(*reading.layer.causes, *late.layer.causes)))
-        reported = None if reading.reported is None else sooner(reading.reported)
-        yield late._replace(frame=reading.frame, reported=reported)
+        column = max(efforts, key=efforts.__getitem__)
+        yield _silent(_moved("effort.", 1, record), "late_effort", words, efforts[column], column)
 
 
 def _sizes(record: ControlRecord, kind: str) -> dict[str, float]:
@@ -193,18 +192,14 @@ def _explained(reading: _Reading, name: str, measured: _Measured, mistakes: Sequ
         left = None if compared is None else compared.off()
         if left is not None and left.off <= _HELPS * min(apart.off, left.way):
             trials.append((left.off, mistake, trial))
-    tried = reading.tried + len(mistakes)
     if not trials:
-        return [replace(reading, tried=tried)]
+        return [replace(reading, tried=reading.tried + len(mistakes))]
     most = 2 * min(leaves for leaves, _, _ in trials) + _SAFETY * apart.rounding
-    worst, column = max((reading.worst, reading.column), (apart, name))
     readings = []
     for leaves, mistake, trial in (item for item in trials if item[0] <= most):
         proof = f"places off by {error(apart.off)}, by {error(leaves, 1)} with that"
         cause = LayerCause(mistake.id, f"{mistake.words} ({proof})", None, leaves)
-        readings.append(
-            _Reading(record=trial, causes=(*reading.causes, cause), worst=worst, column=column, tried=tried)
-        )
+        readings.append(reading.beside(trial, cause, apart, name, len(mistakes)))
     return readings
 
 
@@ -233,9 +228,7 @@ def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
     text, interval = with_bar(abs(lag.intervals), bar, 1)
     proof = f"places off by {error(distance.off)}, by {error(remainder.off, 1)} with that; {text} ± {interval} rows"
     cause = LayerCause("late" if rows > 0 else "early", f"{words} ({proof})", None, remainder.off)
-    worst, column = max((reading.worst, reading.column), (distance, name))
-    tried = reading.tried + 1
-    return _Reading(record=record, causes=(*reading.causes, cause), worst=worst, column=column, tried=tried)
+    return reading.beside(record, cause, distance, name, 1)
 
 
 def _layer(reading: _Reading) -> Layer | None:

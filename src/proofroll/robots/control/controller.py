@@ -134,12 +134,8 @@ class Controller:
     def _rules(self) -> Iterable[tuple[str, object, bool, str]]:
         """Field, value, whether it is wrong, and advice."""
         rate = self.rate
-        yield (
-            "rate",
-            rate,
-            rate is not None and rate <= 0,
-            "give a positive number of instants per second, or leave it out",
-        )
+        advice = "give a positive number of instants per second, or leave it out"
+        yield "rate", rate, rate is not None and rate <= 0, advice
         yield "held", self.held, self.held not in HELD, f"choose one of {', '.join(HELD)}"
         yield "delay", self.delay, self.delay < 0, "a delay is a whole number of instants, at least 0"
         for name, value, active in (
@@ -157,40 +153,20 @@ class Controller:
             limit = gain.limit
             yield f"gains.{number}.limit", limit, limit is not None and limit <= 0, "must be above 0; or leave it out"
             yield f"gains.{number}.joints", list(gain.joints), not gain.joints, "name a joint or a pattern as *_HAA"
-        yield (
-            "targets",
-            next(iter(self.targets), ""),
-            bool(self.policy and self.targets),
-            ("a policy sets all targets; leave out [targets] or [policy]"),
-        )
-        start = self.start
-        yield (
-            "start.base",
-            start.base,
-            start.base is not None and not _turned(start.base),
-            ("give seven numbers: x, y, z in m and a quaternion of length 1, scalar first"),
-        )
-        yield (
-            "start.base_velocity",
-            start.base_velocity,
-            len(start.base_velocity) != _BASE_VELOCITY,
-            ("give six numbers: velocity in the world's axes in m/s, angular velocity in the body's axes in rad/s"),
-        )
-        yield (
-            "start.drop",
-            start.drop,
-            start.drop is not None and self.ground is None,
-            ("it is a height above the ground; give [start] base"),
-        )
-        ground = self.ground
+        both = bool(self.policy and self.targets)
+        advice = "a policy sets all targets; leave out [targets] or [policy]"
+        yield "targets", next(iter(self.targets), ""), both, advice
+        start, ground = self.start, self.ground
+        advice = "give seven numbers: x, y, z in m and a quaternion of length 1, scalar first"
+        yield "start.base", start.base, start.base is not None and not _turned(start.base), advice
+        advice = "give six numbers: velocity in the world's axes in m/s, angular velocity in the body's axes in rad/s"
+        yield "start.base_velocity", start.base_velocity, len(start.base_velocity) != _BASE_VELOCITY, advice
+        advice = "it is a height above the ground; give [start] base"
+        yield "start.drop", start.drop, start.drop is not None and ground is None, advice
         if ground is not None:
-            feet = ground.feet
-            yield (
-                "ground.feet",
-                feet,
-                feet != FEET if isinstance(feet, str) else not feet or min(feet.values()) < 0,
-                f'give "{FEET}", or a table of links and radii in m, of one at least',
-            )
+            feet, advice = ground.feet, f'give "{FEET}", or a table of links and radii in m, of one at least'
+            wrong = feet != FEET if isinstance(feet, str) else not feet or min(feet.values()) < 0
+            yield "ground.feet", feet, wrong, advice
             friction = ground.friction
             yield "ground.friction", friction, friction is not None and friction < 0, "must be at least 0"
 

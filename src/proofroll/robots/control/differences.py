@@ -191,8 +191,9 @@ def _actions(record: ControlRecord, law: ControlLaw) -> Array | str:
     recorded = record.stacked("action", law.joints)
     seen = vars(law.observed(instants, _before(recorded, instants.q))) | observed
     actions: list[Array] = []
+    place = dict(zip(law.exchanged, reversed(law.exchanged), strict=True)).get("last", "last")
     for row in range(len(record.time)):
-        last = {"last": law.factors[-1] * actions[-1]} if row and recorded is None and "last" not in observed else {}
+        last = {place: law.factors[-1] * actions[-1]} if row and recorded is None and place not in observed else {}
         observation = Observation(**{name: item[row] for name, item in seen.items()} | last)
         actions.append(np.clip(answer(observation), -law.clip, law.clip))
     return np.array(actions)

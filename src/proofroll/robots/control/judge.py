@@ -275,10 +275,11 @@ def _best_reading(
     if _unexplained_forces(best()[1]):
         try_rivals(_beside(plain[0], lambda record: readings_by_frames(record, frames)))
     if _unexplained_forces(best()[1]) and not controlled:
-        try_rivals([*readings_of_late_efforts([rival for rival, _ in (*judged, *silent)])])
+        late = [_beside(rival, readings_of_late_efforts) for rival, _ in (*judged, *silent)]
+        try_rivals(itertools.chain.from_iterable(late))
     if _open(best())[0]:
         try_rivals(_beside(plain[0], readings_of_early_rates))
-    if _unexplained_forces(best()[1]) or _open(best())[2]:
+    if not _told(best()):
         candidates = sorted((rival for rival, _ in (*judged, *silent)), key=_count)
         by_state = {id(rival) for rival, _ in judged}
         trials = _of_importers(candidates, partial(layers_of, within=time), time)

@@ -127,7 +127,7 @@ class InAir:
         ranges: joint -> its limits [rad or m].
         assumed: clause on rows that are steps if the program has its usual ones; empty: they are not, or it is known.
         fits: of records to robots that were compared before, by their identities.
-        layers: that were judged before, each with the record without the mistakes of columns found so far.
+        layers: name -> a layer that was judged before, and the record with its columns corrected.
     """
 
     held: HeldRobot
@@ -242,12 +242,7 @@ def _rows_are_steps(record: ControlRecord, law: ControlLaw) -> bool:
 
 
 def _of_another_robot(
-    record: ControlRecord,
-    evidence: _Evidence,
-    efforts: Array,
-    fit: AirFit,
-    usable: NDArray[np.bool_],
-    time: SearchTime,
+    record: ControlRecord, evidence: _Evidence, efforts: Array, fit: AirFit, usable: NDArray[np.bool_], time: SearchTime
 ) -> tuple[AirFit, str]:
     """Fit with the robot that an importer makes of the file and that explains the record by the fewest causes.
 
@@ -327,8 +322,10 @@ def _explained(
     candidates = [item for item in mistakes(evidence.law) if _shows(item, shown)]
     several, tried = explanations(candidates, explanation, time)
     ranked = [(item.rank, item.cause) for item in several]
-    if "target" in shown and not isinstance(offset := _offset(evidence, name), str):
-        ranked.append((2 * offset.after, offset))  # a pose has many numbers: a mistake with fewer goes before
+    if "target" in shown and (offset := _offset(evidence, evidence.law)) is not None:
+        left = _norm(evidence, name, offset.changed(evidence.law, 1.0))
+        cause = MistakeExplanation(offset, 1.0, left).cause
+        ranked += [(2 * left, cause)] if left <= _HELPS * distance else []  # its numbers are many: fewer go before
     if all(item.after > rounding for item in several):
         ranked += [
             ((1 + numbers) * cause.after, cause) for numbers, cause in _fitted_causes(name, compared, evidence, most)
@@ -378,10 +375,8 @@ def _trials(name: str, evidence: _Evidence, bars: Array) -> LayerTrials:
         return np.asarray(np.abs(compared.difference).max(axis=0) / bars)
 
     def fitting(law: ControlLaw) -> Iterator[Mistake]:
-        compared = evidence.difference("target", law)
-        if name == "target" and not isinstance(compared, str) and len(compared.difference) >= _INSTANTS:
-            offsets = compared.difference.mean(axis=0)
-            yield another_pose(offsets_told(law.joints, offsets), law.signs * offsets)
+        offset = _offset(evidence, law, _INSTANTS) if name == "target" else None
+        yield from [] if offset is None else [offset]
 
     return LayerTrials(parts, partial(evidence.left, name), fitting)
 
@@ -431,10 +426,8 @@ def _ramped(evidence: _Evidence, most: float) -> Iterator[tuple[int, LayerCause]
         rows_told = np.isfinite(targets).all(axis=1)
         residual = float((np.abs(targets - recorded)[rows_told] / np.abs(recorded).max(axis=0)).max())
         if residual <= most:
-            yield (
-                0,
-                LayerCause("ramped", "targets go along a straight line from one instant to the next", None, residual),
-            )
+            words = "targets go along a straight line from one instant to the next"
+            yield 0, LayerCause("ramped", words, None, residual)
 
 
 def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:
@@ -483,21 +476,14 @@ def _missed(evidence: _Evidence, candidates: Iterable[Mistake]) -> Iterator[Laye
     yield from (cause for _, cause in sorted(trials, key=lambda item: item[0])[:1])
 
 
-def _offset(evidence: _Evidence, name: str) -> LayerCause | str:
-    """Another default pose, as the mean difference of each joint's target."""
-    compared = evidence.difference("target")
-    if isinstance(compared, str):
-        return compared
-    if not len(compared.difference):
-        return "no row counts"
+def _offset(evidence: _Evidence, law: ControlLaw, fewest: int = 1) -> Mistake | None:
+    """Another default pose, as the mean difference of each joint's target; None without as many instants."""
+    compared = evidence.difference("target", law)
+    fixed = law.policy is not None or all(isinstance(item, float) for item in law.targets)
+    if isinstance(compared, str) or len(compared.difference) < fewest or not fixed:
+        return None
     offsets = compared.difference.mean(axis=0)
-    law = evidence.law
-    pose = law.pose + law.signs * offsets
-    targets = law.targets if law.policy is not None else tuple((law.signs * pose).tolist())
-    distance = _norm(evidence, name, law.change(pose=pose, targets=targets))
-    if distance > _HELPS * _norm(evidence, name, law):
-        return "no constant offset"
-    return LayerCause("pose", offsets_told(law.joints, offsets), None, distance)
+    return another_pose(offsets_told(law.joints, offsets), law.signs * offsets)
 
 
 def _norm(evidence: _Evidence, name: str, law: ControlLaw) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -95,28 +96,20 @@ def motion_layer(
     least = search.before
     fit = "" if search.right else forces(record)
     fitted = [] if isinstance(fit, str) else [cause for cause in fit.causes if cause.id in _ONLY_FORCES]
-    if fitted and any(cause.id != "damping" for cause in fitted):
-        return Layer(
-            name="motion",
-            residual=least,
-            bar=min(seen.bar, 0.5 * least),
-            column="the state",
-            time=float(seen.time[-1]),
-            causes=tuple(fitted),
-        )
-    causes = (*(item.cause for item in search.explanations), *fitted)
-    bar = min([item.after for item in search.explanations] or [seen.bar]) if causes else max(search.spread, seen.bar)
     layer = Layer(
         name="motion",
         residual=least,
-        bar=bar,
+        bar=min(seen.bar, 0.5 * least),
         column="the state",
         time=float(seen.time[-1]),
-        reason=IMPLICIT if search.imitated else "",
-        causes=causes,
-        tried=len(search.tried),
-        known=len(mistakes(law)),
+        causes=tuple(fitted),
     )
+    if any(cause.id != "damping" for cause in fitted):
+        return layer
+    causes = (*(item.cause for item in search.explanations), *fitted)
+    bar = min([item.after for item in search.explanations] or [seen.bar]) if causes else max(search.spread, seen.bar)
+    reason, tried = IMPLICIT if search.imitated else "", len(search.tried)
+    layer = replace(layer, bar=bar, reason=reason, causes=causes, tried=tried, known=len(mistakes(law)))
     undecided = time.over and not search.right and not causes
     ended = f"the search ended after {SEARCH_TIME:.0f} s of processor time without a mistake that explains it"
     reason = f"not decided: off by {error(least)}, and {ended}"

@@ -74,3 +74,16 @@ def test_nothing_is_named_that_leaves_a_column_wrong() -> None:
 def test_a_single_mistake_is_left_to_others() -> None:
     """One mistake that closes all columns is not told as several."""
     assert told((1.0, -1.0, 5.0), FIRST) is None
+
+
+def test_a_size_is_fitted_where_it_changes_what_is_wrong() -> None:
+    """A mistake that leaves a wrong column as it is is tried at its starts alone, and one that reaches it is fitted."""
+    tried: list[float] = []
+
+    def changed(law: tuple[float, ...], size: float) -> tuple[float, ...]:
+        tried.append(size)
+        return law[0], size * law[1], law[2]
+
+    elsewhere = mistake("elsewhere", changed, sized=True)
+    assert told((0.5, -1.0, 2.5), ADDED, TIMES, elsewhere) == ("added + times", "added; and times 2")
+    assert set(tried) == {0.95}

@@ -13,9 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import classical_step
-from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism import BodyMotion, Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates, Solution
-from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion
 from proofroll.elements.mechanism.dynamics.switches import held_joints
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.policy import Observation
@@ -189,7 +188,8 @@ class AirRobot:
         weight = np.einsum("bi,bij->j", self._weights, J[:, :3])
         rank = self.equations.rank
         free = np.linalg.svd(solution.rows.C)[2][rank:].T if rank else np.eye(len(M))
-        return AirForces(M, M @ solution.acceleration - weight, weight, free, solution.motion)
+        inertial = M @ solution.acceleration - weight
+        return AirForces(mass=M, inertial=inertial, weight=weight, free=free, motion=solution.motion)
 
     def coordinates(self, q: Array, v: Array, base: Array | None) -> tuple[Array, Array]:
         """Coordinates and velocities of the mechanism.

@@ -22,6 +22,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import Signal, value_at
 
 VECTORS = ("p_WB", "v_WB_W", "w_WB_B", "gravity_B")  # of an observation, shape (3,) each
+TERMS = (("q", "v", "last"), VECTORS[1:])  # parts of an observation that have one length
 SCALED = ("q", "v", "v_WB_W", "w_WB_B", "last")  # parts of an observation that programs scale
 
 
@@ -76,6 +77,7 @@ class ControlLaw:
         at_centre: True if the velocity of the base is observed there.
         factors: on observed q, v, linear velocity, angular velocity and last action, shape (5,).
         pose_observed: part of the pose that is added to observed coordinates; -1: they are relative to it.
+        exchanged: names of two parts of an observation that have each other's place; empty: none.
         clip: largest size of an action.
         smoothing: part of an action that counts, beside what counted at the instant before; 1: all.
         hold_effort: True if efforts hold between instants, False if they follow the state.
@@ -114,6 +116,7 @@ class ControlLaw:
     at_centre: bool = False
     factors: tuple[float, ...] = (1.0,) * len(SCALED)
     pose_observed: float = 0.0
+    exchanged: tuple[str, ...] = ()
     clip: float = math.inf
     smoothing: float = 1.0
     hold_effort: bool = False
@@ -211,7 +214,7 @@ class ControlLaw:
         order = self._entries[1]
         q, v, velocity, spin, action_factor = self.factors
         moving = state.v_WB + self.at_centre * np.cross(state.w_WB, body @ self.centre)
-        return Observation(
+        seen = Observation(
             time=state.time,
             q=q * (state.q + self.pose_observed * self.pose)[..., order],
             v=v * state.v[..., order],
@@ -222,19 +225,15 @@ class ControlLaw:
             gravity_B=self.gravity_sign * (np.swapaxes(R, -1, -2) @ self.down),
             last=action_factor * last,
         )
+        others = zip(self.exchanged, reversed(self.exchanged), strict=True)
+        return dataclasses.replace(seen, **{name: getattr(seen, other) for name, other in others})
 
     @property
     def observing(self) -> tuple[object, ...]:
         """Settings on which :meth:`observed` depends besides a state."""
-        turns = (
-            self.scalar_last,
-            self.conjugated,
-            self.turned_back,
-            self.gravity_sign,
-            self.velocity_turns,
-            self.spin_turns,
-        )
-        return (*turns, self.observed_order, self.factors, self.pose_observed, self.at_centre, self.observed_lag)
+        rotations = ("scalar_last", "conjugated", "turned_back", "gravity_sign", "velocity_turns", "spin_turns")
+        others = ("observed_order", "factors", "pose_observed", "at_centre", "observed_lag", "exchanged")
+        return tuple(getattr(self, name) for name in (*rotations, *others))
 
     def smoothed(self, action: Array, previous: Array) -> Array:
         """Part of an action that counts, clipped, beside what counted at the instant ``previous``."""

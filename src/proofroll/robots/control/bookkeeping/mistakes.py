@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -13,7 +14,7 @@ import numpy as np
 
 from proofroll.core.diagnosis.fitting import least_squares_parameter
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.robots.control.bookkeeping.law import SCALED, ControlLaw
+from proofroll.robots.control.bookkeeping.law import SCALED, TERMS, ControlLaw
 
 # Layers of a record, each computed from the ones before; a record shows a mistake at one of them.
 LAYERS = {
@@ -136,7 +137,14 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
         yield _sized("armature", "the armature is {size} of the right one", "acceleration", "armature", (0.9, 0.2))
     else:
         words = "there is an armature of {size} kg m²"
-        yield _fitted("armature", words, "acceleration", _armed, _ARMATURES, none=0.0)
+        yield _fitted(
+            "armature",
+            words,
+            "acceleration",
+            lambda law, size: law.change(armature=law.armature + size),
+            _ARMATURES,
+            none=0.0,
+        )
     yield _signed("gravity", "gravity", "acceleration", "gravity")
 
 
@@ -185,16 +193,16 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
     yield _seen("spin_frame", f"{spin} observed in the world's axes", spin_turns=0)
     yield _seen("spin_frame", f"{spin} observed turned from the world's axes to the base's twice", spin_turns=2)
     if law.centre.any():
-        yield _seen("velocity_point", f"{velocity} observed at its centre of mass", at_centre=True)
-        yield _seen(
-            "velocity_point",
-            f"{velocity} observed at its centre of mass, in the base's axes",
-            at_centre=True,
-            velocity_turns=1,
-        )
+        point = f"{velocity} observed at its centre of mass"
+        yield _seen("velocity_point", point, at_centre=True)
+        yield _seen("velocity_point", f"{point}, in the base's axes", at_centre=True, velocity_turns=1)
     for part, words in ((-1.0, "relative to the default pose"), (1.0, "with the default pose added")):
         if law.pose.any():
             yield _seen("observed_pose", f"coordinates are observed {words}", pose_observed=part)
+    for pair in itertools.chain.from_iterable(itertools.combinations(terms, 2) for terms in TERMS):
+        yield _seen(
+            "observed_terms", f"{pair[0]} and {pair[1]} have each other's place in observations", exchanged=pair
+        )
     names = ("the coordinates are", "the rates of the joints are", velocity, spin)
     for k, name in enumerate(names):
         yield _factor(k, f"{name} observed at {{size}} of the right size", f"{name} not observed")
@@ -204,7 +212,14 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
 def _of_actions(law: ControlLaw) -> Iterator[Mistake]:
     """Mistakes of what an action means."""
     clips = (0.05, 0.1, 0.3, 1.0, 3.0)
-    clipped = _fitted("action_clip", "actions are clipped to ±{size}", "action", _clipped, clips, none=math.inf)
+    clipped = _fitted(
+        "action_clip",
+        "actions are clipped to ±{size}",
+        "action",
+        lambda law, size: law.change(clip=size),
+        clips,
+        none=math.inf,
+    )
     yield dataclasses.replace(clipped, later=True)
     for words, order in orders(law.joints):
         yield _fixed("joint_order", f"actions are for joints in another order ({words})", "target", action_order=order)
@@ -252,14 +267,6 @@ def _signed(name: str, what: str, layer: str, attribute: str, starts: tuple[floa
 
 def _scaled(attribute: str, law: ControlLaw, size: float) -> ControlLaw:
     return law.change(**{attribute: size * getattr(law, attribute)})
-
-
-def _armed(law: ControlLaw, size: float) -> ControlLaw:
-    return law.change(armature=law.armature + size)
-
-
-def _clipped(law: ControlLaw, size: float) -> ControlLaw:
-    return law.change(clip=size)
 
 
 def orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:

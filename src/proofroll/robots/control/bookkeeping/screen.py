@@ -6,6 +6,7 @@ seen. So errors do not add up, the state decides what a policy observes, and hun
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,7 +17,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.robots.control.bookkeeping.air import TREATMENTS, AirRobot, Treatment
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.bookkeeping.mistakes import Mistake
+from proofroll.robots.control.bookkeeping.mistakes import Mistake, SearchTime
 
 _FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried where 1 is right
 _AT_ONCE = 500  # laws that move at once: some 100 MB
@@ -195,12 +196,14 @@ class MistakeScreen:
         """Mean square of the velocities that the law itself leaves unexplained, with the best treatment of gains."""
         return min(float(np.square(self.left([self.law], treatment)).mean()) for treatment in TREATMENTS)
 
-    def best(self, candidates: Sequence[Mistake]) -> list[Screened]:
-        """Mistakes with their sizes in each treatment of gains, those that leave least first."""
-        trials = [(item, size) for item in candidates for size in _sizes(item)]
+    def best(self, candidates: Sequence[Mistake], time: SearchTime) -> list[Screened]:
+        """Mistakes with their sizes in the treatments of gains that there is time for, those that leave least first."""
+        further = {item.words: _FACTORS if item.none == 1 else () for item in candidates}
+        sizes = {item.words: item.starts + further[item.words] if item.sized else (1.0,) for item in candidates}
+        trials = [(item, size) for item in candidates for size in sizes[item.words]]
         laws = [item.changed(self.law, size) for item, size in trials]
         screened: list[Screened] = []
-        for treatment in TREATMENTS:
+        for treatment in itertools.takewhile(lambda _: not time.over, TREATMENTS):
             squares = np.square(self.left(laws, treatment)).mean(axis=1)
             ranked: dict[str, Screened] = {}
             for number in np.argsort(squares):
@@ -246,13 +249,6 @@ class MistakeScreen:
         return np.array(
             [np.median(off[mask]) if mask.any() else _BEYOND * off[np.abs(off).argmax()] for off, mask in columns]
         )
-
-
-def _sizes(mistake: Mistake) -> tuple[float, ...]:
-    """Sizes of a mistake that are tried; 1 where it has none."""
-    if not mistake.sized:
-        return (1.0,)
-    return mistake.starts + (_FACTORS if mistake.none == 1 else ())
 
 
 def _laws(law: ControlLaw, screened: Sequence[Screened], sizes: Array) -> list[ControlLaw]:

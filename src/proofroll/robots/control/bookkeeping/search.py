@@ -205,14 +205,11 @@ class MotionSearch:
         """Explanations at a step, the best first; another pose is tried where a mistake leaves something to explain."""
         law, seen = self.law, self.seen
         screen = MistakeScreen(motions.mechanism, law, seen.q, seen.v, motions.step, motions.stride)
-        candidates = [
-            item
-            for item in mistakes(law)
-            if item.id != "rate" or _divides(motions.step, 1 / item.changed(law, 1.0).rate)
-        ]
+        steps = ((item, 1 / item.changed(law, 1.0).rate / motions.step) for item in mistakes(law))  # between instants
+        whole = [item for item, count in steps if item.id != "rate" or abs(count - round(count)) <= 1e-6 * count]
         several: dict[str, MistakeExplanation] = {}
         enough = screen.unexplained
-        for item in screen.best(candidates):
+        for item in screen.best(whole, self._time):
             if item.left > enough or self._time.over:
                 break
             words = item.mistake.words
@@ -282,11 +279,6 @@ class MotionSearch:
         halved = [_moved(self.law, offsets * (1 - 0.5 * row)) for row in np.eye(len(offsets))]
         bound = max(2 * distance, self.seen.bar)
         return [k for k, law in enumerate(halved) if math.isfinite(motions.distance(law, scheme, bound))]
-
-
-def _divides(step: float, period: float) -> bool:
-    """True if a time between instants is a whole number of steps [s], so that a program can act at that rate."""
-    return abs(period / step - round(period / step)) <= 1e-6 * period / step
 
 
 def explained_start(

@@ -98,7 +98,7 @@ def _pair(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, t
     """Two mistakes that close every column, with the fewest fitted numbers; empty where none are found."""
     best: list[_Told] = []
     wrong, changed = trials.parts(law) > 1, _changed(candidates, law, trials)
-    candidates = [item for item in candidates if changed[item.words].any()]
+    candidates = [item for item in candidates if np.any(changed[item.words] & wrong)]
     for first in _known(candidates, law):
         if not np.all(trials.parts(first.law)[~wrong] <= 1):
             continue
