@@ -287,9 +287,8 @@ def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (code, err) == (0, "")
     found = {engine["name"]: engine for engine in json.loads(out)}
     assert found["oracle"]["status"] == "installed"
-    assert found["oracle"]["provides"] == {
-        "only": ["contact between bodies", "contacts that never slip (friction = inf)"]
-    }
+    of_contact = ["contact between bodies", "contact of spheres", "contact with bores"]
+    assert found["oracle"]["provides"] == {"only": [*of_contact, "contacts that never slip (friction = inf)"]}
     assert found["absent"]["status"] == "missing"
     assert "no_such_module_anywhere" in found["absent"]["message"]
     assert found["misspelt"]["status"] == "broken"
