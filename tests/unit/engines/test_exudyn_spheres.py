@@ -67,7 +67,7 @@ def test_two_spheres_press_apart():
         (
             Geometry("g", "b", "sphere", radius=0.0),
             {},
-            "contact of vertices, and Exudyn's contacts are of spheres with a radius",
+            r"ends of cables\), and Exudyn's contacts are of spheres with a radius",
         ),
         (
             Geometry("g", "b", "ellipsoid", axes=(0.1, 0.2, 0.3)),

@@ -269,7 +269,8 @@ def test_describe() -> None:
     """An engine is described by itself, from a process of its own."""
     found = describe("oracle")
     assert found.version == "1"
-    assert found.provides == {"only": ["contact between bodies", "contacts that never slip (friction = inf)"]}
+    of_contact = ["contact between bodies", "contact of spheres", "contact with bores"]
+    assert found.provides == {"only": [*of_contact, "contacts that never slip (friction = inf)"]}
     assert found.presets == {"only": {"matched": {"formulation": "only", "preset": "matched", "dt": 1e-2}}}
     assert found.summary.startswith("Well-behaved")
 

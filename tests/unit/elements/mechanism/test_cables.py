@@ -112,7 +112,7 @@ def test_a_cable_between_bodies_keeps_momentum() -> None:
         ("pinocchio", 1e-4, ""),
         ("projection", 1e-4, ""),
         ("mujoco", 0.2, ""),  # m; its softness returns up to a quarter of the 5 m/s of the jerk, for 0.14 s
-        ("exudyn", 0.0, "touches in k"),
+        ("exudyn", 0.0, "ends of cables"),
     ],
 )
 def test_engines_follow_a_cable_or_refuse_it(tmp_path: Path, engine: str, slack_after: float, reason: str) -> None:

@@ -50,7 +50,7 @@ class MechanismCapability(StrEnum):
     CONTACT_REBOUNDS = "rebounds of bodies from each other (restitution)"
     TURNING_FRICTION = "friction of contacts against rolling and spinning"
     SLIP_REBOUNDS = "slips that impacts reverse (tangential restitution)"
-    VERTICES = "contact of vertices"
+    VERTICES = "contact of points (vertices, ends of cables)"
     SPHERES = "contact of spheres"
     ELLIPSOIDS = "contact of ellipsoids"
     DISCS = "contact of flat discs"
