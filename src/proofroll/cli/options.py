@@ -189,7 +189,7 @@ def new_runner(
     from proofroll.running.runner import Runner
     from proofroll.running.store import Store
 
-    if scheduler is None:  # a cluster is one of dask
+    if scheduler is None:  # without dask, which a cluster may need
         import_xarray()
     store = Store(out / "cases")  # raises for a folder that cannot be written, before a cluster is started
     return Runner(store, jobs=jobs, fresh=fresh, cluster=new_cluster(scheduler), workers=workers)

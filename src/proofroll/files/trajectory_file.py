@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import IO, TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -218,27 +218,33 @@ def _arrays(content: bytes, what: str, times: str = "") -> dict[str, npt.NDArray
     Raises:
         ValueError: a header promises what does not follow, whose memory numpy would ask for, or other rows than times.
     """
-    arrays, lacking = dict[str, npt.NDArray[Any]](), ""
     with reading(what), zipfile.ZipFile(io.BytesIO(content)) as archive:
-        for entry in [item for item in archive.infolist() if item.filename.endswith(".npy")]:
-            name = entry.filename.removesuffix(".npy")
+        items = [item for item in archive.infolist() if item.filename.endswith(".npy")]
+        entries = {item.filename.removesuffix(".npy"): item for item in items}
+        headers = {}
+        for name, entry in entries.items():
             with archive.open(entry) as file:
-                version = np.lib.format.read_magic(file)
-                size = file.read(2 if version == (1, 0) else 4)
-                shape, by_columns, kind = _header(version, size + file.read(int.from_bytes(size, "little")))
-                if math.prod(shape) * kind.itemsize > entry.file_size:
-                    lacking = f"the header of {name} promises {math.prod(shape):.3g} numbers, which do not follow"
-                    break
+                headers[name] = _header_of(file)
+    for name, (shape, _, kind) in headers.items():  # before anything is unpacked
+        if math.prod(shape) * kind.itemsize > entries[name].file_size:
+            raise ValueError(f"the header of {name} promises {math.prod(shape):.3g} numbers, which do not follow")
+        rows = headers[times][0] if times in headers else shape
+        if shape[:1] != rows[:1]:
+            raise ValueError(f"{name} has the shape {shape}; give one row for each of {rows[0] if rows else 1} times")
+    arrays = {}
+    with reading(what), zipfile.ZipFile(io.BytesIO(content)) as archive:
+        for name, entry in entries.items():
+            with archive.open(entry) as file:
+                shape, by_columns, kind = _header_of(file)
                 arrays[name] = np.ndarray(shape, kind, bytearray(file.read()), order="F" if by_columns else "C")
-    if lacking:
-        raise ValueError(lacking)
-    for name, array in arrays.items():
-        rows = arrays[times].shape if times in arrays else array.shape
-        if array.shape[:1] != rows[:1]:
-            raise ValueError(
-                f"{name} has the shape {array.shape}; give one row for each of {rows[0] if rows else 1} times"
-            )
     return arrays
+
+
+def _header_of(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, order by columns, and type of an array, whose file stands at its numbers then."""
+    version = np.lib.format.read_magic(file)
+    size = file.read(2 if version == (1, 0) else 4)
+    return _header(version, size + file.read(int.from_bytes(size, "little")))
 
 
 @lru_cache(maxsize=1000)

@@ -92,17 +92,17 @@ def record_layers(
     evidence = _Evidence(record, law, mechanism, in_air or InAir(HeldRobot.of(mechanism)))
     layers: list[Layer] = []
     time = time or SearchTime()
-    known = evidence.in_air.layers
+    judgements = evidence.in_air.layers
     for name in names:
-        if name in known:
-            layer, record = known[name]
+        if name in judgements:
+            layer, record = judgements[name]
             evidence = dataclasses.replace(evidence, record=record)
         else:
             layer = _layer(name, evidence, {item.name for item in layers if item.residual is None}, time)
             if not layer.holds and (name == "observation" or (name == "action" and not layer.causes)):
                 layer, evidence = _of_columns(layer, evidence)
             if layer.holds or not time.over:
-                known[name] = layer, evidence.record
+                judgements[name] = layer, evidence.record
         layers.append(layer)
     record = evidence.record
     if grounded:

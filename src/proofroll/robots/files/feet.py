@@ -211,10 +211,10 @@ class _NearPair:
     face: Sequence[int]
 
     def __post_init__(self) -> None:
-        moving, other = sorted(self.shapes, key=lambda shape: shape.body == WORLD)
-        if self.face and self.touches and other.kind == "box" and moving.kind in _ON_FACES:
-            other = other.face(*self.face)
-        object.__setattr__(self, "shapes", (moving, other))
+        moving, partner = sorted(self.shapes, key=lambda shape: shape.body == WORLD)
+        if self.face and self.touches and partner.kind == "box" and moving.kind in _ON_FACES:
+            partner = partner.face(*self.face)
+        object.__setattr__(self, "shapes", (moving, partner))
 
     @property
     def touches(self) -> bool:

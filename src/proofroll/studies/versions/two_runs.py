@@ -213,8 +213,8 @@ def _about(data: xr.Dataset, new_data: xr.Dataset) -> dict[str, tuple[Any, Any]]
         | {f"{name}.{key}": value for name in objects for key, value in _object(run, name).items()}
         for run in (data, new_data)
     ]
-    both = [(name, values[0].get(name), values[1].get(name)) for name in dict.fromkeys([*values[0], *values[1]])]
-    return {name: (old, new) for name, old, new in both if old != new}
+    pairs = [(name, values[0].get(name), values[1].get(name)) for name in dict.fromkeys([*values[0], *values[1]])]
+    return {name: (old, new) for name, old, new in pairs if old != new}
 
 
 def _at_shared_instants(data: xr.Dataset, new_data: xr.Dataset, new: Path) -> tuple[xr.Dataset, xr.Dataset]:

@@ -1,6 +1,7 @@
 """Trajectories of users: what they may hold."""
 
 import io
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ import xarray as xr
 
 import proofroll
 from proofroll.core.errors import InputError
+from proofroll.files.trajectory_file import read_arrays
 
 TIMES = np.linspace(0, 1, 11)
 
@@ -81,11 +83,18 @@ def test_a_file_that_its_library_cannot_read(tmp_path: Path, place: bytes, value
 
 
 def test_rows_are_counted_before_anything_is_unpacked(tmp_path: Path) -> None:
-    """An array of other rows than the times is told from its header."""
+    """An array of other rows than the times is told from its header, without the memory of its numbers."""
     run = tmp_path / "run.npz"
-    np.savez_compressed(run, t=TIMES, angle=np.zeros(10**6))
-    with pytest.raises(InputError, match=r"angle has the shape \(1000000,\); give one row for each of 11 times"):
+    np.savez_compressed(run, t=TIMES, angle=np.zeros(2 * 10**6))
+    words = r"angle has the shape \(2000000,\); give one row for each of 11 times"
+    with pytest.raises(InputError, match=words):
         proofroll.judge(run, "pendulum", columns={"t": "time", "angle": "q.pivot"})
+    tracemalloc.start()
+    with pytest.raises(ValueError, match=words):
+        read_arrays(run, "t")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8e6  # bytes: half of the array
 
 
 def test_judge_has_a_limit_of_time(command_line: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:

@@ -110,13 +110,13 @@ class Actuator:
         return free if mode == "linear" else min(max(free, -self.bound), self.bound)
 
     def law(self) -> Callable[[float, float, float], float]:
-        """:meth:`effort` at a time, coordinate and rate, with its numbers at hand: Exudyn asks it 100 times a step."""
+        """:meth:`effort` at a time, coordinate and rate, with its numbers at hand, for engines that ask it often."""
         if self.kind != "position":
             return self.effort
         n, bound, target = self.gear, self.bound, self.target
         spring, damper = n * self.kp, n * n * self.kd
-        at = target.at if isinstance(target, Table | Held) else partial(value_at, target)
-        return lambda t, q, v: min(max(float(spring * (at(t) - n * q) - damper * v), -bound), bound)
+        target_at = target.at if isinstance(target, Table | Held) else partial(value_at, target)
+        return lambda t, q, v: min(max(float(spring * (target_at(t) - n * q) - damper * v), -bound), bound)
 
     def mode(self, time: float, q: float, v: float) -> str:
         """Mode, of :data:`MODES`, at a time [s], for coordinate and rate of the joint."""

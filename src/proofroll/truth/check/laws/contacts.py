@@ -150,10 +150,10 @@ def rolling_of(contact: PairContact, pieces: Pieces, k: int, relative: Array) ->
     normal = pieces.normal[..., k, :]
     if contact.pair.against == "turning":
         return relative - dot(normal, relative)[..., None] * normal
-    first = contact.solid_a.kind == "sphere"
-    ball, body = (contact.solid_a, contact.a) if first else (contact.solid_b, contact.b)
+    a_is_ball = contact.solid_a.kind == "sphere"
+    ball, body = (contact.solid_a, contact.a) if a_is_ball else (contact.solid_b, contact.b)
     centre = pieces.p[..., body, :] + turned(pieces.R[..., body, :, :], ball.centre)
-    sign = 1.0 if first else -1.0
+    sign = 1.0 if a_is_ball else -1.0
     return np.asarray(cross(normal, slide_of(contact, pieces, centre)) * (sign / ball.radius))
 
 

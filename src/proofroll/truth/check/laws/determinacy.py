@@ -22,8 +22,8 @@ def determinate_reactions(scene: LawScene, published: PublishedValues, residuals
     if scene.contacts or not (unknown.any() or m.loops):
         return
     for row in {0, last // 2, last}:
-        one = BodyPoses(**{name: getattr(published.pieces, name)[[row]] for name in _ARRAYS})
-        most = np.maximum(most, _changes(scene, one))
+        poses = BodyPoses(**{name: getattr(published.pieces, name)[[row]] for name in _ARRAYS})
+        most = np.maximum(most, _changes(scene, poses))
     # drives and couplings have reactions of their own, by which further components may change
     passive = not m.couplings and all(joint.motion is None for joint in m.joints)
     wrong = np.where(unknown, (most < _FIXED) & passive, (most > _FREE) & np.isfinite(wrenches).all(0))
@@ -31,12 +31,12 @@ def determinate_reactions(scene: LawScene, published: PublishedValues, residuals
         residuals.note("unknown", connection.name, parts[None, None].astype(float), 1.0, published.pieces.time[:1])
 
 
-def _changes(scene: LawScene, one: BodyPoses) -> Array:
+def _changes(scene: LawScene, poses: BodyPoses) -> Array:
     """Change of each component, (connections, 6), by reactions that together move nothing, relative to the largest."""
-    centres, reactions, columns = scene.centres(one)[0][0, 0], list[Array](), list[Array]()
+    centres, reactions, columns = scene.centres(poses)[0][0, 0], list[Array](), list[Array]()
     for number, connection in enumerate(scene.connections):
-        place = scene.placed(connection, one).origin_b[0, 0]
-        for force, moment in held(scene, one, connection):
+        place = scene.placed(connection, poses).origin_b[0, 0]
+        for force, moment in held(scene, poses, connection):
             reactions.append(np.zeros((len(scene.connections), 6)))
             reactions[-1][number] = *force, *moment
             effect = np.zeros((len(scene.mass), 6))

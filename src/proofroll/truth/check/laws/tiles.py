@@ -56,8 +56,8 @@ class Tiles(BodyPoses):
             rolling, spinning = turning
             return modes._replace(contacts=tuple(contacts), rolling=rolling, spinning=spinning)
 
-        known: dict[Modes, Modes] = {}
-        return replace(self, modes=tuple(known.setdefault(item, folded(item)) for item in self.modes))
+        merged: dict[Modes, Modes] = {}
+        return replace(self, modes=tuple(merged.setdefault(item, folded(item)) for item in self.modes))
 
     def holding(self, times: Array) -> Places:
         """Places of times [s] in the tiles that hold them; of two that meet there the later."""
