@@ -13,7 +13,7 @@ import sys
 import weakref
 import zipfile
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -38,6 +38,8 @@ _ABOUT = "about.json"
 # True if xarray was imported without dask; then dask is hidden, too, when xarray asks for a scheduler to write.
 _without_dask = False
 _LONGEST = 200  # characters shown of the error of a library that reads a file
+# Shape of an array, True if it is stored by columns, and the type of its numbers.
+_Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
 
 
 @contextlib.contextmanager
@@ -218,29 +220,33 @@ def _arrays(content: bytes, what: str, times: str = "") -> dict[str, npt.NDArray
     Raises:
         ValueError: a header promises what does not follow, whose memory numpy would ask for, or other rows than times.
     """
+    arrays, headers, files, fault = dict[str, npt.NDArray[Any]](), dict[str, _Header](), dict[str, IO[bytes]](), ""
     with reading(what), zipfile.ZipFile(io.BytesIO(content)) as archive:
-        items = [item for item in archive.infolist() if item.filename.endswith(".npy")]
-        entries = {item.filename.removesuffix(".npy"): item for item in items}
-        headers = {}
-        for name, entry in entries.items():
-            with archive.open(entry) as file:
-                headers[name] = _header_of(file)
-    for name, (shape, _, kind) in headers.items():  # before anything is unpacked
-        if math.prod(shape) * kind.itemsize > entries[name].file_size:
-            raise ValueError(f"the header of {name} promises {math.prod(shape):.3g} numbers, which do not follow")
-        rows = headers[times][0] if times in headers else shape
-        if shape[:1] != rows[:1]:
-            raise ValueError(f"{name} has the shape {shape}; give one row for each of {rows[0] if rows else 1} times")
-    arrays = {}
-    with reading(what), zipfile.ZipFile(io.BytesIO(content)) as archive:
-        for name, entry in entries.items():
-            with archive.open(entry) as file:
-                shape, by_columns, kind = _header_of(file)
-                arrays[name] = np.ndarray(shape, kind, bytearray(file.read()), order="F" if by_columns else "C")
+        for entry in [item for item in archive.infolist() if item.filename.endswith(".npy")]:
+            name = entry.filename.removesuffix(".npy")
+            files[name] = archive.open(entry)
+            headers[name] = shape, _, kind = _header_of(files[name])
+            if not fault and math.prod(shape) * kind.itemsize > entry.file_size:
+                fault = f"the header of {name} promises {math.prod(shape):.3g} numbers, which do not follow"
+        fault = fault or _other_rows(headers, times)
+        for name, (shape, by_columns, kind) in headers.items() if not fault else ():
+            numbers = bytearray(files[name].read())
+            arrays[name] = np.ndarray(shape, kind, numbers, order="F" if by_columns else "C")
+    if fault:
+        raise ValueError(fault)
     return arrays
 
 
-def _header_of(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+def _other_rows(headers: Mapping[str, _Header], times: str) -> str:
+    """Clause on the first array whose rows are not as many as the times; empty: there is none."""
+    count = headers[times][0][:1] if times in headers else None
+    for name, (shape, _, _) in headers.items():
+        if count is not None and shape[:1] != count:
+            return f"{name} has the shape {shape}; give one row for each of {count[0] if count else 1} times"
+    return ""
+
+
+def _header_of(file: IO[bytes]) -> _Header:
     """Shape, order by columns, and type of an array, whose file stands at its numbers then."""
     version = np.lib.format.read_magic(file)
     size = file.read(2 if version == (1, 0) else 4)
@@ -248,7 +254,7 @@ def _header_of(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 
 
 @lru_cache(maxsize=1000)
-def _header(version: tuple[int, int], text: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+def _header(version: tuple[int, int], text: bytes) -> _Header:
     """Shape, order by columns, and type of an array, by its header in a version of numpy's format."""
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, by_columns, kind = read(io.BytesIO(text))
