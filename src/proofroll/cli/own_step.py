@@ -104,19 +104,17 @@ def _change(made: StepAnswer) -> list[str]:
     return changed or [f"Lines that do, if any: {lines_command(made, spec.name)}"]
 
 
-def stored_sentences(comparison: Comparison, out: Path) -> list[str]:
-    """First sentence of a stored answer for the first point of a comparison at the default tolerance; else none."""
+def stored_sentences(comparison: Comparison, tolerances: Sequence[str], engines: Sequence[str], out: Path) -> list[str]:
+    """First sentence of the stored answer of engines for the first point of a comparison and tolerances; else none."""
     from proofroll.files.scene_file import read_scene_file
-    from proofroll.report.answer.sentences import taken_sentence
-    from proofroll.studies.answer.answers import answer_path, stored
+    from proofroll.report.answer.sentences import taken_sentence, tolerance_words
+    from proofroll.studies.answer.answers import longest_stored
     from proofroll.studies.answer.question import AnswerQuestion
-    from proofroll.studies.answer.records import SceneAnswer
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
 
     point = next(iter(comparison.combinations()), {})
     values = {name: value for name, value in point.items() if isinstance(value, float)}
     until = read_scene_file(comparison.scene).duration or comparison.until
     question = AnswerQuestion.of(comparison.scene, values, until)
-    path = answer_path(out, question, AskedTolerance.of([DEFAULT], question.loaded))
-    answer = stored(path, SceneAnswer) if path.is_file() else None
-    return [f"To {DEFAULT} of the path: {taken_sentence(answer)}"] if answer is not None else []
+    answer = longest_stored(out, question, AskedTolerance.of(tolerances or [DEFAULT], question.loaded), engines)
+    return [f"To {tolerance_words(answer)}: {taken_sentence(answer)}"] if answer is not None else []

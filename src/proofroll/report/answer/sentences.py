@@ -35,6 +35,8 @@ SIGNS = {
 }
 INSTALLED = "as installed"
 _QUANTITIES = {"p_WB": "body positions"}
+# Least ratio of two speeds that is told.
+_FASTER = 1.1
 _PREFIXES = {-3: "m", -6: "µ", -9: "n"}
 
 
@@ -101,9 +103,14 @@ def installed_words(item: EngineAnswer) -> str:
     failed = [(setting, run) for setting in tried for run in setting.steps if run.of_allowed is not None]
     if failed:
         setting, run = min(failed, key=lambda pair: pair[1].of_allowed or math.inf)
-        dearer = "dearer, " if setting.state is State.DEARER else ""
-        return f"{INSTALLED}: {dearer}{number(run.of_allowed)} times too far off at {_at(item, setting, run)}"
+        told = f"{_at(item, setting, run)} is off by {_times_allowed(run.of_allowed)}"
+        return f"{INSTALLED}: dearer ({told})" if setting.state is State.DEARER else f"{INSTALLED}: {told}"
     return f"{INSTALLED}: {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
+
+
+def _times_allowed(of_allowed: float | None) -> str:
+    """An error over what is allowed, for a reader: quantities may have different bounds."""
+    return f"{number(of_allowed)} times what is allowed"
 
 
 def _at(item: EngineAnswer, setting: SettingTried, run: StepTried) -> str:
@@ -149,14 +156,14 @@ def reason(item: EngineAnswer) -> str:
 def coarser_words(item: EngineAnswer) -> str:
     """Clause on twice the step of an answer that holds; empty if it was not run."""
     tried = item.coarser
-    if tried is None or item.bound is None:
+    if tried is None:
         return ""
     double = "twice the step" if item.resolution == "dt" else "ten times the tolerance"
     if tried.status != Status.DONE:
         return f"{double} {ended_words(tried)}"
     if tried.of_allowed is None or tried.of_allowed <= 1:
         return ""
-    return f"{double} is off by {off_words(item.bound, tried.of_allowed)}"
+    return f"{double} is off by {_times_allowed(tried.of_allowed)}"
 
 
 def ended_words(tried: StepTried) -> str:
@@ -167,12 +174,27 @@ def ended_words(tried: StepTried) -> str:
 
 
 def taken_sentence(made: SceneAnswer) -> str:
-    """First sentence of an answer: what to take, or that nothing was shown to hold the tolerance."""
+    """First sentence of an answer: what to take, or that nothing was shown to hold the tolerance.
+
+    A step that is not confirmed is not advised; where one may be faster than what is, another sentence says so.
+    """
     if made.open:
         return f"Nothing can be advised for {made.tolerance}: {made.open}."
+    asked = f"{tolerance_words(made)} over {made.until:g} s"
     if made.taken is None:
-        return f"No engine is shown to hold {tolerance_words(made)} over {made.until:g} s."
-    return f"Take {sentence(made.taken, made.until)}"
+        return f"No engine is shown to hold {asked}."
+    if made.confirmed is None:
+        return f"No engine is confirmed to hold {asked}; the fastest that may: {sentence(made.taken, made.until)}"
+    faster = made.perhaps_faster
+    ratio = _ratio(made.confirmed.seconds_per_second, faster.seconds_per_second) if faster else 0.0
+    name = engine_words(faster.engine, faster.formulation) if faster else ""
+    doubt = f" {name} may be {number(ratio)} times faster, not confirmed." if ratio > 1 else ""
+    return f"Take {sentence(made.confirmed, made.until)}{doubt}"
+
+
+def _ratio(cost: float | None, other: float | None) -> float:
+    """A cost over another one; 0 if one of them was not measured."""
+    return cost / other if cost and other else 0.0
 
 
 def tolerance_words(made: SceneAnswer) -> str:
@@ -254,12 +276,13 @@ def step_sentence(made: StepAnswer) -> str:
     error = f"{error_words(made.bound, made.error)} over {made.until:g} s"
     if not made.holds:
         luck = f" is luck: {made.luck}" if made.luck else ""
-        until = "" if made.luck else f"; it holds until {number(made.held_until, 3)} s"
+        until = f"; it holds until {number(made.held_until, 3)} s" if made.held_until and not made.luck else ""
         return f"No: {error}{luck}{until}{_would_do(made)}."
     told = f"Yes: {error} ({size}, {speed(made.seconds_per_second)} real time)"
     if item.step is not None and item.step > made.step * (1 + 1e-9):
-        ratio = (made.seconds_per_second or 0.0) / (item.seconds_per_second or math.inf)
-        return f"{told}; {step(item.resolution, item.step)} would do, {number(ratio)} times faster."
+        ratio = _ratio(made.seconds_per_second, item.seconds_per_second)
+        faster = f", {number(ratio)} times faster" if ratio > _FASTER else ""
+        return f"{told}; {step(item.resolution, item.step)} would do{faster}."
     if item.state is State.UNCONFIRMED:
         return f"{told}; not confirmed: {item.why}."
     double = "twice the step" if made.resolution == "dt" else "ten times the tolerance"

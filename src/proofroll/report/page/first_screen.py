@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
+from proofroll.core.number_format import number
 from proofroll.report.answer.sentences import (
     brought_words,
     error_words,
@@ -18,7 +19,7 @@ from proofroll.report.answer.sentences import (
     tolerance_words,
 )
 from proofroll.report.kinds import group_words
-from proofroll.report.labels import engine_title, scene_words
+from proofroll.report.labels import engine_title, scene_words, symbol
 from proofroll.report.parts import Part, PartEntry, part_kinds
 from proofroll.report.pen import Disc, Lettering, Picture, Polyline
 from proofroll.studies.answer.records import EngineAnswer, SceneAnswer
@@ -52,11 +53,15 @@ class Chip(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Number of pairs of an engine and a scene by what was found, and of scenes that are won by an engine alone."""
+    """Number of pairs of an engine and a scene by what was found, and of scenes by what is advised.
+
+    ``alone``: an engine without a part of proofroll; ``aided``: one with such a part.
+    """
 
     states: dict[str, int]
     scenes: int
     alone: int
+    aided: int
 
 
 @dataclass(frozen=True)
@@ -93,24 +98,24 @@ class FirstScreen:
         won: dict[tuple[str, bool], list[str]] = {}
         nobody = []
         for item in self.answers(tolerance):
-            taken = item.answer.taken
-            if taken is None or taken.state is not State.HOLDS:
+            confirmed = item.answer.confirmed
+            if confirmed is None:
                 nobody.append(item.words)
             else:
-                won.setdefault((taken.engine, bool(taken.brought)), []).append(item.words)
+                won.setdefault((confirmed.engine, bool(confirmed.brought)), []).append(item.words)
         chips = []
         for (engine, hollow), names in sorted(won.items(), key=lambda pair: (pair[0][1], -len(pair[1]))):
             through = " through a part of proofroll" if hollow else ""
             chips.append(Chip(engine, f"{engine_title(engine)}{through}", f"for {', '.join(names)}", hollow))
-        return chips + ([Chip("", "None shown", f"for {', '.join(nobody)}")] if nobody else [])
+        return chips + ([Chip("", "None confirmed", f"for {', '.join(nobody)}")] if nobody else [])
 
     def counts(self, tolerance: str) -> Counts:
         """Counts over all engines and scenes."""
         answers = [item.answer for item in self.answers(tolerance)]
         looks = [_LOOKS.get(engine.state, "open") for made in answers for engine in made.engines]
-        taken = [made.taken for made in answers if made.taken is not None and made.taken.state is State.HOLDS]
+        brought = [bool(made.confirmed.brought) for made in answers if made.confirmed is not None]
         states = {name: looks.count(name) for name in _STATES}
-        return Counts(states, len(answers), sum(not item.brought for item in taken))
+        return Counts(states, len(answers), brought.count(False), brought.count(True))
 
     @property
     def chapters(self) -> dict[str, list[tuple[type[Part], PartEntry, int]]]:
@@ -158,6 +163,12 @@ class ReportedAnswer:
         return scene if self.study == self.answer.scene else f"{scene} ({study})"
 
 
+def place_words(made: SceneAnswer) -> str:
+    """Length of the runs, and the parameters that differ from the scene's own, for a reader."""
+    given = [f"{symbol(name)} {number(value)}" for name, value in made.parameters.items()]
+    return ", ".join([f"over {made.until:g} s", *given])
+
+
 def how(item: EngineAnswer) -> str:
     """Setting and step of an engine that holds, with the part that is not its own; or why none is shown to hold."""
     if not item.holds:
@@ -197,10 +208,10 @@ def answers_sentence(answers: Sequence[ReportedAnswer]) -> str:
     of_first = [item for item in answers if item.answer.tolerance == answers[0].answer.tolerance]
     won: dict[str, list[str]] = {}
     for item in of_first:
-        taken = item.answer.taken
-        won.setdefault(engine_title(taken.engine) if taken else "none shown", []).append(item.words)
+        confirmed = item.answer.confirmed
+        won.setdefault(engine_title(confirmed.engine) if confirmed else "none", []).append(item.words)
     clauses = "; ".join(f"{title} for {', '.join(names)}" for title, names in won.items())
-    return f"The cheapest that holds {tolerance_words(of_first[0].answer)}: {clauses}."
+    return f"The fastest confirmed to hold {tolerance_words(of_first[0].answer)}: {clauses}."
 
 
 def small(picture: Picture) -> Picture:

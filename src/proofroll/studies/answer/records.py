@@ -9,6 +9,9 @@ from proofroll.core.validation import FloatOrInf
 from proofroll.studies.answer.setting_search import State
 from proofroll.studies.study_store import Measured
 
+# States that a longer search leaves as they are.
+_DECIDED = {State.HOLDS, State.DEARER, State.ELSEWHERE, State.REFUSED, State.CANNOT, State.SILENT}
+
 
 @dataclass(frozen=True)
 class AllowedError:
@@ -178,6 +181,23 @@ class SceneAnswer(AnsweredScene):
         return best if best is not None and best.holds else None
 
     @property
+    def confirmed(self) -> EngineAnswer | None:
+        """The cheapest with a confirmed step: what is advised; None: there is none."""
+        best = self.taken
+        return best if best is not None and best.state is State.HOLDS else None
+
+    @property
+    def perhaps_faster(self) -> EngineAnswer | None:
+        """The cheapest that holds without confirmation; None: there is none."""
+        return next((item for item in self.engines if item.state is State.UNCONFIRMED), None)
+
+    @property
+    def is_cut_short(self) -> bool:
+        """True if the search left something open that a longer one may decide."""
+        states = {state for item in self.engines for state in (item.state, *(each.state for each in item.settings))}
+        return not states <= _DECIDED
+
+    @property
     def untried(self) -> bool:
         """True if no engine could be tried: each refuses, cannot, or was not run."""
         tried = [item for item in self.engines if item.state not in {State.REFUSED, State.CANNOT, State.NOT_RUN}]
@@ -199,6 +219,7 @@ class StepAnswer(AnsweredScene):
         seconds_per_second: processor time of it per simulated second.
         advised: answer of the engine with this setting at other steps.
         spent: processor time [s].
+        measured: time, machine and versions.
     """
 
     spec: str
@@ -215,6 +236,7 @@ class StepAnswer(AnsweredScene):
     seconds_per_second: float | None
     advised: EngineAnswer
     spent: float
+    measured: Measured
 
 
 def ranked(engines: Sequence[EngineAnswer]) -> list[EngineAnswer]:
