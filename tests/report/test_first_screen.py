@@ -51,7 +51,9 @@ def test_counts_are_of_engines(screen: FirstScreen) -> None:
     through = ReportedAnswer(scene_answer(THROUGH, HELD), "x", "loops", "")
     unsure = ReportedAnswer(scene_answer(replace(HELD, state=State.UNCONFIRMED)), "y", "loops", "")
     others = FirstScreen(replace(screen.content, answers=[through, unsure]))
-    assert others.counts("1e-4")[1:] == (2, 0, 1)
+    assert others.counts("1e-4")[1:] == (2, 0, 1, 0)
+    faster = ReportedAnswer(scene_answer(HELD, replace(THROUGH, state=State.UNCONFIRMED)), "z", "loops", "")
+    assert FirstScreen(replace(screen.content, answers=[faster])).counts("1e-4")[1:] == (1, 1, 0, 1)
     assert [chip.title for chip in others.chips("1e-4")] == ["beta through a part of proofroll", "None confirmed"]
     assert answers_sentence([through, unsure]) == (
         "The fastest confirmed to hold 1e-4 of the path: beta for sphere in cylinder (x); "

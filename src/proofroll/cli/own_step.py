@@ -28,7 +28,7 @@ def answer_steps(
     like: Path | None = None,
     as_json: bool,
 ) -> NoReturn:
-    """Prints a line for each engine, and exits: 1 if a step is not good enough.
+    """Prints a line for each engine, and exits: 1 if a step is not good enough, 3 if that could not be decided.
 
     Args:
         name: of a scene or a comparison.
@@ -80,7 +80,9 @@ def answer_steps(
         lines = [f"{head}{step_sentence(item)}" for head, item in zip(heads, made, strict=True)]
         lines += _change(made[-1]) if like else []
         options.show_lines([*lines, *further, scope_sentence(made[0])], widest=WIDTH)
-    raise typer.Exit(options.OK if all(item.holds for item in made) else options.CONTRADICTED)
+    if all(item.holds for item in made):
+        raise typer.Exit(options.OK)
+    raise typer.Exit(options.ENGINE if all(item.holds or item.undecided for item in made) else options.CONTRADICTED)
 
 
 def _change(made: StepAnswer) -> list[str]:
@@ -93,7 +95,7 @@ def _change(made: StepAnswer) -> list[str]:
     from proofroll.report.answer.sentences import lines_command
     from proofroll.report.page.model_lines import own_lines
 
-    if made.holds:
+    if made.holds or made.undecided:
         return []
     spec = parse_engine(made.advised.spec or made.spec)
     try:

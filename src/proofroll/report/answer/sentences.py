@@ -185,11 +185,11 @@ def taken_sentence(made: SceneAnswer) -> str:
         return f"No engine is shown to hold {asked}."
     if made.confirmed is None:
         return f"No engine is confirmed to hold {asked}; the fastest that may: {sentence(made.taken, made.until)}"
-    faster = made.perhaps_faster
-    ratio = _ratio(made.confirmed.seconds_per_second, faster.seconds_per_second) if faster else 0.0
-    name = engine_words(faster.engine, faster.formulation) if faster else ""
-    doubt = f" {name} may be {number(ratio)} times faster, not confirmed." if ratio > 1 else ""
-    return f"Take {sentence(made.confirmed, made.until)}{doubt}"
+    told = f"Take {sentence(made.confirmed, made.until)}"
+    if (rival := made.perhaps_faster) is None:
+        return told
+    ratio = _ratio(made.confirmed.seconds_per_second, rival.seconds_per_second)
+    return f"{told} {engine_words(rival.engine, rival.formulation)} may be {number(ratio)} times faster, not confirmed."
 
 
 def _ratio(cost: float | None, other: float | None) -> float:
@@ -265,7 +265,7 @@ def _given(made: SceneAnswer | StepAnswer) -> list[str]:
 
 
 def step_sentence(made: StepAnswer) -> str:
-    """Answer for a person's own step in one sentence: yes or no, by how much, and which step would do."""
+    """Answer for a person's own step in one sentence: yes, no or perhaps, by how much, and which step would do."""
     if made.open:
         return f"Not judged: {made.open}."
     item, size = made.advised, step(made.resolution, made.step)
@@ -274,6 +274,9 @@ def step_sentence(made: StepAnswer) -> str:
         until = f", it holds until {number(made.held_until, 3)} s" if made.held_until else ""
         return f"No: {ended}{until}{_would_do(made)}."
     error = f"{error_words(made.bound, made.error)} over {made.until:g} s"
+    if made.undecided:
+        why = item.why or "no finer step was run"
+        return f"Perhaps: {error} ({size}, {speed(made.seconds_per_second)} real time); not confirmed: {why}."
     if not made.holds:
         luck = f" is luck: {made.luck}" if made.luck else ""
         until = f"; it holds until {number(made.held_until, 3)} s" if made.held_until and not made.luck else ""
@@ -283,8 +286,6 @@ def step_sentence(made: StepAnswer) -> str:
         ratio = _ratio(made.seconds_per_second, item.seconds_per_second)
         faster = f", {number(ratio)} times faster" if ratio > _FASTER else ""
         return f"{told}; {step(item.resolution, item.step)} would do{faster}."
-    if item.state is State.UNCONFIRMED:
-        return f"{told}; not confirmed: {item.why}."
     double = "twice the step" if made.resolution == "dt" else "ten times the tolerance"
     return f"{told}; {double} does not do."
 

@@ -55,13 +55,15 @@ class Chip(NamedTuple):
 class Counts(NamedTuple):
     """Number of pairs of an engine and a scene by what was found, and of scenes by what is advised.
 
-    ``alone``: an engine without a part of proofroll; ``aided``: one with such a part.
+    ``alone``: an engine without a part of proofroll; ``aided``: one with such a part; ``doubtful``: of both, how many
+    have an unconfirmed one that may be faster.
     """
 
     states: dict[str, int]
     scenes: int
     alone: int
     aided: int
+    doubtful: int
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,8 @@ class FirstScreen:
         looks = [_LOOKS.get(engine.state, "open") for made in answers for engine in made.engines]
         brought = [bool(made.confirmed.brought) for made in answers if made.confirmed is not None]
         states = {name: looks.count(name) for name in _STATES}
-        return Counts(states, len(answers), brought.count(False), brought.count(True))
+        doubtful = sum(made.perhaps_faster is not None for made in answers)
+        return Counts(states, len(answers), brought.count(False), brought.count(True), doubtful)
 
     @property
     def chapters(self) -> dict[str, list[tuple[type[Part], PartEntry, int]]]:
@@ -171,11 +174,11 @@ def place_words(made: SceneAnswer) -> str:
 
 def how(item: EngineAnswer) -> str:
     """Setting and step of an engine that holds, with the part that is not its own; or why none is shown to hold."""
+    name = setting_words(item).removeprefix(f"{engine_title(item.engine)} ")
     if not item.holds:
         told = reason(item).partition("; ")[2]
-        return f"{setting_words(item)}: {told}" if item.spec and told else told
+        return f"{name}: {told}" if item.spec and told else told
     error = error_words(item.bound, item.error) if item.bound is not None and item.error is not None else ""
-    name = setting_words(item).removeprefix(f"{engine_title(item.engine)} ")
     unsure = f"not confirmed: {item.why}" if item.state is State.UNCONFIRMED else ""
     return "; ".join(filter(None, (name, error, brought_words(item), unsure, installed_words(item))))
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.multi_element import represents
+from proofroll.core.number_format import number
 from proofroll.core.plugins import EngineSpec, parse_engine
 from proofroll.running.case import EngineFacts, Status
 from proofroll.running.engine_questions import on_scene, resolve_with_truth
@@ -22,7 +23,7 @@ from proofroll.studies.answer.answers import (
 from proofroll.studies.answer.question import AnswerQuestion
 from proofroll.studies.answer.records import StepAnswer
 from proofroll.studies.answer.search import EngineSearch, SearchesAbreast, searching
-from proofroll.studies.answer.setting_search import SettingSearch
+from proofroll.studies.answer.setting_search import SettingSearch, State
 from proofroll.studies.judging.asked_tolerance import AskedTolerance, orientations_of
 from proofroll.studies.study_store import conditions_now
 
@@ -98,6 +99,7 @@ def step_answer(
     compared = [(item, made) for made in (run, item.chosen) if item.chosen and made and made.status is Status.DONE]
     speeds = speeds_alone({spec_of(*pair): pair for pair in compared}, question, abreast)
     advised = engine_answer(search, bounds, speeds)
+    luck = _luck(item, coarser) if within else ""
     cost = speeds.get(spec_of(item, run), run.cost) if run else math.inf
     return StepAnswer(
         scene=question.scene,
@@ -112,8 +114,8 @@ def step_answer(
         spec=engine,
         resolution=resolution,
         step=size,
-        holds=within and advised.holds and item.level is not None and item.level <= coarser,
-        luck="" if not within else item.unsafe.get(coarser, ""),
+        holds=within and not luck and item.state is State.HOLDS and (item.level or 0) <= coarser,
+        luck=luck,
         bound=next((bound for bound in bounds if bound.quantity == worst), None),
         error=error if math.isfinite(error) else None,
         status=str(run.status) if run else "",
@@ -125,3 +127,12 @@ def step_answer(
         spent=processor_seconds() - begin,
         measured=conditions_now(),
     )
+
+
+def _luck(item: SettingSearch, level: int) -> str:
+    """Clause on why a step within the tolerance must not be advised; empty: a search has shown no reason."""
+    finer = item.divisor(level + 1)
+    if item.unsafe.get(level) or finer not in item.runs or item.size(finer) <= 1:
+        return item.unsafe.get(level, "")
+    part = "half" if item.fixed_step else "a tenth"
+    return f"{part} of it is off by {number(item.size(finer))} times what is allowed"

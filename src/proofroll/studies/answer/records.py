@@ -188,8 +188,12 @@ class SceneAnswer(AnsweredScene):
 
     @property
     def perhaps_faster(self) -> EngineAnswer | None:
-        """The cheapest that holds without confirmation; None: there is none."""
-        return next((item for item in self.engines if item.state is State.UNCONFIRMED), None)
+        """The cheapest that holds without confirmation, if it is cheaper than the confirmed one; else None."""
+        rival = next((item for item in self.engines if item.state is State.UNCONFIRMED), None)
+        if rival is None or self.confirmed is None:
+            return None
+        cost, least = self.confirmed.seconds_per_second, rival.seconds_per_second
+        return rival if cost and least and least < cost else None
 
     @property
     def is_cut_short(self) -> bool:
@@ -211,7 +215,7 @@ class StepAnswer(AnsweredScene):
     Attributes:
         spec: engine as it was given.
         resolution, step: ``dt`` or ``rtol``, and its value.
-        holds: True if the step holds the tolerance and may be advised, or could not be confirmed.
+        holds: True if the step holds the tolerance and may be advised.
         luck: clause on why a step within the tolerance must not be advised; empty: it may.
         bound, error: quantity with the largest error over what is allowed, and that error in its unit.
         status, message: of the run with this step.
@@ -237,6 +241,12 @@ class StepAnswer(AnsweredScene):
     advised: EngineAnswer
     spent: float
     measured: Measured
+
+    @property
+    def undecided(self) -> bool:
+        """True if nothing could be judged, or if the step holds the tolerance and is not confirmed."""
+        within = self.bound is not None and self.error is not None and self.error <= self.bound.allowed
+        return bool(self.open) or (within and not self.holds and not self.luck)
 
 
 def ranked(engines: Sequence[EngineAnswer]) -> list[EngineAnswer]:

@@ -104,6 +104,13 @@ def test_a_persons_step_is_good_enough_or_not() -> None:
         "No: 1.7 mm of 1 mm over 5 s; it holds until 1 s; dt 1e-3 s would do (0.78 mm), 50× real time."
     )
     assert step_sentence(replace(no, held_until=0.0)).startswith("No: 1.7 mm of 1 mm over 5 s; dt 1e-3 s would do")
+    unsure = replace(OWN.advised, state=State.UNCONFIRMED, why="the next step takes 9 s")
+    perhaps = replace(OWN, holds=False, advised=unsure)
+    assert perhaps.undecided
+    assert not no.undecided
+    assert step_sentence(perhaps) == (
+        "Perhaps: 0.12 mm of 1 mm over 5 s (dt 2e-3 s, 160× real time); not confirmed: the next step takes 9 s."
+    )
     lucky = replace(no, error=9e-4, luck="dt 1.6e-3 s is off by 2 times what is allowed")
     assert step_sentence(lucky).startswith("No: 0.9 mm of 1 mm over 5 s is luck: dt 1.6e-3 s is off by 2 times")
     lost = replace(no, status="diverged", message="not finite at 1.35 s", error=None, bound=None)
