@@ -62,12 +62,6 @@ def error_words(bound: AllowedError, error: float) -> str:
     return f"{measure(error, bound.unit)} of {measure(bound.allowed, bound.unit)}"
 
 
-def off_words(bound: AllowedError, of_allowed: float) -> str:
-    """An error by its part of what is allowed: ``0.12 mm``, or ``6e-5`` as a part of the size."""
-    error = of_allowed * bound.allowed
-    return number(error / bound.size) if bound.relative and bound.size else measure(error, bound.unit)
-
-
 def quantity_words(name: str) -> str:
     """Name of a quantity for a reader."""
     return _QUANTITIES.get(name) or symbol(name)
@@ -103,14 +97,9 @@ def installed_words(item: EngineAnswer) -> str:
     failed = [(setting, run) for setting in tried for run in setting.steps if run.of_allowed is not None]
     if failed:
         setting, run = min(failed, key=lambda pair: pair[1].of_allowed or math.inf)
-        told = f"{_at(item, setting, run)} is off by {_times_allowed(run.of_allowed)}"
+        told = f"{_at(item, setting, run)} is off by {number(run.of_allowed)} times what is allowed"
         return f"{INSTALLED}: dearer ({told})" if setting.state is State.DEARER else f"{INSTALLED}: {told}"
     return f"{INSTALLED}: {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
-
-
-def _times_allowed(of_allowed: float | None) -> str:
-    """An error over what is allowed, for a reader: quantities may have different bounds."""
-    return f"{number(of_allowed)} times what is allowed"
 
 
 def _at(item: EngineAnswer, setting: SettingTried, run: StepTried) -> str:
@@ -163,7 +152,7 @@ def coarser_words(item: EngineAnswer) -> str:
         return f"{double} {ended_words(tried)}"
     if tried.of_allowed is None or tried.of_allowed <= 1:
         return ""
-    return f"{double} is off by {_times_allowed(tried.of_allowed)}"
+    return f"{double} is off by {number(tried.of_allowed)} times what is allowed"
 
 
 def ended_words(tried: StepTried) -> str:
@@ -188,13 +177,8 @@ def taken_sentence(made: SceneAnswer) -> str:
     told = f"Take {sentence(made.confirmed, made.until)}"
     if (rival := made.perhaps_faster) is None:
         return told
-    ratio = _ratio(made.confirmed.seconds_per_second, rival.seconds_per_second)
+    ratio = (made.confirmed.seconds_per_second or 0.0) / (rival.seconds_per_second or math.inf)
     return f"{told} {engine_words(rival.engine, rival.formulation)} may be {number(ratio)} times faster, not confirmed."
-
-
-def _ratio(cost: float | None, other: float | None) -> float:
-    """A cost over another one; 0 if one of them was not measured."""
-    return cost / other if cost and other else 0.0
 
 
 def tolerance_words(made: SceneAnswer) -> str:
@@ -283,7 +267,7 @@ def step_sentence(made: StepAnswer) -> str:
         return f"No: {error}{luck}{until}{_would_do(made)}."
     told = f"Yes: {error} ({size}, {speed(made.seconds_per_second)} real time)"
     if item.step is not None and item.step > made.step * (1 + 1e-9):
-        ratio = _ratio(made.seconds_per_second, item.seconds_per_second)
+        ratio = (made.seconds_per_second or 0.0) / (item.seconds_per_second or math.inf)
         faster = f", {number(ratio)} times faster" if ratio > _FASTER else ""
         return f"{told}; {step(item.resolution, item.step)} would do{faster}."
     double = "twice the step" if made.resolution == "dt" else "ten times the tolerance"
@@ -294,7 +278,7 @@ def _would_do(made: StepAnswer) -> str:
     """Clause on the step of the same setting that holds, or on why none was found."""
     item = made.advised
     if item.holds and item.step is not None and item.bound is not None and item.error is not None:
-        off = off_words(item.bound, item.error / item.bound.allowed)
+        off = error_words(item.bound, item.error).partition(" of ")[0]
         sure = "" if item.state is State.HOLDS else ", not confirmed"
         return (
             f"; {step(item.resolution, item.step)} would do ({off}{sure}), {speed(item.seconds_per_second)} real time"

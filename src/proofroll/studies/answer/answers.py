@@ -313,9 +313,8 @@ def longest_stored(
 
     ``whole``: not one of a report's briefer searches, unless a longer one would find no more.
     """
-    longer, brief = (
-        stored(answer_path(folder, question, asked, engines, caps), SceneAnswer) for caps in (WHOLE, BRIEF)
-    )
+    paths = (answer_path(folder, question, asked, engines, caps) for caps in (WHOLE, BRIEF))
+    longer, brief = (stored(path, SceneAnswer) for path in paths)
     return longer or (None if brief is not None and whole and brief.is_cut_short else brief)
 
 

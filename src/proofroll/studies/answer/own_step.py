@@ -13,13 +13,7 @@ from proofroll.running.case import EngineFacts, Status
 from proofroll.running.engine_questions import on_scene, resolve_with_truth
 from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
-from proofroll.studies.answer.answers import (
-    bounds_of,
-    engine_answer,
-    spec_of,
-    speeds_alone,
-    unanswerable_because,
-)
+from proofroll.studies.answer.answers import bounds_of, engine_answer, spec_of, speeds_alone, unanswerable_because
 from proofroll.studies.answer.question import AnswerQuestion
 from proofroll.studies.answer.records import StepAnswer
 from proofroll.studies.answer.search import EngineSearch, SearchesAbreast, searching
@@ -99,7 +93,11 @@ def step_answer(
     compared = [(item, made) for made in (run, item.chosen) if item.chosen and made and made.status is Status.DONE]
     speeds = speeds_alone({spec_of(*pair): pair for pair in compared}, question, abreast)
     advised = engine_answer(search, bounds, speeds)
-    luck = _luck(item, coarser) if within else ""
+    luck, finer = item.unsafe.get(coarser, "").rpartition("holds by luck: ")[2], item.divisor(coarser + 1)
+    if not luck and finer in item.runs and item.size(finer) > 1:
+        part = "half" if item.fixed_step else "a tenth"
+        luck = f"{part} of it is off by {number(item.size(finer))} times what is allowed"
+    luck = luck if within else ""
     cost = speeds.get(spec_of(item, run), run.cost) if run else math.inf
     return StepAnswer(
         scene=question.scene,
@@ -127,12 +125,3 @@ def step_answer(
         spent=processor_seconds() - begin,
         measured=conditions_now(),
     )
-
-
-def _luck(item: SettingSearch, level: int) -> str:
-    """Clause on why a step within the tolerance must not be advised; empty: a search has shown no reason."""
-    finer = item.divisor(level + 1)
-    if item.unsafe.get(level) or finer not in item.runs or item.size(finer) <= 1:
-        return item.unsafe.get(level, "")
-    part = "half" if item.fixed_step else "a tenth"
-    return f"{part} of it is off by {number(item.size(finer))} times what is allowed"

@@ -46,8 +46,6 @@ _FINEST = 40
 _TIGHTER = 1.5
 # Errors that do not fall by this factor from a step to its half may be small by luck; they must leave this margin.
 _REGULAR, _MARGIN = 1.5, 2.0
-# Cost of a step between one that holds and its half, over that of the first at most.
-_UNEVEN = 1.5
 # A coarser step is sound up to this part of the size of a quantity, or this many times what is allowed.
 _SOUND, _TIMES = 0.05, 30.0
 # A limit of small steps leads elsewhere if it is off by this many times what is allowed.
@@ -325,7 +323,7 @@ class SettingSearch:
             if fault:
                 self.unsafe[held] = fault
                 return self.next_divisor(left)
-            if check is not None and left > 0 and self._seconds(held) * _UNEVEN <= self.caps.run:
+            if check is not None and left > 0 and self._seconds(held) * 1.5 <= self.caps.run:
                 return check
         reason = (
             f"the next step takes {seconds:.0f} s of processor time, and a run may take {self.caps.run:g}"
