@@ -109,7 +109,7 @@ def _change(made: StepAnswer) -> list[str]:
 def stored_sentences(comparison: Comparison, tolerances: Sequence[str], engines: Sequence[str], out: Path) -> list[str]:
     """First sentence of the stored answer of engines for the first point of a comparison and tolerances; else none."""
     from proofroll.files.scene_file import read_scene_file
-    from proofroll.report.answer.sentences import taken_sentence, tolerance_words
+    from proofroll.report.answer.sentences import parameter_words, taken_sentence, tolerance_words
     from proofroll.studies.answer.answers import longest_stored
     from proofroll.studies.answer.question import AnswerQuestion
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
@@ -119,4 +119,6 @@ def stored_sentences(comparison: Comparison, tolerances: Sequence[str], engines:
     until = read_scene_file(comparison.scene).duration or comparison.until
     question = AnswerQuestion.of(comparison.scene, values, until)
     answer = longest_stored(out, question, AskedTolerance.of(tolerances or [DEFAULT], question.loaded), engines)
-    return [f"To {tolerance_words(answer)}: {taken_sentence(answer)}"] if answer is not None else []
+    if answer is None:
+        return []
+    return [f"To {', '.join([tolerance_words(answer), *parameter_words(answer)])}: {taken_sentence(answer)}"]

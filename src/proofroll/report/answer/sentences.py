@@ -186,6 +186,11 @@ def tolerance_words(made: SceneAnswer) -> str:
     return f"{made.tolerance} of the path" if _is_number(made.tolerance) else made.tolerance
 
 
+def parameter_words(made: SceneAnswer) -> list[str]:
+    """Parameters of the scene that were given, for a reader: ``speed 4``."""
+    return [f"{symbol(name)} {number(value)}" for name, value in made.parameters.items()]
+
+
 def _is_number(text: str) -> bool:
     try:
         return math.isfinite(float(text))

@@ -8,18 +8,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from proofroll.core.number_format import number
 from proofroll.report.answer.sentences import (
     brought_words,
     error_words,
     installed_words,
+    parameter_words,
     reason,
     setting_words,
     speed,
     tolerance_words,
 )
 from proofroll.report.kinds import group_words
-from proofroll.report.labels import engine_title, scene_words, symbol
+from proofroll.report.labels import engine_title, scene_words
 from proofroll.report.parts import Part, PartEntry, part_kinds
 from proofroll.report.pen import Disc, Lettering, Picture, Polyline
 from proofroll.studies.answer.records import EngineAnswer, SceneAnswer
@@ -118,7 +118,8 @@ class FirstScreen:
         brought = [bool(made.confirmed.brought) for made in answers if made.confirmed is not None]
         states = {name: looks.count(name) for name in _STATES}
         doubtful = sum(made.perhaps_faster is not None for made in answers)
-        return Counts(states, len(answers), brought.count(False), brought.count(True), doubtful)
+        alone, aided = brought.count(False), brought.count(True)
+        return Counts(states=states, scenes=len(answers), alone=alone, aided=aided, doubtful=doubtful)
 
     @property
     def chapters(self) -> dict[str, list[tuple[type[Part], PartEntry, int]]]:
@@ -168,8 +169,7 @@ class ReportedAnswer:
 
 def place_words(made: SceneAnswer) -> str:
     """Length of the runs, and the parameters that differ from the scene's own, for a reader."""
-    given = [f"{symbol(name)} {number(value)}" for name, value in made.parameters.items()]
-    return ", ".join([f"over {made.until:g} s", *given])
+    return ", ".join([f"over {made.until:g} s", *parameter_words(made)])
 
 
 def how(item: EngineAnswer) -> str:

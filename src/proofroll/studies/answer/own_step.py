@@ -97,7 +97,6 @@ def step_answer(
     if not luck and finer in item.runs and item.size(finer) > 1:
         part = "half" if item.fixed_step else "a tenth"
         luck = f"{part} of it is off by {number(item.size(finer))} times what is allowed"
-    luck = luck if within else ""
     cost = speeds.get(spec_of(item, run), run.cost) if run else math.inf
     return StepAnswer(
         scene=question.scene,
@@ -113,7 +112,7 @@ def step_answer(
         resolution=resolution,
         step=size,
         holds=within and not luck and item.state is State.HOLDS and (item.level or 0) <= coarser,
-        luck=luck,
+        luck=luck if within else "",
         bound=next((bound for bound in bounds if bound.quantity == worst), None),
         error=error if math.isfinite(error) else None,
         status=str(run.status) if run else "",
