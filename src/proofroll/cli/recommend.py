@@ -56,7 +56,7 @@ def recommend(
     """Name the cheapest engine and step that holds a tolerance. It is held over the scene's own duration.
 
     Each engine is searched over all its settings and steps until no other can be cheaper. A step is advised if half of
-    it holds, too, and a third more does not break down. A run takes at most 8 s of processor time and an engine 30 s;
+    it holds, too, and a third more does not break down. A run takes about 8 s of processor time at most, an engine 30;
     what that leaves open is named. Exit 1 if nothing holds the tolerance, 3 if no engine could be tried.
     """
     from proofroll.files.json_data import plain
@@ -143,7 +143,7 @@ def _answer(
         if not quiet:
             place = f"{question.scene} over {question.until:g} s"
             options.complain(
-                f"searching {', '.join(names)} in {place}: at most {WHOLE.engine:g} s of processor time each"
+                f"searching {', '.join(names)} in {place}: about {WHOLE.engine:g} s of processor time each at most"
             )
 
     def tell(item: EngineAnswer, until: float) -> None:

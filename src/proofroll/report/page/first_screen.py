@@ -185,7 +185,7 @@ def how(item: EngineAnswer) -> str:
 
 def caps_words() -> str:
     """Sentences on what a report's searches are asked, and how to ask for more."""
-    limits = f"at most {BRIEF.run:g} s of processor time a run and {BRIEF.engine:g} s an engine"
+    limits = f"about {BRIEF.run:g} s of processor time a run and {BRIEF.engine:g} s an engine at most"
     return f"Searched once for each scene of a kind, {limits}; proofroll recommend SCENE searches longer."
 
 

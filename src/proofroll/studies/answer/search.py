@@ -134,10 +134,10 @@ def searching(search: EngineSearch, question: AnswerQuestion) -> Asking:
     What can still be cheapest is run next. As soon as a confirmed step is cheaper than all bounds, the other settings
     are dearer, without a further run.
     """
-    queue = [(0.0, number) for number in range(len(search.settings))]
+    queue = [(0.0, 0, number) for number in range(len(search.settings))]  # of equal bounds the one with fewer runs
     best = math.inf
     while queue:
-        least, number = heapq.heappop(queue)
+        least, _, number = heapq.heappop(queue)
         item = search.settings[number]
         if least >= best:
             item.decide(State.DEARER, "any step that may hold costs more than this engine's choice")
@@ -150,7 +150,7 @@ def searching(search: EngineSearch, question: AnswerQuestion) -> Asking:
         run = yield from _run(item, divisor, question)
         search.spent += run.spent
         item.runs[divisor] = run
-        heapq.heappush(queue, (item.least, number))
+        heapq.heappush(queue, (item.least, len(item.runs), number))
 
 
 def _run(item: SettingSearch, divisor: int, question: AnswerQuestion) -> Generator[Case, JudgedRun, JudgedRun]:

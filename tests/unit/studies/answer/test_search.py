@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -59,6 +60,13 @@ def test_what_cannot_be_cheaper_is_not_run_further() -> None:
     assert search.found is search.settings[0]
     assert [item.state for item in search.settings] == [State.HOLDS, State.DEARER]
     assert len([case for case in asked if case.engine.settings["preset"] == "poor"]) == 1
+
+
+def test_each_setting_is_run_before_one_without_a_cost_is_run_again() -> None:
+    """A run that ends without a cost bounds nothing; the other settings have their turn before its next step."""
+    search = EngineSearch("mujoco", [setting("poor"), setting("good")])
+    asked = searched(search, lambda _, step: 4 * step**2, lambda preset: math.inf if preset == "poor" else 1e-6)
+    assert [case.engine.settings["preset"] for case in asked[:2]] == ["poor", "good"]
 
 
 def test_events_are_looked_for_only_where_they_are_judged() -> None:
