@@ -75,7 +75,7 @@ def compare(
 ) -> None:
     """Hold engines against the truth of a scene or comparison. Exit 1 if a verdict contradicts the file.
 
-    Exit 3 if an engine is missing or failed, or if nothing could be judged.
+    Exit 3 if an engine is missing or failed, or if nothing could be judged or decided.
 
     For a scene or a robot file every formulation that can represent it is run, without claims. --set, --until, --every
     and --budget are for these; runs beyond 60 s of processor time are left out and named. An --engine without a row in

@@ -160,15 +160,18 @@ def unanswerable_because(bounds: Sequence[AllowedError], reference: Reference) -
 
 
 def _speeds(searches: Sequence[EngineSearch], question: AnswerQuestion, abreast: SearchesAbreast) -> dict[str, float]:
-    """Setting with its step -> seconds per simulated second, of the cheapest and those near it, measured alone."""
+    """Setting with its step -> seconds per simulated second, of the cheapest and those near it, measured alone.
+
+    Runs so short that most of their time in the search may be that of a start are measured, too.
+    """
     chosen = {
         spec_of(item): (item, run)
         for search in searches
         for item in search.settings
         if item.state in {State.HOLDS, State.UNCONFIRMED} and (run := item.chosen) is not None
     }
-    least = min((run.cost for _, run in chosen.values()), default=math.inf)
-    near = {spec: pair for spec, pair in chosen.items() if pair[1].cost <= _NEAR * least}
+    most = max(_NEAR * min((run.cost for _, run in chosen.values()), default=math.inf), _ONCE / question.until)
+    near = {spec: pair for spec, pair in chosen.items() if pair[1].cost <= most}
     return speeds_alone(near, question, abreast)
 
 

@@ -16,11 +16,13 @@ from proofroll.running.engine_questions import resolve_with_truth
 from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
+from proofroll.running.timing import Timing
+from proofroll.studies.answer import answers
 from proofroll.studies.answer.answers import answer, answer_path, engine_answer, kept, stored
 from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion, sampling_of
 from proofroll.studies.answer.records import AllowedError, SceneAnswer
-from proofroll.studies.answer.search import EngineSearch, searching
+from proofroll.studies.answer.search import EngineSearch, SearchesAbreast, searching
 from proofroll.studies.answer.setting_search import SettingSearch, State
 from proofroll.studies.judging.asked_tolerance import AskedTolerance
 
@@ -60,6 +62,19 @@ def test_what_cannot_be_cheaper_is_not_run_further() -> None:
     assert search.found is search.settings[0]
     assert [item.state for item in search.settings] == [State.HOLDS, State.DEARER]
     assert len([case for case in asked if case.engine.settings["preset"] == "poor"]) == 1
+
+
+def test_short_runs_are_measured_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A run of some ms may have taken most of its time to start; what is clearly dearer is not measured again."""
+    monkeypatch.setattr(answers, "time_in_rounds", lambda tasks, *_, **__: dict.fromkeys(tasks, Timing((5e-4,))))
+    settings = []
+    for preset, cost in (("fast", 1e-3), ("starts slowly", 9e-3), ("dear", 0.5)):
+        item = setting(preset)
+        item.runs[1], item.level, item.state = JudgedRun(0.1, Status.DONE, cost=cost), 0, State.HOLDS
+        settings.append(item)
+    abreast = SearchesAbreast({}, Runner(Store(tmp_path), jobs=1, workers=Workers()))
+    speeds = answers._speeds([EngineSearch("mujoco", settings)], QUESTION, abreast)
+    assert speeds == {"mujoco[preset=fast,dt=0.1]": 5e-4, "mujoco[preset=starts slowly,dt=0.1]": 5e-4}
 
 
 def test_each_setting_is_run_before_one_without_a_cost_is_run_again() -> None:
