@@ -194,9 +194,10 @@ def read_columns(path: Path) -> Columns:
     """
     content = ordinary_content(path)
     what = f"{path} is no stored trajectory"
-    arrays = _arrays(content, what)
     with reading(what), zipfile.ZipFile(io.BytesIO(content)) as archive:
-        about, attrs = map(dict, json.loads(archive.read(_ABOUT)))
+        about, attrs = map(dict, json.loads(archive.read(_ABOUT)))  # first: a foreign file has none
+    arrays = _arrays(content, what)
+    with reading(what):
         variables = {name: Variable(tuple(dims), arrays[name], dict(its)) for name, (dims, its) in about.items()}
     return Columns(variables, attrs)
 

@@ -13,7 +13,7 @@ import xarray as xr
 
 import proofroll
 from proofroll.core.errors import InputError
-from proofroll.files.trajectory_file import read_arrays
+from proofroll.files.trajectory_file import read_arrays, read_columns
 
 TIMES = np.linspace(0, 1, 11)
 
@@ -90,6 +90,8 @@ def test_rows_are_counted_before_anything_is_unpacked(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=words):
         proofroll.judge(run, "pendulum", columns={"t": "time", "angle": "q.pivot"})
     tracemalloc.start()
+    with pytest.raises(ValueError, match="no stored trajectory"):
+        read_columns(run)
     with pytest.raises(ValueError, match=words):
         read_arrays(run, "t")
     peak = tracemalloc.get_traced_memory()[1]
