@@ -231,6 +231,6 @@ def _unwritten(error: OSError | SystemExit) -> Any:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     if isinstance(error, BrokenPipeError):
         return OK
-    fault = f"{error.filename} cannot be used" if error.filename else "the output cannot be written"
+    fault = f"{error.filename!s:.300} cannot be used" if error.filename else "the output cannot be written"
     complain(f"{fault} ({error.strerror or error})")
     return USAGE
