@@ -103,7 +103,7 @@ def installed_words(item: EngineAnswer) -> str:
         setting, run = min(failed, key=lambda pair: pair[1].of_allowed or math.inf)
         dearer = "dearer, " if setting.state is State.DEARER else ""
         return f"{INSTALLED}: {dearer}{number(run.of_allowed)} times too far off at {_at(item, setting, run)}"
-    return f"{INSTALLED}: {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
+    return f"{INSTALLED}: refused, {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
 
 
 def _at(item: EngineAnswer, setting: SettingTried, run: StepTried) -> str:

@@ -47,7 +47,7 @@ def test_settings_are_told_in_two_words() -> None:
         "as installed: dearer, 4 times too far off at rough, dt 2e-3 s"
     )
     refused = replace(tried, state=State.REFUSED, why="it cannot", steps=[])
-    assert installed_words(replace(HELD, settings=[refused])) == "as installed: it cannot"
+    assert installed_words(replace(HELD, settings=[refused])) == "as installed: refused, it cannot"
     assert installed_words(replace(HELD, preset="default", settings=[tried])) == ""
     assert installed_words(replace(FINER, settings=[tried])) == ""
 
