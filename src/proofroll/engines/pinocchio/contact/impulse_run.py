@@ -30,6 +30,7 @@ _BLOCKS = (
     "Pinocchio's admm solver did not reach solver_tolerance at one step; from there proofroll solves its matrices by "
     "blocks"
 )
+_SHARED = "Pinocchio's solvers have no cone shared by slip and turning; proofroll solves its matrices by blocks"
 _PARTS = "in the convex problem a slipping contact separates"
 _FOUND = "an impulse opposes the slip at its end, which turns, is found to solver_tolerance"
 _LATER = f"{_FOUND}, and follows the turning of its contact (J̇v) one step later"
@@ -107,8 +108,9 @@ class ImpulseRun(MechanismRun):
         blocks = self.steps.blocks
         if not blocks.solved:
             return []
+        by_blocks = _SHARED if self.steps.shares else _BLOCKS
         rough = blocks.worst > float(self._settings.solver_tolerance or 0.0)
-        return [f"{_BLOCKS}, to {number(blocks.worst, 1)} of the largest speed" if rough else _BLOCKS]
+        return [f"{by_blocks}, to {number(blocks.worst, 1)} of the largest speed" if rough else by_blocks]
 
     def events(self) -> Sequence[Event] | None:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""

@@ -43,6 +43,7 @@ PROVIDES: frozenset[str] = (
     | ALL_SHAPES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
     | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
+    | {_CAPABILITY.SHARED_CONE}
     | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
     | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS, _CAPABILITY.MOTIONS}
 )
@@ -63,6 +64,7 @@ _NEAR = 2.0
 _SMALL = 1e-9
 # Ratio of friction to its bound above which an impulse lies on the cone.
 _INSIDE = 1 - 1e-6
+_OF_BLOCKS = "Pinocchio's solvers have no cone shared by slip and turning, which proofroll solves by blocks"
 _NO_CHANGE: Sequence[float] = (0.0, 0.0, 0.0)  # of slip and gap velocities
 # Ratio of the contact's mobility in two directions of the surface above which PGS returns a wrong impulse.
 _UNEQUAL = 2.0
@@ -76,6 +78,11 @@ def family(settings: PinocchioSettings) -> Mapping[str, str]:
     return of_contact(Family.CONVEX if settings.convex else Family.HARD)
 
 
+def _axes(frame: Array, turns: Array) -> Array:
+    """Axes of turns that share a cone, spin first, in the columns of the frame of a normal."""
+    return np.roll(frame, 1, axis=1)[:, : len(turns)]
+
+
 class ImpulseSteps:
     """Steps of a tree with contacts, dry friction and stops of joints.
 
@@ -85,6 +92,7 @@ class ImpulseSteps:
         events: of the contacts.
         joints: joint rows, numbered after the contacts.
         blocks: solver that goes on where Pinocchio's ADMM stops.
+        shares: True if slips and turns of a contact share its cone; then blocks are the only solver.
         ahead: bodies later in a step, or in a sample.
         coming: impulses of the next step, where a sample has found them.
     """
@@ -93,7 +101,8 @@ class ImpulseSteps:
         """Starts at time 0.
 
         Raises:
-            Refused: Pinocchio's solver returns wrong impulses for such contacts, or one point does not hold a body.
+            Refused: Pinocchio's solver returns wrong impulses for such contacts, or has no cone of theirs, or one point
+                does not hold a body.
         """
         bodies = {body for contact in tree.mechanism.contacts for body in (contact.body_a, contact.body_b)}
         self._tree, self._model, self._bodies = tree, tree.model, MovingBodies(tree, bodies)
@@ -117,8 +126,13 @@ class ImpulseSteps:
         self._solvers: dict[tuple[int, ...], SolverParts] = {}
         self.blocks = BlockSolver(float(settings.solver_tolerance or 0.0))
         nv, self._all = tree.model.nv, tuple(range(len(self.contacts)))
-        ends = list(accumulate([3] * len(self.contacts) + [1] * len(self.joints.J), initial=0))
+        self._arms = [np.array(contact.shared_arms) for contact in self.contacts]
+        self.shares = any(map(len, self._arms))
+        if self.shares and (settings.solver != "admm" or settings.convex):
+            raise Refused(f"{_OF_BLOCKS}, in place of solver=admm with convex=false; set these")
+        ends = list(accumulate([*(3 + len(arms) for arms in self._arms), *[1] * len(self.joints.J)], initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
+        self._slides = [row for rows in self._rows[: len(self.contacts)] for row in rows[-3:]]
         self._upper = np.triu(np.ones((nv, nv), dtype=bool))
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
@@ -177,8 +191,9 @@ class ImpulseSteps:
     def beginning(self, span: float, *, convex: bool) -> Impulses:
         """Impulses of a short time from now on, with the turning of the contacts (J̇v); open gaps stay open."""
         terms = self.terms(self.q, self.v, span)
-        shifts = [change for changes in self._turning(self.q, self.v, terms, span) for change in changes]
-        shifts += [0.0] * len(self.joints.J)
+        shifts = [0.0] * len(terms.rows)
+        for rows, changes in zip(self._rows, self._turning(self.q, self.v, terms, span), strict=False):
+            shifts[rows[-3] : rows[-1] + 1] = changes
         apart = [touch.absent or touch.gap > self._touching for touch in terms.touching]
         apart += [False] * len(self.joints.friction) + [not item.closed(self.q) for item in self.joints.stops]
         for rows in compress(self._rows, apart):
@@ -201,10 +216,15 @@ class ImpulseSteps:
             "contact_place": place,
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
             "contact_restitution": self.restitution.copy(),
-            "contact_rolling": rolling_levers(self._moments.frictions, len(touching)),
+            "contact_rolling": rolling_levers(self._moments.frictions, len(touching)) + self._rolling_shares(),
             "contact_tangential": np.array([contact.tangential_restitution for contact in self.contacts]),
             "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
         }
+
+    def _rolling_shares(self) -> list[float]:
+        """Coefficient of rolling in the cone of each contact [m]."""
+        pairs = zip(self.contacts, self._arms, strict=True)
+        return [contact.friction * float(arms[-1]) if len(arms) > 1 else 0.0 for contact, arms in pairs]
 
     def terms(self, q: Array, v: Array, span: float, late: float = 0.0) -> StepTerms:
         """Terms of a step of length ``span`` [s]; ``q`` belongs to the time ``late`` [s] after its start."""
@@ -222,9 +242,20 @@ class ImpulseSteps:
         pin.computeJointJacobians(model, data, q)
         frames, all_of = [frame_of_axis(point.normal) for point in touching], self._solver(self._all)
         contact_rows = [self._posed(all_of, k, *placed) for k, placed in enumerate(zip(touching, frames, strict=True))]
+        if self.shares:
+            contact_rows = [np.concatenate([self._turns(k, frames[k]), rows]) for k, rows in enumerate(contact_rows)]
         rows = np.concatenate([*contact_rows, self.joints.J])
-        J = rows[: 3 * len(frames)].reshape(-1, 3, model.nv)
+        J = rows[self._slides if self.shares else slice(len(self._slides))].reshape(-1, 3, model.nv)
         return StepTerms(rows=rows, J=J, free=free, inverse=inverse, touching=touching, frames=frames)
+
+    def _turns(self, k: int, frame: Array) -> Array:
+        """Derivatives of the angular velocities that share a contact's cone, times their arms, (turns, nv)."""
+        contact, arms, turning = self.contacts[k], self._arms[k], np.zeros((3, self._model.nv))
+        for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
+            if len(arms) and self._index[body] >= 0:
+                of_frame = self._tree.body[self._index[body]]
+                turning += sign * pin.getFrameJacobian(self._model, self._data, of_frame, pin.LOCAL_WORLD_ALIGNED)[3:]
+        return np.asarray(arms[:, None] * (_axes(frame, arms).T @ turning))
 
     def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
         """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
@@ -350,7 +381,7 @@ class ImpulseSteps:
         if not self._moments.frictions:
             return self._solved(terms, shifts, span, convex=convex)
         J, free, inverse, touching = terms.J, terms.free, terms.inverse, terms.touching
-        rows, count = self._moments.rows(self._data, terms.touching, terms.frames, J), len(touching)
+        rows = self._moments.rows(self._data, terms.touching, terms.frames, J)
         approach, soft_speed = J[:, 2] @ v, -_SOFT * self._gravity * span
         soft = approach >= soft_speed
         if not soft.all():  # a curved wall turns away from a fast ball
@@ -368,7 +399,7 @@ class ImpulseSteps:
             return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(sticking_rows), kick.states)
 
         moments, impulses = self._moments.found(rows, v, inverse, pressed, self.t)
-        by_contact = np.zeros((count, 3))
+        by_contact = kicks[0].moment.copy()
         np.add.at(by_contact, self._pressed_by, moments)
         driving = kicks[0].driving - self._motions[1].T @ impulses
         return kicks[0]._replace(moment=by_contact, driving=driving)
@@ -380,6 +411,7 @@ class ImpulseSteps:
         rubs = count + len(self.joints.friction)
         gaps = [k for k in (*self._all, *range(rubs, len(own_rows))) if math.isfinite(shifts[own_rows[k][-1]])]
         impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(own_rows) - count), tuple(range(count, rubs))
+        moment = np.zeros((count, 3))
         states = [OPEN] * count
         grown, pushed = bool(which), np.zeros(len(free))
         alone, motor_responses = self._motions
@@ -396,9 +428,9 @@ class ImpulseSteps:
                 driving = alone - motor_responses.T @ pushed if alone.size else alone
                 for k, held in enumerate(self._held):
                     if states[k] == SLIP:
-                        slips = [speeds[row] + shifts[row] for row in own_rows[k][:2]]
+                        slips = [speeds[row] + shifts[row] for row in own_rows[k][:-1]]
                         states[k] = STICK if math.hypot(*slips) <= held else SLIP
-                moment, seen = np.zeros((count, 3)), tuple(states)
+                seen = tuple(states)
                 return Impulses(v=v, impulse=impulse, states=seen, moment=moment, along=along_rows, driving=driving)
             which, grown = tuple(sorted(closing.union(which))), False
             parts = self._solver(which)
@@ -407,12 +439,15 @@ class ImpulseSteps:
             got = self._by_any(which, chosen @ to_joints, g, terms, span, convex=convex)
             v, pushed = free + to_joints @ got, chosen.T @ got if alone.size else pushed
             speeds, sizes = (rows @ v).tolist(), got.tolist()
-            impulse[:], along_rows[:] = 0.0, 0.0
+            impulse[:], moment[:], along_rows[:] = 0.0, 0.0, 0.0
             for end, k in zip(parts.ends, which, strict=True):
                 if k < count:
                     impulse[k] = frames[k] @ got[end - 3 : end]
-                    F1, F2, N = sizes[end - 3 : end]
-                    states[k] = step_events.state_of(N, math.hypot(F1, F2), _INSIDE * self.contacts[k].friction * N)
+                    turns, (F1, F2, N) = got[end - len(own_rows[k]) : end - 3], sizes[end - 3 : end]
+                    F, bound = math.hypot(F1, F2, *turns), _INSIDE * self.contacts[k].friction * N
+                    states[k] = step_events.state_of(N, F, bound)
+                    if turns.size:
+                        moment[k] = _axes(frames[k], turns) @ (self._arms[k] * turns)
                 else:
                     along_rows[k - count] = sizes[end - 1]
 
@@ -424,7 +459,7 @@ class ImpulseSteps:
         Raises:
             Diverged: neither finds them.
         """
-        if not self.blocks.solved:
+        if not self.blocks.solved and not self.shares:
             try:
                 return self._found(which, G, g, terms, span, convex=convex)
             except Diverged:
@@ -434,11 +469,18 @@ class ImpulseSteps:
         for k, end in zip(which, self._solver(which).ends, strict=True):
             if k < count:
                 self._check(k, diagonal[end - 3 : end].tolist(), terms.touching[k].flat)
-                parts[k] = Block(end - 3, self._friction(k))
+                turns = len(self._arms[k])
+                parts[k] = Block(end - 3 - turns, self._friction(k), turns=turns)
             else:
                 rubs = k < count + len(rubbing)
                 parts[k] = Block(end - 1, None, span * rubbing[k - count].joint.friction if rubs else math.inf)
-        return self.blocks.impulses(G, g, parts, lambda: self._found(which, G, g, terms, span, convex=convex))
+
+        def otherwise() -> Array:
+            if self.shares:
+                raise Diverged(f"the sweeps over blocks do not settle at {self.t:g} s, and {_OF_BLOCKS}")
+            return self._found(which, G, g, terms, span, convex=convex)
+
+        return self.blocks.impulses(G, g, parts, otherwise)
 
     def _found(
         self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool

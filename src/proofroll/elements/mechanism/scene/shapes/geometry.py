@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,7 +15,7 @@ from typing_extensions import override
 from proofroll.core.arrays import cross, read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism.scene import checks, rotations
-from proofroll.elements.mechanism.scene.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Against, Vector, Z
+from proofroll.elements.mechanism.scene.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Against, Cone, Vector, Z
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.box_features import BoxSlot
 from proofroll.elements.mechanism.scene.shapes.capsule_box import CapsuleBoxSlot
@@ -251,6 +252,9 @@ class Pair:
         spinning_friction: largest moment against spin about the normal over the normal force [m].
         against: law of rolling resistance where the pair slips: against the ``turning`` of the bodies, or against the
             ``motion`` of a ball's centre over a plane or a curved wall; while a ball rolls both are one.
+        cone: bounds of friction. "separate": sliding, spin and rolling have their own ones; "shared": what one takes
+            the others lack, as force over ``friction`` and moments over their coefficients are together at most the
+            normal force, by the root of the sum of their squares, and oppose slip and turning with most power.
     """
 
     name: str
@@ -262,6 +266,7 @@ class Pair:
     rolling_resistance: float = field(default=0.0, metadata=METRES)
     spinning_friction: float = field(default=0.0, metadata=METRES)
     against: Against = "turning"
+    cone: Cone = "separate"
 
     def __post_init__(self) -> None:
         where = f"pairs.{checks.name(self.name, 'pairs')}"
@@ -271,6 +276,9 @@ class Pair:
         checks.read(self, where, checks.number, "friction", at_least=0, bounded=False)
         checks.read(self, where, checks.number, "rolling_resistance", "spinning_friction", at_least=0)
         require_known(f"{where}.against", self.against, get_args(Against))
+        require_known(f"{where}.cone", self.cone, get_args(Cone))
+        if self.cone == "shared":
+            self._check_shared(where)
         checks.read(self, where, checks.number, "restitution", at_least=0)
         if self.restitution > 1:
             advice = "no impact returns more than it takes; give 0 to 1"
@@ -285,6 +293,15 @@ class Pair:
                 advice = f"kinetic friction, {self.friction:g}, must lie above 0 and not above it"
                 raise InputError(f"{where}.static_friction", self.static_friction, advice)
 
+    def _check_shared(self, where: str) -> None:
+        for key in ("friction", "spinning_friction"):
+            if not 0 < getattr(self, key) < math.inf:
+                advice = "a shared cone needs one above 0, and finite; give it, or leave cone out"
+                raise InputError(f"{where}.{key}", getattr(self, key), advice)
+        for key, default in (("static_friction", None), ("against", "turning"), ("tangential_restitution", 0.0)):
+            if getattr(self, key) != default:
+                raise InputError(f"{where}.{key}", getattr(self, key), "a shared cone has none; leave it out")
+
     @property
     def static(self) -> float:
         """Coefficient of a contact that sticks."""
@@ -292,7 +309,10 @@ class Pair:
 
     def with_friction(self, friction: float) -> Pair:
         """The pair with another coefficient; its static one changes by the same factor."""
-        if self.static_friction is None or not friction:
+        if not friction:
+            off = replace(self, friction=friction, static_friction=None, cone="separate")
+            return replace(off, spinning_friction=0.0, rolling_resistance=0.0) if self.cone == "shared" else off
+        if self.static_friction is None:
             return replace(self, friction=friction, static_friction=None)
         return replace(self, friction=friction, static_friction=self.static * friction / self.friction)
 
@@ -311,7 +331,7 @@ class BodyContact:
         static_friction: coefficient while it sticks; None: the same.
         tangential_restitution: of the pair.
         rolling_resistance, spinning_friction: of the pair [m].
-        against: see :class:`Pair`.
+        against, cone: see :class:`Pair`.
         slot: number among the contacts of two boxes, or of a box and a capsule.
         bound: largest friction without a normal force; always 0 between bodies [N].
         presses: True, as it has a normal force.
@@ -334,7 +354,16 @@ class BodyContact:
     rolling_resistance: float = 0.0
     spinning_friction: float = 0.0
     against: Against = "turning"
+    cone: Cone = "separate"
     slot: int = 0
+
+    @property
+    def shared_arms(self) -> tuple[float, ...]:
+        """Moments that a shared cone holds over its force of sliding [m]: of spin, and of rolling about two axes."""
+        if self.cone == "separate":
+            return ()
+        rolling = (self.rolling_resistance,) * 2 if self.rolling_resistance else ()
+        return tuple(moment / self.friction for moment in (self.spinning_friction, *rolling))
 
     @property
     def static(self) -> float:
@@ -417,6 +446,7 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
                     rolling_resistance=pair.rolling_resistance,
                     spinning_friction=pair.spinning_friction,
                     against=pair.against,
+                    cone=pair.cone,
                     slot=number - 1,
                 )
             )

@@ -52,8 +52,8 @@ def _require_one_place(pair: Pair, kinds: set[GeometryKind]) -> None:
     several = "boxes and capsules touch at several places" if "box" in kinds <= {"capsule", "box"} else ""
     several = f"a {long_body} touches at two ends" if long_body else several
     for key in ("rolling_resistance", "spinning_friction"):
-        if several and getattr(pair, key):
-            advice = f"{several}, whose moments are not followed together; leave it out"
+        if several and getattr(pair, key) and pair.cone != "shared":
+            advice = f'{several}, whose moments are not followed together; leave it out, or give cone = "shared"'
             raise InputError(f"pairs.{pair.name}.{key}", getattr(pair, key), advice)
 
 
