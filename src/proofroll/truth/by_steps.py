@@ -32,7 +32,6 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 if TYPE_CHECKING:
     import xarray as xr
 
-# Contacts that no route follows.
 _HELD, _SHARED = "under held targets yet", "whose sliding and turning share a cone"
 # Longest step [s], how many steps there are, and how many of them an error bar needs.
 _LONGEST, _RUNGS, _NEEDED = 1e-3, 3, 2

@@ -1,6 +1,5 @@
 """Loads of closed contacts at a state of a run: known ones, and those by each unknown force."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +67,7 @@ class Pressing(NamedTuple):
     Attributes:
         unknown: by a unit of each force or moment that the state leaves open, (forces, nv).
         known: sum of all others, (nv).
-        determinate: False if a closed contact has no one place or normal.
+        determinate: False if a closed contact has no one place or normal, or a cone that turning shares.
     """
 
     unknown: FloatArray
@@ -89,35 +88,24 @@ def pressing(mechanism: Mechanism, motion: BodyMotion, limits: ContactLimits, la
     for contact, touching in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
         n = touching.normal
         across = touching.slide - n * (n @ touching.slide)
-        bodies = index[contact.body_a], index[contact.body_b]
-        turning, of_turning, _ = turning_row(motion, bodies)
-        shared = _shared(contact, n, turning)
-        slip = math.hypot(float(np.linalg.norm(across)), *(arm * float(np.linalg.norm(part)) for arm, part in shared))
+        slip = float(np.linalg.norm(across))
         kind = limits.kind(contact, touching.gap, slip)
         if kind == "open" or touching.absent:
             continue
-        determinate &= not touching.flat
+        determinate &= not touching.flat and contact.cone == "separate"
+        bodies = index[contact.body_a], index[contact.body_b]
         J, surface = slide_row(motion, bodies, touching)[0], frame_of_axis(n)[:, :2].T
         push = n if kind == "stick" or not slip else n - contact.friction * across / slip
         if kind == "stick":
             unknown.append(surface @ J)
+        turning, of_turning, _ = turning_row(motion, bodies)
         moments, loose = _against_turning(contact, touching, turning, law)
-        if shared:
-            turns = np.stack([n, *surface])[: len(contact.shared_arms)]
-            moments = np.array([contact.friction * arm**2 * part / (-slip or -math.inf) for arm, part in shared])
-            moments, loose = (np.zeros((1, 3)), turns) if kind == "stick" else (moments, turns[:0])
         unknown.append(loose @ of_turning)
         weight = g * float(masses[list(bodies)].sum())
-        known += weight * moments[0] @ of_turning if law.by_weight and not shared else 0.0
-        by_normal = moments[1] if law.by_weight and not shared else moments.sum(axis=0)
+        known += weight * moments[0] @ of_turning if law.by_weight else 0.0
+        by_normal = moments[1] if law.by_weight else moments.sum(axis=0)
         unknown.append((push @ J + by_normal @ of_turning)[None])
     return Pressing(np.concatenate(unknown), known, determinate)
-
-
-def _shared(contact: BodyContact, n: FloatArray, turning: FloatArray) -> list[tuple[float, FloatArray]]:
-    """Arm and angular velocity of spin and of rolling, if they share the cone of a contact."""
-    spin = n * (n @ turning)
-    return [*zip(contact.shared_arms, (spin, turning - spin), strict=False)]
 
 
 def _against_turning(

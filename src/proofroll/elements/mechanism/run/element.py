@@ -199,10 +199,7 @@ class MechanismElement:
 
     @cached_property
     def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
-        """Equations of contacts and laws of joints, and modes at the start.
-
-        None: nothing switches, or not uniquely, or a closed contact has a cone that they have not.
-        """
+        """Equations of contacts and laws of joints, and modes at the start; None: not unique, or of a shared cone."""
         from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 
         if self._switches:

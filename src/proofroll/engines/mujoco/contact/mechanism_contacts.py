@@ -67,7 +67,8 @@ def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
     moving = _moving(mechanism)
     check_walls(mechanism, settings)
     for contact in mechanism.contacts:
-        for mu in (_coefficient(contact), contact.spinning_friction, _rolling(contact)):
+        rolling = contact.rolling_resistance if contact.shared_arms else 0.0
+        for mu in (_coefficient(contact), contact.spinning_friction, rolling):
             if 0 < mu < _SMALLEST_FRICTION:
                 raise Refused(
                     f"MuJoCo raises a coefficient of friction of {mu:g} to {_SMALLEST_FRICTION:g}; 0 is exact"
@@ -123,7 +124,7 @@ def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> 
     pair.condim = (TURNS if contact.spinning_friction else SLIDES) if contact.friction else 1
     pair.friction = (_coefficient(contact), _coefficient(contact), contact.spinning_friction, 0.0, 0.0)
     if arms := contact.shared_arms:
-        pair.condim, pair.friction[3:] = SLIDES + len(arms), _rolling(contact)
+        pair.condim, pair.friction[3:] = SLIDES + len(arms), contact.rolling_resistance
     settings.soften(pair)
     if contact.restitution:
         pair.solref = (-1.0, -(1 + contact.restitution) / settings.dt)
@@ -140,11 +141,6 @@ def _coefficient(contact: BodyContact) -> float:
     """Coefficient of a contact in MuJoCo, which has no unbounded friction."""
     beside_spin = contact.spinning_friction and contact.cone == "separate"
     return min(contact.friction, _BESIDE_SPIN if beside_spin else UNBOUNDED_FRICTION)
-
-
-def _rolling(contact: BodyContact) -> float:
-    """Coefficient of rolling in the cone of a contact [m]."""
-    return contact.rolling_resistance if contact.cone == "shared" else 0.0
 
 
 def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:

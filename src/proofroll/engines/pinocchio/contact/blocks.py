@@ -29,7 +29,6 @@ _PATIENCE = 2 * _TOGETHER
 _ACCEPTED = 1e-5  # change that is taken where no solver reaches the tolerance
 _TURNS, _LONGEST_TURN = 40, 0.7  # steps of a search for a direction, and the longest of them [rad]
 _FLAT = 1e-12  # determinant of a contact's mobility, relative to its largest cubed, that may be round-off
-_PLAIN = 3  # rows of a contact without turns
 _ALONG = 1e-10  # slip across a direction, relative to the largest speed, that is found
 
 
@@ -123,6 +122,7 @@ def impulses_by_blocks(
         for block in blocks
         if block.friction is not None
     ]
+    shared = {block.first: _SharedCone(G[block.rows, block.rows], block) for block in blocks if block.turns}
     diagonal = G.diagonal().tolist()
     part = 1.0  # of the way to a block's own solution
     least, fell = math.inf, 0  # smallest change, and the last sweep that halved it
@@ -141,7 +141,8 @@ def impulses_by_blocks(
                 velocity - sum(map(mul, responses, impulse))
                 for velocity, responses in zip(velocities, mobility, strict=True)
             ]
-            new = _contact(mobility, free, friction, impulse, speed)
+            cone = shared.get(rows.start)
+            new = cone.impulse(free) if cone else _contact(mobility, free, friction, impulse, speed)
             steps = [part * (a - b) for a, b in zip(new, impulse, strict=True)]
             if any(steps):
                 u += steps @ response
@@ -201,10 +202,8 @@ def _contact(
     G: Sequence[Sequence[float]], b: Sequence[float], mu: float, guess: Sequence[float], speed: float
 ) -> list[float]:
     """Impulse of a contact: slips and normal; ``b``: its velocity without it, ``guess``: the one before."""
-    if b[-1] >= 0:
-        return [0.0] * len(b)
-    if len(b) > _PLAIN:
-        return _of_shared_cone(np.array(G), np.array(b), mu)
+    if b[2] >= 0:
+        return [0.0, 0.0, 0.0]
     if not mu:
         return [0.0, 0.0, -b[2] / G[2][2]]
     x, y, normal = _sticking(G, b)
@@ -223,34 +222,45 @@ def _contact(
     return best
 
 
-def _of_shared_cone(G: Array, b: Array, mu: float) -> list[float]:
-    """Impulse of a contact whose slips and turns share a cone; arguments of :func:`_contact`.
+class _SharedCone:
+    """A contact whose slips and turns share a cone.
 
     What slips has friction F against its slip u = -λ F: with the eigenvalues of the mobility along the surface, while
     the normal velocity is 0, |F| = mu N is one equation for λ.
     """
-    from scipy.optimize import brentq  # half a second, which few runs need
 
-    push, easy = G[:-1, -1], G[-1, -1]
-    sizes, ways = np.linalg.eigh(G[:-1, :-1] - np.outer(push, push) / easy)
-    parts, pulls = ways.T @ (push * (b[-1] / easy) - b[:-1]), ways.T @ push
-    sizes = np.where(sizes > _FLAT * sizes[-1], sizes, math.inf)  # nothing moves along the others
+    def __init__(self, G: Array, block: Block) -> None:
+        """Takes the responses of its rows, the normal last."""
+        self._mu, self._easy, self._push = block.friction or 0.0, float(G[-1, -1]), G[:-1, -1]
+        sizes, self._ways = np.linalg.eigh(G[:-1, :-1] - np.outer(self._push, self._push) / self._easy)
+        self._sizes = np.where(sizes > _FLAT * sizes[-1], sizes, math.inf).tolist()  # nothing moves along the others
+        self._pulls: list[float] = (self._ways.T @ self._push).tolist()
 
-    def along(resistance: float) -> Array:
-        return np.asarray(parts / (sizes + resistance))
+    def impulse(self, b: Sequence[float]) -> list[float]:
+        """Impulse of its rows; ``b``: its velocity without it."""
+        from scipy.optimize import brentq  # half a second, which few runs need
 
-    def excess(resistance: float) -> float:
+        if b[-1] >= 0:
+            return [0.0] * len(b)
+        parts = ((self._push * (b[-1] / self._easy) - b[:-1]) @ self._ways).tolist()
+
+        def along(resistance: float) -> list[float]:
+            return [part / (size + resistance) for part, size in zip(parts, self._sizes, strict=True)]
+
+        def normal(friction: Sequence[float]) -> float:
+            return -(sum(map(mul, self._pulls, friction)) + b[-1]) / self._easy
+
+        def excess(resistance: float) -> float:
+            friction = along(resistance)
+            return math.hypot(*friction) - self._mu * normal(friction)
+
+        resistance, most = 0.0, max(size for size in self._sizes if math.isfinite(size))
+        if excess(0.0) > 0:
+            while excess(most) > 0:
+                most *= 4.0
+            resistance = float(brentq(excess, 0.0, most, xtol=_SETTLED**2 * most, rtol=_SETTLED))
         friction = along(resistance)
-        return math.hypot(*friction.tolist()) + mu * (float(pulls @ friction) + float(b[-1])) / float(easy)
-
-    resistance = 0.0
-    if excess(0.0) > 0:
-        most = float(sizes[np.isfinite(sizes)].max())
-        while excess(most) > 0:
-            most *= 4.0
-        resistance = float(brentq(excess, 0.0, most, xtol=_SETTLED**2 * most, rtol=_SETTLED))
-    friction = along(resistance)
-    return [*(ways @ friction).tolist(), -(float(pulls @ friction) + float(b[-1])) / float(easy)]
+        return [*(self._ways @ friction).tolist(), normal(friction)]
 
 
 def _sticking(G: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[float, float, float]:

@@ -6,7 +6,7 @@ contacts separate.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import accumulate, compress, pairwise, starmap
 from typing import Any
 
@@ -17,13 +17,12 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import ONE_POINT, Touching, touch
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, ALL_SHAPES, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
-from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK
 from proofroll.elements.mechanism.scene.rotations import Array, carried, frame_of_axis
 from proofroll.engines.pinocchio.contact.blocks import Block, BlockSolver
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
+from proofroll.engines.pinocchio.contact.shared_cones import SharedCones
 from proofroll.engines.pinocchio.contact.step_terms import (
     LARGEST_FRICTION,
     Impulses,
@@ -36,24 +35,6 @@ from proofroll.engines.pinocchio.contact.turning_moments import Pressed, Turning
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
-_CAPABILITY = MechanismCapability
-PROVIDES: frozenset[str] = (
-    ALL_JOINTS
-    | FORCES
-    | ALL_SHAPES
-    | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-    | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
-    | {_CAPABILITY.SHARED_CONE}
-    | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
-    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS, _CAPABILITY.MOTIONS}
-)
-_OF_A_TREE = "its steps are those of a tree with contacts"
-LACKING: Mapping[str, str] = {
-    **dict.fromkeys(
-        ALL_LOOPS | {_CAPABILITY.COUPLINGS, _CAPABILITY.COUPLINGS_OF_MANY, _CAPABILITY.MASSLESS}, _OF_A_TREE
-    ),
-    _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
-}
 # Approach speed, in steps of gravity, below which nothing rebounds.
 _SOFT = 5.0
 # Fraction of a gap that a step by the midpoint rule closes; closing all of it would eject what has penetrated.
@@ -64,23 +45,12 @@ _NEAR = 2.0
 _SMALL = 1e-9
 # Ratio of friction to its bound above which an impulse lies on the cone.
 _INSIDE = 1 - 1e-6
-_OF_BLOCKS = "Pinocchio's solvers have no cone shared by slip and turning, which proofroll solves by blocks"
 _NO_CHANGE: Sequence[float] = (0.0, 0.0, 0.0)  # of slip and gap velocities
 # Ratio of the contact's mobility in two directions of the surface above which PGS returns a wrong impulse.
 _UNEQUAL = 2.0
 # Largest coefficient of the first cone, and factor on it while an impulse lies on it. Narrower cones than needed cost
 # iterations alone; of three contacts tried, ADMM finds all impulses in cones below 10, and not all in those above.
 _NARROW, _WIDER = 1.0, 3.0
-
-
-def family(settings: PinocchioSettings) -> Mapping[str, str]:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
-    return of_contact(Family.CONVEX if settings.convex else Family.HARD)
-
-
-def _axes(frame: Array, turns: Array) -> Array:
-    """Axes of turns that share a cone, spin first, in the columns of the frame of a normal."""
-    return np.roll(frame, 1, axis=1)[:, : len(turns)]
 
 
 class ImpulseSteps:
@@ -92,7 +62,7 @@ class ImpulseSteps:
         events: of the contacts.
         joints: joint rows, numbered after the contacts.
         blocks: solver that goes on where Pinocchio's ADMM stops.
-        shares: True if slips and turns of a contact share its cone; then blocks are the only solver.
+        sharing: cones that turns share with slips, which blocks alone solve.
         ahead: bodies later in a step, or in a sample.
         coming: impulses of the next step, where a sample has found them.
     """
@@ -126,11 +96,8 @@ class ImpulseSteps:
         self._solvers: dict[tuple[int, ...], SolverParts] = {}
         self.blocks = BlockSolver(float(settings.solver_tolerance or 0.0))
         nv, self._all = tree.model.nv, tuple(range(len(self.contacts)))
-        self._arms = [np.array(contact.shared_arms) for contact in self.contacts]
-        self.shares = any(map(len, self._arms))
-        if self.shares and (settings.solver != "admm" or settings.convex):
-            raise Refused(f"{_OF_BLOCKS}, in place of solver=admm with convex=false; set these")
-        ends = list(accumulate([*(3 + len(arms) for arms in self._arms), *[1] * len(self.joints.J)], initial=0))
+        self.sharing = sharing = SharedCones(tree, settings)
+        ends = list(accumulate([*(3 + turns for turns in sharing.turns), *[1] * len(self.joints.J)], initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
         self._slides = [row for rows in self._rows[: len(self.contacts)] for row in rows[-3:]]
         self._upper = np.triu(np.ones((nv, nv), dtype=bool))
@@ -216,15 +183,10 @@ class ImpulseSteps:
             "contact_place": place,
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
             "contact_restitution": self.restitution.copy(),
-            "contact_rolling": rolling_levers(self._moments.frictions, len(touching)) + self._rolling_shares(),
+            "contact_rolling": rolling_levers(self._moments.frictions, len(touching)) + self.sharing.rolling,
             "contact_tangential": np.array([contact.tangential_restitution for contact in self.contacts]),
             "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
         }
-
-    def _rolling_shares(self) -> list[float]:
-        """Coefficient of rolling in the cone of each contact [m]."""
-        pairs = zip(self.contacts, self._arms, strict=True)
-        return [contact.friction * float(arms[-1]) if len(arms) > 1 else 0.0 for contact, arms in pairs]
 
     def terms(self, q: Array, v: Array, span: float, late: float = 0.0) -> StepTerms:
         """Terms of a step of length ``span`` [s]; ``q`` belongs to the time ``late`` [s] after its start."""
@@ -242,20 +204,13 @@ class ImpulseSteps:
         pin.computeJointJacobians(model, data, q)
         frames, all_of = [frame_of_axis(point.normal) for point in touching], self._solver(self._all)
         contact_rows = [self._posed(all_of, k, *placed) for k, placed in enumerate(zip(touching, frames, strict=True))]
-        if self.shares:
-            contact_rows = [np.concatenate([self._turns(k, frames[k]), rows]) for k, rows in enumerate(contact_rows)]
+        if self.sharing:
+            contact_rows = [
+                row for k, rows in enumerate(contact_rows) for row in (self.sharing.rows(data, k, frames[k]), rows)
+            ]
         rows = np.concatenate([*contact_rows, self.joints.J])
-        J = rows[self._slides if self.shares else slice(len(self._slides))].reshape(-1, 3, model.nv)
+        J = rows[self._slides if self.sharing else slice(len(self._slides))].reshape(-1, 3, model.nv)
         return StepTerms(rows=rows, J=J, free=free, inverse=inverse, touching=touching, frames=frames)
-
-    def _turns(self, k: int, frame: Array) -> Array:
-        """Derivatives of the angular velocities that share a contact's cone, times their arms, (turns, nv)."""
-        contact, arms, turning = self.contacts[k], self._arms[k], np.zeros((3, self._model.nv))
-        for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
-            if len(arms) and self._index[body] >= 0:
-                of_frame = self._tree.body[self._index[body]]
-                turning += sign * pin.getFrameJacobian(self._model, self._data, of_frame, pin.LOCAL_WORLD_ALIGNED)[3:]
-        return np.asarray(arms[:, None] * (_axes(frame, arms).T @ turning))
 
     def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
         """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
@@ -447,7 +402,7 @@ class ImpulseSteps:
                     F, bound = math.hypot(F1, F2, *turns), _INSIDE * self.contacts[k].friction * N
                     states[k] = step_events.state_of(N, F, bound)
                     if turns.size:
-                        moment[k] = _axes(frames[k], turns) @ (self._arms[k] * turns)
+                        moment[k] = self.sharing.moment(k, frames[k], turns)
                 else:
                     along_rows[k - count] = sizes[end - 1]
 
@@ -459,7 +414,7 @@ class ImpulseSteps:
         Raises:
             Diverged: neither finds them.
         """
-        if not self.blocks.solved and not self.shares:
+        if not self.blocks.solved and not self.sharing:
             try:
                 return self._found(which, G, g, terms, span, convex=convex)
             except Diverged:
@@ -469,18 +424,12 @@ class ImpulseSteps:
         for k, end in zip(which, self._solver(which).ends, strict=True):
             if k < count:
                 self._check(k, diagonal[end - 3 : end].tolist(), terms.touching[k].flat)
-                turns = len(self._arms[k])
+                turns = self.sharing.turns[k]
                 parts[k] = Block(end - 3 - turns, self._friction(k), turns=turns)
             else:
                 rubs = k < count + len(rubbing)
                 parts[k] = Block(end - 1, None, span * rubbing[k - count].joint.friction if rubs else math.inf)
-
-        def otherwise() -> Array:
-            if self.shares:
-                raise Diverged(f"the sweeps over blocks do not settle at {self.t:g} s, and {_OF_BLOCKS}")
-            return self._found(which, G, g, terms, span, convex=convex)
-
-        return self.blocks.impulses(G, g, parts, otherwise)
+        return self.blocks.impulses(G, g, parts, lambda: self._found(which, G, g, terms, span, convex=convex))
 
     def _found(
         self, which: tuple[int, ...], G: Array, g: Array, terms: StepTerms, span: float, *, convex: bool
@@ -493,6 +442,7 @@ class ImpulseSteps:
         Raises:
             Diverged: Pinocchio's solver does not find them.
         """
+        self.sharing.require_none(self.t)
         count, solver = len(self.contacts), self._solver(which)
         # Pinocchio's tolerances and regularisations are numbers without scale: 1e-8, below which its ADMM adapts
         # its penalty the wrong way, would be a large part of the impulses of short steps or light bodies. In these

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,7 +19,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.box_features import BoxSlot
 from proofroll.elements.mechanism.scene.shapes.capsule_box import CapsuleBoxSlot
 from proofroll.elements.mechanism.scene.shapes.features import SolidFeatures, features_between
-from proofroll.elements.mechanism.scene.shapes.pair_rules import CURVED, require_rule
+from proofroll.elements.mechanism.scene.shapes.pair_rules import CURVED, check_shared, require_rule
 from proofroll.elements.mechanism.scene.shapes.shapes import (
     BoxShape,
     CapsuleShape,
@@ -278,7 +277,7 @@ class Pair:
         require_known(f"{where}.against", self.against, get_args(Against))
         require_known(f"{where}.cone", self.cone, get_args(Cone))
         if self.cone == "shared":
-            self._check_shared(where)
+            check_shared(where, self)
         checks.read(self, where, checks.number, "restitution", at_least=0)
         if self.restitution > 1:
             advice = "no impact returns more than it takes; give 0 to 1"
@@ -293,15 +292,6 @@ class Pair:
                 advice = f"kinetic friction, {self.friction:g}, must lie above 0 and not above it"
                 raise InputError(f"{where}.static_friction", self.static_friction, advice)
 
-    def _check_shared(self, where: str) -> None:
-        for key in ("friction", "spinning_friction"):
-            if not 0 < getattr(self, key) < math.inf:
-                advice = "a shared cone needs one above 0, and finite; give it, or leave cone out"
-                raise InputError(f"{where}.{key}", getattr(self, key), advice)
-        for key, default in (("static_friction", None), ("against", "turning"), ("tangential_restitution", 0.0)):
-            if getattr(self, key) != default:
-                raise InputError(f"{where}.{key}", getattr(self, key), "a shared cone has none; leave it out")
-
     @property
     def static(self) -> float:
         """Coefficient of a contact that sticks."""
@@ -309,10 +299,9 @@ class Pair:
 
     def with_friction(self, friction: float) -> Pair:
         """The pair with another coefficient; its static one changes by the same factor."""
-        if not friction:
-            off = replace(self, friction=friction, static_friction=None, cone="separate")
-            return replace(off, spinning_friction=0.0, rolling_resistance=0.0) if self.cone == "shared" else off
-        if self.static_friction is None:
+        if self.cone == "shared" and not friction:
+            return Pair(self.name, self.geometries, friction, self.restitution)
+        if self.static_friction is None or not friction:
             return replace(self, friction=friction, static_friction=None)
         return replace(self, friction=friction, static_friction=self.static * friction / self.friction)
 
@@ -451,13 +440,6 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
                 )
             )
     return tuple(contacts)
-
-
-def coefficients_of(contacts: Sequence[BodyContact]) -> dict[str, Array]:
-    """Coefficients of contacts by their names in :class:`.MechanismBuilt`."""
-    laws = {"friction": "friction", "restitution": "restitution", "static": "static"}
-    laws["tangential"] = "tangential_restitution"
-    return {f"contact_{name}": np.array([getattr(contact, law) for contact in contacts]) for name, law in laws.items()}
 
 
 def shared_pairs(contacts: Sequence[BodyContact]) -> dict[str, list[int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from proofroll.core.errors import InputError
@@ -44,6 +45,17 @@ def require_rule(key: str, pair: Pair, a: Geometry, b: Geometry) -> None:
     if pair.against == "motion" and not (kinds & {"plane", *CURVED} and any(ball.radius for ball in balls)):
         advice = "only a sphere moves over a plane or a curved wall with its centre; leave it out, or give turning"
         raise InputError(f"pairs.{pair.name}.against", pair.against, advice)
+
+
+def check_shared(where: str, pair: Pair) -> None:
+    """Raises InputError for laws of a pair that a shared cone has not."""
+    for key in ("friction", "spinning_friction"):
+        if not 0 < getattr(pair, key) < math.inf:
+            advice = "a shared cone needs one above 0, and finite; give it, or leave cone out"
+            raise InputError(f"{where}.{key}", getattr(pair, key), advice)
+    for key, default in (("static_friction", None), ("against", "turning"), ("tangential_restitution", 0.0)):
+        if getattr(pair, key) != default:
+            raise InputError(f"{where}.{key}", getattr(pair, key), "a shared cone has none; leave it out")
 
 
 def _require_one_place(pair: Pair, kinds: set[GeometryKind]) -> None:
