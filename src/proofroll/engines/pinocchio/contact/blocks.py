@@ -248,7 +248,7 @@ class _SharedCone:
             return [part / (size + resistance) for part, size in zip(parts, self._sizes, strict=True)]
 
         def normal(friction: Sequence[float]) -> float:
-            return -(sum(map(mul, self._pulls, friction)) + b[-1]) / self._easy
+            return -float(sum(map(mul, self._pulls, friction)) + b[-1]) / self._easy
 
         def excess(resistance: float) -> float:
             friction = along(resistance)
