@@ -11,6 +11,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.files.scene_sources import root_words
 from proofroll.report.labels import engine_title, engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
+from proofroll.report.run.last_values import FORCES
 from proofroll.running.case import Status
 from proofroll.studies.answer.records import (
     AllowedError,
@@ -208,7 +209,7 @@ def unaided(made: SceneAnswer) -> EngineAnswer | None:
 def scope_sentence(made: SceneAnswer | StepAnswer) -> str:
     """Sentence on what was judged, over which time, and that attitudes were not."""
     names = ", ".join(quantity_words(bound.quantity) for bound in made.bounds)
-    loads = ", forces after the start" if any(bound.unit in {"N", "N m"} for bound in made.bounds) else ""
+    loads = ", forces after the start" if any(bound.unit in FORCES for bound in made.bounds) else ""
     unjudged = f" Not judged: {' and '.join(made.unjudged)}." if made.unjudged else ""
     beyond = f" No longer: {made.beyond}." if made.beyond else ""
     return f"Judged: {names}, every {made.every:g} s over {made.until:g} s{loads}.{beyond}{unjudged}"
