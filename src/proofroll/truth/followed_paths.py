@@ -15,6 +15,7 @@ from proofroll.core.pace import PACE
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.record import Record
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.error_bars import (
@@ -55,6 +56,8 @@ def refuse_uncovered(mechanism: Mechanism) -> None:
     """
     if mechanism.unmodelled:
         raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
+    if mechanism.shares_cone:
+        raise Refused(f"no route of the truth has {MechanismCapability.SHARED_CONE}")
     if analyse(mechanism).singular_start:
         raise Refused("the start is a singular pose, where the motion may branch")
 
@@ -352,8 +355,8 @@ def _goes_on(stretches: Sequence[Stretch[Any]], kinds: Callable[[Any], Any]) -> 
     """True if the first of some stretches goes on in the next, in the same kinds of mode and without a jump."""
     if len(stretches) < 2 or kinds(stretches[0].mode) != kinds(stretches[1].mode):
         return False
-    last, first = stretches[0].last[:-1], stretches[1].first[:-1]  # each time has its own last digit
-    return bool(np.all(np.abs(first - last) <= CLOSE * np.maximum(1.0, np.abs(last))))
+    last, begin = stretches[0].last[:-1], stretches[1].first[:-1]  # each time has its own last digit
+    return bool(np.all(np.abs(begin - last) <= CLOSE * np.maximum(1.0, np.abs(last))))
 
 
 def _parts(stretches: Sequence[Stretch[Any]], kinds: Callable[[Any], Any]) -> int:

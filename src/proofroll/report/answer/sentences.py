@@ -11,6 +11,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.files.scene_sources import root_words
 from proofroll.report.labels import engine_title, engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
+from proofroll.report.run.last_values import FORCES
 from proofroll.running.case import Status
 from proofroll.studies.answer.records import (
     AllowedError,
@@ -99,7 +100,7 @@ def installed_words(item: EngineAnswer) -> str:
         setting, run = min(failed, key=lambda pair: pair[1].of_allowed or math.inf)
         told = f"{_at(item, setting, run)} is off by {number(run.of_allowed)} times what is allowed"
         return f"{INSTALLED}: dearer ({told})" if setting.state is State.DEARER else f"{INSTALLED}: {told}"
-    return f"{INSTALLED}: {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
+    return f"{INSTALLED}: refused, {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
 
 
 def _at(item: EngineAnswer, setting: SettingTried, run: StepTried) -> str:
@@ -208,9 +209,10 @@ def unaided(made: SceneAnswer) -> EngineAnswer | None:
 def scope_sentence(made: SceneAnswer | StepAnswer) -> str:
     """Sentence on what was judged, over which time, and that attitudes were not."""
     names = ", ".join(quantity_words(bound.quantity) for bound in made.bounds)
+    loads = ", forces after the start" if any(bound.unit in FORCES for bound in made.bounds) else ""
     unjudged = f" Not judged: {' and '.join(made.unjudged)}." if made.unjudged else ""
     beyond = f" No longer: {made.beyond}." if made.beyond else ""
-    return f"Judged: {names}, every {made.every:g} s over {made.until:g} s.{beyond}{unjudged}"
+    return f"Judged: {names}, every {made.every:g} s over {made.until:g} s{loads}.{beyond}{unjudged}"
 
 
 def answer_lines(made: SceneAnswer) -> Iterator[str]:

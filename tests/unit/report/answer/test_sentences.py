@@ -51,7 +51,7 @@ def test_settings_are_told_in_two_words() -> None:
     finer = installed_words(replace(HELD, settings=[replace(off, state=State.FINER)]))
     assert finer == "as installed: rough, dt 2e-3 s is off by 4 times what is allowed"
     refused = replace(tried, state=State.REFUSED, why="it cannot", steps=[])
-    assert installed_words(replace(HELD, settings=[refused])) == "as installed: it cannot"
+    assert installed_words(replace(HELD, settings=[refused])) == "as installed: refused, it cannot"
     assert installed_words(replace(HELD, preset="default", settings=[tried])) == ""
     assert installed_words(replace(FINER, settings=[tried])) == ""
 
@@ -72,6 +72,8 @@ def test_an_answer_begins_with_what_to_take() -> None:
     assert [line[0] for line in lines[2:]] == ["·", "N", "J"]
     assert lines[3] == "Not good enough: twice the step is off by 4 times what is allowed."
     assert lines[4] == "Judged: z, every 0.02 s over 2 s. Not judged: attitude."
+    pressed = replace(scene_answer(HELD), bounds=[replace(scene_answer(HELD).bounds[0], quantity="N", unit="N")])
+    assert list(answer_lines(pressed))[-1].startswith("Judged: N, every 0.02 s over 2 s, forces after the start.")
     assert taken_sentence(scene_answer(FINER)) == "No engine is shown to hold 1e-4 of the path over 2 s."
     blurred = replace(scene_answer(), open="the truth itself is known to 1e-3 m of z only")
     assert taken_sentence(blurred) == "Nothing can be advised for 1e-4: the truth itself is known to 1e-3 m of z only."
