@@ -74,7 +74,7 @@ def test_the_option_is_the_same_everywhere() -> None:
     """Each command that takes parameters or a controller of a scene takes a root, in the same words."""
     taken = {
         name: {word: item for item in command.params for word in item.opts}
-        for name, command in _made(app).commands.items()
+        for name, command in _made(app, "").commands.items()
     }
     of_scenes = {name for name, options in taken.items() if {"--set", "--control"} & options.keys()}
     assert of_scenes >= {"check", "run", "compare", "recommend", "report", "judge", "export", "ladder", "balance"}

@@ -190,10 +190,8 @@ class SceneAnswer(AnsweredScene):
     def perhaps_faster(self) -> EngineAnswer | None:
         """The cheapest that holds without confirmation, if it is cheaper than the confirmed one; else None."""
         rival = next((item for item in self.engines if item.state is State.UNCONFIRMED), None)
-        if rival is None or self.confirmed is None:
-            return None
-        cost, least = self.confirmed.seconds_per_second, rival.seconds_per_second
-        return rival if cost and least and least < cost else None
+        cost = (self.confirmed and self.confirmed.seconds_per_second) or 0.0
+        return rival if rival is not None and 0 < (rival.seconds_per_second or 0.0) < cost else None
 
     @property
     def is_cut_short(self) -> bool:
