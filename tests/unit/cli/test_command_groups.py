@@ -55,11 +55,24 @@ def test_a_command_whose_package_is_lacking_names_it(
     """Without the package that announces a command, one line says from where to install it; both places are there."""
     project = tomllib.loads((_PACKAGES[name] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert name in project["entry-points"]["proofroll.commands"]
-    monkeypatch.delitem(_made(app).commands, name)
+    left = [item for item in app.registered_groups if item.name != name]
+    monkeypatch.setattr(app, "registered_groups", left)
+    monkeypatch.setattr(app, "registered_commands", [item for item in app.registered_commands if item.name != name])
+    monkeypatch.setattr("proofroll.cli._made", _made.__wrapped__)
     code, out, err = proofroll(name, "--json")
     assert (code, out, err) == (2, "", f"proofroll: {name} is now {NOW[name]}\n")
     assert f"pip install {project['name']};" in err
     assert ROOT / err.split()[-1] == _PACKAGES[name]
+
+
+def test_the_command_that_is_asked_for_is_made_alone() -> None:
+    """A known name makes its own command with all options, as all are made otherwise."""
+    every = _made(app).commands
+    for name, command in every.items():
+        (alone,) = _made(app, name).commands.values()
+        assert [item.opts for item in alone.params] == [item.opts for item in command.params]
+        assert alone.short_help == command.short_help
+    assert _made(app, "comparre").commands.keys() == every.keys()
 
 
 def test_another_command_is_unknown() -> None:
