@@ -80,7 +80,7 @@ def single_case(
     asks: Sequence[str] = (),
     workers: Workers | None = None,
 ) -> Case:
-    """Case of one run on the command line.
+    """Case of one run on the command line, which is not stored.
 
     Args:
         scene: name or path.
@@ -99,7 +99,7 @@ def single_case(
         raise InputError("time_limit", time_limit, "give a positive, finite time in s")
     spec = parse_engine(engine)
     loaded = scene_of_run(scene, parameters, asks)
-    facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
+    facts = resolve([(spec.name, spec.options)], workers, loaded.requires, stored=False)[0]
     if isinstance(facts, ProofrollError):
         raise facts
     facts = on_scene(facts, loaded, workers) if facts.name == "truth" else facts
