@@ -32,7 +32,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 if TYPE_CHECKING:
     import xarray as xr
 
-NO_ROUTE = "no route of the truth follows contacts under held targets yet"
+_HELD, _SHARED = "under held targets yet", "whose sliding and turning share a cone"
 # Longest step [s], how many steps there are, and how many of them an error bar needs.
 _LONGEST, _RUNGS, _NEEDED = 1e-3, 3, 2
 # How many twins there are, how far apart they start [m, rad], and the distances up to which a motion is told [m].
@@ -74,8 +74,9 @@ def reference_by_steps(element: MechanismElement, times: FloatArray, engines: Se
         Refused: no engine is installed whose steps would be a reference.
         Diverged: a run ends early.
     """
+    reason = f"no route of the truth follows contacts {_SHARED if element.mechanism.shares_cone else _HELD}"
     if not engines:
-        raise Refused(f"{NO_ROUTE}, and no installed engine that represents it declares its steps as a reference")
+        raise Refused(f"{reason}, and no installed engine that represents it declares its steps as a reference")
     runs: list[_SteppedRun] = []
     steps = _steps(element)
     PACE.follow("second", sum(times[-1] / step for step in steps))
@@ -84,13 +85,13 @@ def reference_by_steps(element: MechanismElement, times: FloatArray, engines: Se
             runs.append(_run(element, times, step, engines[0], before=sum(times[-1] / run.step for run in runs)))
         except Diverged as error:
             by = f"{_words(engines[0])}, dt {number(step, 3)} s"
-            raise Diverged(f"{NO_ROUTE}, and the steps of {by} end: {error}", error.time) from None
+            raise Diverged(f"{reason}, and the steps of {by} end: {error}", error.time) from None
         if not runs[-1].whole:
             break
     PACE.leave()
     runs = runs[:-1] if len(runs) > _NEEDED and not runs[-1].whole else runs
     if len(runs) < _NEEDED:
-        raise Diverged(f"{NO_ROUTE}, and the processor time did not suffice for two runs by steps")
+        raise Diverged(f"{reason}, and the processor time did not suffice for two runs by steps")
     count = runs[-1].columns.variables["time"].values.size
     if count < len(times):
         runs = [replace(run, columns=run.columns.at("time", np.ones(count, dtype=bool))) for run in runs]

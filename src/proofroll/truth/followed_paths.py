@@ -15,6 +15,7 @@ from proofroll.core.pace import PACE
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.record import Record
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.error_bars import (
@@ -55,6 +56,8 @@ def refuse_uncovered(mechanism: Mechanism) -> None:
     """
     if mechanism.unmodelled:
         raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
+    if mechanism.shares_cone:
+        raise Refused(f"no route of the truth has {MechanismCapability.SHARED_CONE}")
     if analyse(mechanism).singular_start:
         raise Refused("the start is a singular pose, where the motion may branch")
 

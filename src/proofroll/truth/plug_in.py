@@ -83,9 +83,9 @@ class MechanismTruth:
 
     @staticmethod
     def by_steps(element: Element) -> bool:
-        """See :class:`proofroll.core.truth.TakesSteps`: contacts under held targets."""
+        """See :class:`proofroll.core.truth.TakesSteps`: contacts under held targets, or whose turning shares a cone."""
         assert isinstance(element, MechanismElement)  # by ``covers``
-        return bool(element.mechanism.contacts) and has_held(element.mechanism)
+        return bool(element.mechanism.contacts) and (has_held(element.mechanism) or element.mechanism.shares_cone)
 
     @staticmethod
     def reference(element: Element, times: FloatArray, engines: Sequence[str]) -> xr.Dataset:

@@ -23,6 +23,7 @@ pytestmark = pytest.mark.drill
 
 # A trunk on three bent legs, each a hip and a foot; its home pose lies 3 cm below the floor that it stands on.
 FOOT = '<geom name="{name}_foot" type="sphere" size=".02" pos="0 0 -.2" friction=".4" priority="1"/>'
+BLOCK = 'type="box" size=".02 .015 .02"'
 LEG = (
     '<body name="{name}" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 1 0" damping=".1" frictionloss=".05" '
     'armature=".01"/><inertial mass=".3" pos="0 0 -.1" diaginertia="1e-3 1e-3 2e-4"/>{foot}</body>'
@@ -110,17 +111,21 @@ def test_half_a_margin_is_a_larger_radius_and_half_a_higher_floor(
     assert {shape.position[2] for shape in shapes if shape.kind == "plane"} == {0.0025}
 
 
-def test_turning_friction_of_balls_is_taken(stood: Callable[..., Scene]) -> None:
-    """Condim 6 adds friction against spin and rolling, with the file's lengths."""
-    foot = FOOT.replace('friction=".4"', 'condim="6" friction=".4 .003 .0002"')
-    pair = _pairs(stood(robot(foot)))["rear_foot on floor"]
-    assert (pair.spinning_friction, pair.rolling_resistance) == (0.003, 0.0002)
+@pytest.mark.parametrize("shape", ['type="sphere" size=".02"', BLOCK, 'type="capsule" size=".02 .02"'])
+def test_turning_friction_of_feet_is_taken(stood: Callable[..., Scene], shape: str) -> None:
+    """Condim 4 adds friction against spin and 6 against rolling, with the file's lengths, in the cone of sliding."""
+    foot = FOOT.replace('type="sphere" size=".02"', shape).replace(
+        'friction=".4"', 'condim="6" friction=".4 .003 .0002"'
+    )
+    for text, rolling in ((foot, 0.0002), (foot.replace('condim="6"', 'condim="4"'), 0.0)):
+        pair = _pairs(stood(robot(text)))["rear_foot on floor"]
+        assert (pair.spinning_friction, pair.rolling_resistance, pair.cone) == (0.003, rolling, "shared")
+    assert _pairs(stood(robot(foot), CONTROL + "friction = 0\n"))["rear_foot on floor"].cone == "separate"
 
 
 @pytest.mark.parametrize(
     ("foot", "says"),
     [
-        (FOOT.replace('"sphere" size=".02"', '"capsule" size=".02 .02" condim="4"'), "against turning"),
         (FOOT.replace("priority", 'solref=".02 .1" priority'), "rebounds"),
         (FOOT.replace('"sphere" size=".02"', '"box" size=".02 .02 .02" margin=".01"'), "a margin of 0.01 m around box"),
     ],
@@ -348,6 +353,7 @@ def test_the_first_of_two_bodies_that_float_is_lifted_by_its_own_shapes(stood: C
 
 
 FLOORED = robot(HOOF, after=hoof())
+TURNING = 'condim="4" friction=".3 .004"'
 
 
 @pytest.mark.parametrize(
@@ -362,6 +368,17 @@ FLOORED = robot(HOOF, after=hoof())
         ),
         pytest.param(table("cylinder"), BARE, 1e-6, id="cylinder on a box"),
         pytest.param(table("mesh"), BARE, 1e-7, id="mesh on a box"),
+        pytest.param(
+            robot(FOOT.replace('type="sphere" size=".02"', BLOCK).replace('friction=".4"', TURNING)), CONTROL, 1e-9,
+            id="boxes of condim 4",
+        ),
+        pytest.param(
+            robot(FOOT.replace('friction=".4"', 'condim="6" friction=".4 .003 .0002"')), CONTROL, 1e-9,
+            id="balls of condim 6",
+        ),
+        pytest.param(
+            table("cylinder").replace('friction=".4"', TURNING), BARE, 1e-6, id="cylinder of condim 4 on a box",
+        ),
     ],
 )  # fmt: skip
 def test_a_scene_moves_as_the_file_in_plain_mujoco(

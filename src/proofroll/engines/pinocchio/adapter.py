@@ -11,7 +11,7 @@ from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import mechanism_of
-from proofroll.engines.pinocchio.contact import impulses
+from proofroll.engines.pinocchio.contact import impulse_run
 from proofroll.engines.pinocchio.contact.impulse_run import ImpulseRun
 from proofroll.engines.pinocchio.own_lines import own_lines
 from proofroll.engines.pinocchio.settings import PRESETS, PinocchioSettings
@@ -32,7 +32,7 @@ class Pinocchio:
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "null_space": joint_tree.PROVIDES,
         "constraint_dynamics": constraint_dynamics.PROVIDES,
-        "impulses": impulses.PROVIDES,
+        "impulses": impulse_run.PROVIDES,
     }
     made_for: ClassVar[Mapping[str, frozenset[str]]] = {
         "impulses": frozenset(MechanismCapability[name] for name in ("CONTACT", "JOINT_FRICTION", "STOPS"))
@@ -40,7 +40,7 @@ class Pinocchio:
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "null_space": joint_tree.LACKING,
         "constraint_dynamics": constraint_dynamics.LACKING,
-        "impulses": impulses.LACKING,
+        "impulses": impulse_run.LACKING,
     }
     settings: ClassVar[type[Any]] = PinocchioSettings
     lines = staticmethod(own_lines)
@@ -72,7 +72,7 @@ class Pinocchio:
         """See :class:`proofroll.core.engine_abilities.BringsAPart`."""
         return "integrator"
 
-    family = staticmethod(impulses.family)
+    family = staticmethod(impulse_run.family)
 
     @staticmethod
     def lowered(settings: PinocchioSettings) -> Mapping[str, int]:

@@ -261,9 +261,6 @@ class _NearPair:
         most = max(len(shape.corners) for shape in self.shapes)
         if most > _MOST_CORNERS:
             yield f"a mesh whose convex hull has {most} corners; at most {_MOST_CORNERS} are taken"
-        several = {"capsule", "cylinder", "box", "mesh"} & set(kinds) and "sphere" not in kinds
-        if several and (self.table(None).keys() & {"spinning_friction", "rolling_resistance"}):
-            yield f"{' on '.join(kinds)} with friction against turning: of condim 4 or 6, 3 is taken"
         if self.margin > _THIN and not any(self.grown):
             yield f"a margin of {self.margin:g} m around {kinds[0]}"
         if self.softness[0] > 0 and self.softness[1] < _REBOUNDS:
@@ -276,9 +273,9 @@ class _NearPair:
         """Table of the pair's laws; ``friction``: in place of the file's."""
         coefficient = friction if friction is not None and self.on_floor else self.friction[0]
         rows: dict[str, Any] = {"friction": float(coefficient) if self.dim > _SLIDES else 0.0}
-        if self.dim >= _SPINS and self.friction[2]:
-            rows["spinning_friction"] = float(self.friction[2])
-        if self.dim >= _ROLLS and self.friction[3]:
+        if self.dim >= _SPINS and coefficient:
+            rows |= {"spinning_friction": float(self.friction[2]), "cone": "shared"}
+        if self.dim >= _ROLLS and coefficient:
             rows["rolling_resistance"] = float(self.friction[3])
         return rows
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _USUAL = Tolerance(0.01, True)
 _LEAST = 0.01
 _MILLI = 1e3
-_NO_TOLERANCE = "no tolerance is given for it"
+_NO_TOLERANCE = "no tolerance is given"
 _UNDETERMINED = "the truth does not determine it"
 _CONTRADICTS = "that is against the state of the same trajectory"
 _MOST_TRUTHS = 64

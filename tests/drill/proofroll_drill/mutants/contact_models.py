@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.elements.mechanism.scene.shapes.geometry import coefficients_of
+from proofroll.engines.projection.contact.contact_modes import coefficients_of
 from proofroll.truth.numerics.hybrid import follow, states_of
 from proofroll.truth.tree.contact_tree import ContactTree
 from proofroll_drill.mutants.base import STEP, planted

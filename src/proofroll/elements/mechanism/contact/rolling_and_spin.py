@@ -129,9 +129,11 @@ def rolling_levers(frictions: Sequence[TurningFriction], count: int) -> Array:
 
 
 def turning_frictions(contacts: Sequence[BodyContact]) -> tuple[TurningFriction, ...]:
-    """Friction against turning of each contact that has some."""
+    """Friction against turning of each contact that has some, but for what shares the cone of sliding."""
     laws = []
     for k, contact in enumerate(contacts):
+        if contact.cone == "shared":
+            continue
         for spins, size in ((False, contact.rolling_resistance), (True, contact.spinning_friction)):
             if size:
                 text = f"{contact.name} {'spin' if spins else 'roll'}"

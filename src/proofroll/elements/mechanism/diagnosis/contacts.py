@@ -115,7 +115,8 @@ def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
     N = normal_forces(followed, force)
     presses = np.asarray(PRESSES * element.force < N)
     presses[0] = False  # several engines know no force there
-    slides = presses & np.asarray(followed.slip > SLIDES * element.speed)
+    separate = [contact.cone == "separate" for contact in element.mechanism.contacts]  # others share Coulomb's bound
+    slides = presses & np.asarray(followed.slip > SLIDES * element.speed) & separate
     true = follow_contacts(placed_of(element.mechanism, truth))
     u_n = np.sum(followed.normal * followed.slide, axis=-1)
     yield SeenContact(

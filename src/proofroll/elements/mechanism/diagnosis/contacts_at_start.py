@@ -134,7 +134,7 @@ def _other_turning(accelerations: _FirstAccelerations) -> Iterator[Cause]:
             )
         for key, name in _TURNING.items():
             size = getattr(pair, key)
-            if not size:
+            if not size or pair.cone == "shared":
                 continue
 
             def changed(factor: float, pair: Any = pair, key: str = key, size: float = size) -> FloatArray:

@@ -67,7 +67,7 @@ class Pressing(NamedTuple):
     Attributes:
         unknown: by a unit of each force or moment that the state leaves open, (forces, nv).
         known: sum of all others, (nv).
-        determinate: False if a closed contact has no one place or normal.
+        determinate: False if a closed contact has no one place or normal, or a cone that turning shares.
     """
 
     unknown: FloatArray
@@ -92,7 +92,7 @@ def pressing(mechanism: Mechanism, motion: BodyMotion, limits: ContactLimits, la
         kind = limits.kind(contact, touching.gap, slip)
         if kind == "open" or touching.absent:
             continue
-        determinate &= not touching.flat
+        determinate &= not touching.flat and contact.cone == "separate"
         bodies = index[contact.body_a], index[contact.body_b]
         J, surface = slide_row(motion, bodies, touching)[0], frame_of_axis(n)[:, :2].T
         push = n if kind == "stick" or not slip else n - contact.friction * across / slip

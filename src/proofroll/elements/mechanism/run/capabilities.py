@@ -49,6 +49,7 @@ class MechanismCapability(StrEnum):
     STATIC_FRICTION = "static friction of contacts above their kinetic friction"
     CONTACT_REBOUNDS = "rebounds of bodies from each other (restitution)"
     TURNING_FRICTION = "friction of contacts against rolling and spinning"
+    SHARED_CONE = "one cone of sliding, spinning and rolling friction"
     SLIP_REBOUNDS = "slips that impacts reverse (tangential restitution)"
     VERTICES = "contact of points (vertices, ends of cables)"
     SPHERES = "contact of spheres"
@@ -131,7 +132,10 @@ def required(mechanism: Mechanism) -> frozenset[str]:
         capability.UNBOUNDED_FRICTION: any(math.isinf(pair.friction) for pair in pairs),
         capability.STATIC_FRICTION: any(pair.static != pair.friction for pair in pairs),
         capability.CONTACT_REBOUNDS: any(pair.restitution for pair in pairs),
-        capability.TURNING_FRICTION: any(pair.rolling_resistance or pair.spinning_friction for pair in pairs),
+        capability.TURNING_FRICTION: any(
+            pair.cone == "separate" and (pair.rolling_resistance or pair.spinning_friction) for pair in pairs
+        ),
+        capability.SHARED_CONE: mechanism.shares_cone,
         capability.SLIP_REBOUNDS: any(pair.tangential_restitution for pair in pairs),
         capability.ACTUATORS: bool(actuators),
         capability.SATURATION: any(actuator.limit is not None for actuator in actuators),

@@ -199,14 +199,16 @@ class MechanismElement:
 
     @cached_property
     def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
-        """Equations of contacts and laws of joints, and modes at the start; None: nothing switches, or not uniquely."""
+        """Equations of contacts and laws of joints, and modes at the start; None: not unique, or of a shared cone."""
         from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 
         if self._switches:
             with contextlib.suppress(Refused):
                 dynamics = ContactDynamics(self._equations.mechanism)
                 mode, margin = dynamics.begin()
-                return (dynamics, mode) if margin else None
+                closed = zip(self.mechanism.contacts, mode, strict=False)
+                shared = any(contact.cone == "shared" and acting.kind != "open" for contact, acting in closed)
+                return (dynamics, mode) if margin and not shared else None
         return None
 
     @cached_property

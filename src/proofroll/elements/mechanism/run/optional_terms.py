@@ -26,6 +26,7 @@ def optional_terms(mechanism: Mechanism, parameters: Mapping[str, float]) -> lis
     The name of the parameter is, or ends with, the key of the law.
     """
     because = "the scene has it"
+    pairs = [pair for pair in mechanism.pairs if pair.cone == "separate"]  # of a shared cone no part is left alone
     terms = [
         OptionalTerm(name, because, {}, {key: 0.0})
         for key, name in _OF_JOINTS.items()
@@ -36,7 +37,7 @@ def optional_terms(mechanism: Mechanism, parameters: Mapping[str, float]) -> lis
         terms.append(OptionalTerm("limits of efforts", meaning, {}, {"limit": _FAR * parameters["limit"]}))
     rubbing: dict[str, float] = {}
     for key, name in _OF_PAIRS.items():
-        if owners := _owned(parameters, key, mechanism.pairs, mechanism.joints):
+        if owners := _owned(parameters, key, pairs, mechanism.joints):
             terms.append(OptionalTerm(name, because, {}, dict.fromkeys(owners, 0.0)))
             rubbing = rubbing or {parameter: _ROLLS * value for parameter, value in owners.items() if key == "friction"}
     if rubbing:

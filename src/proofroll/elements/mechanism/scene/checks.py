@@ -33,6 +33,7 @@ WORLD = "world"
 ZERO: Vector = (0.0, 0.0, 0.0)
 Z: Vector = (0.0, 0.0, 1.0)
 Against = Literal["motion", "turning"]  # what rolling resistance opposes
+Cone = Literal["separate", "shared"]  # bounds of sliding, spinning and rolling friction
 _LONGEST_NAME = 200  # characters
 _SQUARED = 1e-150  # sizes above it, and below its inverse, have squares within the range of numbers
 

@@ -167,6 +167,11 @@ class Mechanism:
         of_joints = any(joint.friction or joint.limits for joint in self.joints)
         return bool(self.contacts) or of_joints or any(item.limit is not None for item in self.actuators)
 
+    @property
+    def shares_cone(self) -> bool:
+        """True if sliding and turning of a pair share a cone."""
+        return any(pair.cone == "shared" for pair in self.pairs)
+
     @cached_property
     def conservative(self) -> bool:
         """True if nothing drives or dissipates."""

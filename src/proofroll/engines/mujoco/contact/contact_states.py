@@ -38,6 +38,8 @@ class ContactStates:
         self._open = (OPEN,) * len(mechanism.contacts)
         self._first = {geom: number for geom, (number, _) in contacts.of_geom.items()}
         self._contacts, self._friction = contacts, [contact.friction for contact in mechanism.contacts]
+        # arms of what shares the cone: forces and speeds of sliding, then moments over arms and turning times arms
+        self._arms = [[1.0, 1.0, *contact.shared_arms] for contact in mechanism.contacts]
         self._pyramidal = settings.cone == "pyramidal"
         # of the forces in MjData after a step: those of its start, or of the last stage of RK4
         self.behind = 0.0 if settings.integrator == "RK4" else settings.dt
@@ -74,14 +76,19 @@ class ContactStates:
         mu = self._friction[number]
         if not 0 < mu < math.inf:
             return state_of(forces[row], 0.0, mu)
+        arms = self._arms[number]
         if self._pyramidal:  # edges: the normal plus or less mu times a tangent
-            a, b, c, d = forces[row : row + 4]
-            state = state_of(a + b + c + d, abs(a - b) + abs(c - d), _ON_CONE * (a + b + c + d))
-            v1, v2 = rates[row] - rates[row + 1], rates[row + 2] - rates[row + 3]
-            return STICK if state == SLIP and math.hypot(v1, v2) <= 2 * mu * self._held else state
-        N = forces[row]
-        state = state_of(N, math.hypot(forces[row + 1], forces[row + 2]), _ON_CONE * mu * N)
-        return STICK if state == SLIP and math.hypot(rates[row + 1], rates[row + 2]) <= self._held else state
+            first, second = (slice(row + side, row + 2 * len(arms), 2) for side in (0, 1))
+            edges = [*zip(forces[first], forces[second], strict=True)]
+            N, friction = sum(a + b for a, b in edges), sum(abs(a - b) for a, b in edges)
+            state = state_of(N, friction, _ON_CONE * N)
+            speeds = [v1 - v2 for v1, v2 in zip(rates[first], rates[second], strict=True)]
+            return STICK if state == SLIP and math.hypot(*speeds) <= 2 * mu * self._held else state
+        N, along = forces[row], slice(row + 1, row + 1 + len(arms))
+        friction = math.hypot(*(force / arm for force, arm in zip(forces[along], arms, strict=True)))
+        state = state_of(N, friction, _ON_CONE * mu * N)
+        slip = math.hypot(*(rate * arm for rate, arm in zip(rates[along], arms, strict=True)))
+        return STICK if state == SLIP and slip <= self._held else state
 
     def _numbers(self, data: Any, firsts: list[int], states_found: list[int]) -> list[int]:
         """Number of each of MuJoCo's contacts; of boxes those are looked up where points change or jump."""

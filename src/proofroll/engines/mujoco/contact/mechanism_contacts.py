@@ -67,7 +67,8 @@ def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
     moving = _moving(mechanism)
     check_walls(mechanism, settings)
     for contact in mechanism.contacts:
-        for mu in (_coefficient(contact), contact.spinning_friction):
+        rolling = contact.rolling_resistance if contact.shared_arms else 0.0
+        for mu in (_coefficient(contact), contact.spinning_friction, rolling):
             if 0 < mu < _SMALLEST_FRICTION:
                 raise Refused(
                     f"MuJoCo raises a coefficient of friction of {mu:g} to {_SMALLEST_FRICTION:g}; 0 is exact"
@@ -87,10 +88,10 @@ def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
 
 def _check_turning(contact: BodyContact) -> None:
     """Raises Refused for friction against turning that MuJoCo's one cone of a contact bounds by another law."""
-    if contact.spinning_friction and np.isfinite(contact.friction):
+    if contact.spinning_friction and np.isfinite(contact.friction) and contact.cone == "separate":
         raise Refused(
             f"{contact.name} has friction against spin: in MuJoCo (condim 4) it shares one cone with sliding, and what "
-            "one takes the other lacks; the scene bounds each alone, and friction = inf is the same in both"
+            'one takes the other lacks; the scene bounds each alone; give cone = "shared", or friction = inf'
         )
 
 
@@ -122,6 +123,8 @@ def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> 
     """
     pair.condim = (TURNS if contact.spinning_friction else SLIDES) if contact.friction else 1
     pair.friction = (_coefficient(contact), _coefficient(contact), contact.spinning_friction, 0.0, 0.0)
+    if arms := contact.shared_arms:
+        pair.condim, pair.friction[3:] = SLIDES + len(arms), contact.rolling_resistance
     settings.soften(pair)
     if contact.restitution:
         pair.solref = (-1.0, -(1 + contact.restitution) / settings.dt)
@@ -136,7 +139,8 @@ def times_softer(mechanism: Mechanism) -> float:
 
 def _coefficient(contact: BodyContact) -> float:
     """Coefficient of a contact in MuJoCo, which has no unbounded friction."""
-    return min(contact.friction, _BESIDE_SPIN if contact.spinning_friction else UNBOUNDED_FRICTION)
+    beside_spin = contact.spinning_friction and contact.cone == "separate"
+    return min(contact.friction, _BESIDE_SPIN if beside_spin else UNBOUNDED_FRICTION)
 
 
 def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:
@@ -179,13 +183,15 @@ def _moving(mechanism: Mechanism) -> frozenset[str]:
 class ContactsRead(NamedTuple):
     """Contacts as MuJoCo finds them.
 
-    Gaps [m], normals from b to a, places [m], coefficients, and the Delassus matrix [1/kg].
+    Gaps [m], normals from b to a, places [m], coefficients of sliding and of rolling in its cone [m], of restitution,
+    and the Delassus matrix [1/kg].
     """
 
     gap: Array
     normal: Array
     place: Array
     friction: Array
+    rolling: Array
     restitution: Array
     response: Array
 
@@ -260,16 +266,17 @@ class Contacts:
                 continue
             if number in self._turned:
                 if number in self._on_cone:
-                    data.efc_aref[row] -= mu * float(np.linalg.norm(rates[friction] - data.efc_aref[friction]))
+                    data.efc_aref[row] -= float(np.linalg.norm(mu * (rates[friction] - data.efc_aref[friction])))
                 continue
-            slip = math.hypot(*data.efc_vel[friction].tolist())
+            slips, accelerations = mu * data.efc_vel[friction], mu * rates[friction]
+            slip = math.hypot(*slips.tolist())
             # from rest a slip starts along its acceleration
-            slip_rates = rates[friction] if slip == 0 else data.efc_vel[friction]
+            slip_rates = accelerations if slip == 0 else slips
             size = float(np.linalg.norm(slip_rates))
-            rate = float(slip_rates @ rates[friction]) / size if size else 0.0
+            rate = float(slip_rates @ accelerations) / size if size else 0.0
             damped = float(data.efc_KBIP[friction.start, 1]) * slip
             if damped + rate > 0:
-                data.efc_aref[row] -= mu * (damped + _LEAD * max(rate, 0.0))
+                data.efc_aref[row] -= damped + _LEAD * max(rate, 0.0)
 
     def depths(self, data: Any) -> dict[int, float]:
         """Depth at which each contact carries its normal force in ``data``, by number of contact [m].
@@ -287,12 +294,13 @@ class Contacts:
                 depths[self._number(contact)] = loaded - margin(self._settings)
         return depths
 
-    def _slipping(self, contact: Any) -> tuple[float, slice]:
-        """Coefficient and rows of a contact's friction that may slip: of a pair that never slides, against spin."""
-        row = int(contact.efc_address)
-        if math.isinf(self._mechanism.contacts[self._number(contact)].friction):
-            return float(contact.friction[2]), slice(row + SLIDES, row + max(SLIDES, int(contact.dim)))
-        return float(contact.friction[0]), slice(row + 1, row + min(SLIDES, int(contact.dim)))
+    def _slipping(self, contact: Any) -> tuple[Array, slice]:
+        """Coefficients and rows of a contact's friction that may slip: of a pair that never slides, against spin."""
+        row, dim, law = int(contact.efc_address), int(contact.dim), self._mechanism.contacts[self._number(contact)]
+        first, end = 1, dim if law.cone == "shared" else min(SLIDES, dim)
+        if math.isinf(law.friction):
+            first, end = SLIDES, max(SLIDES, dim)
+        return contact.friction[first - 1 : end - 1], slice(row + first, row + end)
 
     def watch(self, data: Any) -> None:
         """Keeps which contacts have their force on the cone, and which stick; ``data``: with the last forces.
@@ -305,9 +313,9 @@ class Contacts:
             row = int(contact.efc_address)
             if row >= 0:
                 mu, friction = self._slipping(contact)
-                bound = _NEAR_CONE * mu * data.efc_force[row]
-                if bound > 0:
-                    on_cone = math.hypot(*data.efc_force[friction].tolist()) >= bound
+                bound = _NEAR_CONE * data.efc_force[row]
+                if bound > 0 and mu.size:
+                    on_cone = math.hypot(*(data.efc_force[friction] / mu).tolist()) >= bound
                     (self._on_cone if on_cone else within).add(self._number(contact))
         self._sticking = within - self._on_cone - self._turned
 
@@ -413,8 +421,8 @@ class Contacts:
             if row < 0:
                 continue
             mu, friction = self._slipping(contact)
-            if np.linalg.norm(data.efc_force[friction]) >= _NEAR_CONE * mu * data.efc_force[row]:
-                data.efc_aref[row] -= mu * np.linalg.norm(missed[friction])
+            if np.linalg.norm(data.efc_force[friction] / mu) >= _NEAR_CONE * data.efc_force[row]:
+                data.efc_aref[row] -= np.linalg.norm(mu * missed[friction])
 
     def read(self, data: Any, rows_of: Callable[[Any, int], Array]) -> ContactsRead:
         """All contacts, by MuJoCo's own search with a margin so wide that it finds every one; overwrites ``data``.
@@ -422,7 +430,7 @@ class Contacts:
         Coefficients are those that MuJoCo combined. ``rows_of(data, n)`` is the Jacobian of the first n rows.
         """
         model, count = self._model, len(self._geoms)
-        gap, friction, restitution = np.full((3, count), np.nan)
+        gap, friction, rolling, restitution = np.full((4, count), np.nan)
         normal, place = np.full((2, count, 3), np.nan)
         rows = np.full((count, 3, model.nv), np.nan)
         kept = int(model.opt.cone), model.pair_margin.copy()
@@ -441,6 +449,7 @@ class Contacts:
                 row, dim = int(contact.efc_address), min(SLIDES, int(contact.dim))
                 damping = float(contact.solref[1])
                 friction[number] = contact.friction[0] if dim > 1 else 0.0
+                rolling[number] = contact.friction[3] if contact.dim > TURNS else 0.0
                 restitution[number] = -damping * model.opt.timestep - 1.0 if damping < 0 else 0.0
                 rows[number] = contact.frame.reshape(3, 3)[:dim].T @ all_rows[row : row + dim]
         equality_rows = all_rows[: data.ne]
@@ -452,7 +461,13 @@ class Contacts:
         through_loops = np.linalg.pinv(whole[by, by], DEPENDENT, hermitian=True) @ whole[by, of]
         response = (whole[of, of] - whole[of, by] @ through_loops).reshape(count, 3, count, 3)
         return ContactsRead(
-            gap=gap, normal=normal, place=place, friction=friction, restitution=restitution, response=response
+            gap=gap,
+            normal=normal,
+            place=place,
+            friction=friction,
+            rolling=rolling,
+            restitution=restitution,
+            response=response,
         )
 
     def _to_surface(self, number: int) -> float:

@@ -41,6 +41,7 @@ _SOFT = (
 )
 PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
 PROVIDES |= ALL_SHAPES | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
+PROVIDES |= {_CAPABILITY.SHARED_CONE}
 LACKING: Mapping[str, str] = {
     **mechanism.LACKING,
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
@@ -226,7 +227,7 @@ class MujocoGeoms(MujocoMechanism):
             read = self._contacts.read(self._evaluated(), self._rows)
         contacts = {f"contact_{name}": value for name, value in read._asdict().items()}
         if self._resistance is not None:
-            contacts["contact_rolling"] = self._resistance.levers
+            contacts["contact_rolling"] = self._resistance.levers + contacts["contact_rolling"]
         if not self._evaluated().ncon:
             return replace(plain, **contacts)
         softened, forces = dict(plain.regularised), self._forces(self._evaluated())

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from operator import mul
 from typing import NamedTuple
 
 import numpy as np
@@ -35,14 +36,16 @@ class Block(NamedTuple):
     """Rows of one contact, or of one joint's friction or stop.
 
     Attributes:
-        first: number of the first row; those of a contact are two slips and the normal.
+        first: number of the first row; those of a contact are turns that share its cone, two slips and the normal.
         friction: coefficient of a contact; None: a joint's row.
         bound: largest impulse of a joint's dry friction [N m s or N s]; inf: a stop, which only presses.
+        turns: number of rows of turning.
     """
 
     first: int
     friction: float | None
     bound: float = math.inf
+    turns: int = 0
 
     @property
     def least(self) -> float:
@@ -52,7 +55,7 @@ class Block(NamedTuple):
     @property
     def rows(self) -> slice:
         """All rows."""
-        return slice(self.first, self.first + (1 if self.friction is None else 3))
+        return slice(self.first, self.first + (1 if self.friction is None else 3 + self.turns))
 
 
 class BlockSolver:
@@ -119,6 +122,7 @@ def impulses_by_blocks(
         for block in blocks
         if block.friction is not None
     ]
+    shared = {block.first: _SharedCone(G[block.rows, block.rows], block) for block in blocks if block.turns}
     diagonal = G.diagonal().tolist()
     part = 1.0  # of the way to a block's own solution
     least, fell = math.inf, 0  # smallest change, and the last sweep that halved it
@@ -134,10 +138,11 @@ def impulses_by_blocks(
         for rows, mobility, response, friction in contacts:
             impulse, velocities = f[rows].tolist(), u[rows].tolist()
             free = [
-                velocity - (x * impulse[0] + y * impulse[1] + z * impulse[2])
-                for velocity, (x, y, z) in zip(velocities, mobility, strict=True)
+                velocity - sum(map(mul, responses, impulse))
+                for velocity, responses in zip(velocities, mobility, strict=True)
             ]
-            new = _contact(mobility, free, friction, impulse, speed)
+            cone = shared.get(rows.start)
+            new = cone.impulse(free) if cone else _contact(mobility, free, friction, impulse, speed)
             steps = [part * (a - b) for a, b in zip(new, impulse, strict=True)]
             if any(steps):
                 u += steps @ response
@@ -164,25 +169,25 @@ def _closer(G: Array, g: Array, u: Array, f: Array, blocks: Sequence[Block]) -> 
 
 def _at_once(G: Array, u: Array, f: Array, blocks: Sequence[Block]) -> Array:
     """Change of impulses that stops all rows that stick or press, while slips keep their directions."""
-    sizes, sticking, slipping = f.tolist(), list[int](), list[int]()
+    sizes, sticking, slipping = f.tolist(), list[int](), list[slice]()
     for block in blocks:
-        first, impulse = block.first, sizes[block.rows]
+        own_rows, impulse = block.rows, sizes[block.rows]
         if block.friction is None:
-            sticking += [first] if 0 < abs(impulse[0]) < block.bound else []
-        elif math.hypot(*impulse[:2]) < block.friction * impulse[2] * (1 - _SETTLED):
-            sticking += range(first, first + 3)
-        elif impulse[2] > 0:
-            slipping.append(first)
+            sticking += [block.first] if 0 < abs(impulse[0]) < block.bound else []
+        elif math.hypot(*impulse[:-1]) < block.friction * impulse[-1] * (1 - _SETTLED):
+            sticking += range(own_rows.start, own_rows.stop)
+        elif impulse[-1] > 0:
+            slipping.append(own_rows)
     change = np.zeros(len(f))
     if not sticking and not slipping:
         return change
-    held = [*sticking, *(first + 2 for first in slipping)]
-    rows, moves = G[held], [f[first : first + 3] / f[first + 2] for first in slipping]
-    slip_columns = [rows[:, first : first + 3] @ move for first, move in zip(slipping, moves, strict=True)]
+    held = [*sticking, *(own_rows.stop - 1 for own_rows in slipping)]
+    rows, moves = G[held], [f[own_rows] / f[own_rows.stop - 1] for own_rows in slipping]
+    slip_columns = [rows[:, own_rows] @ move for own_rows, move in zip(slipping, moves, strict=True)]
     parts = np.linalg.lstsq(np.column_stack([rows[:, sticking], *slip_columns]), -u[held], rcond=None)[0]
     change[sticking] = parts[: len(sticking)]
-    for first, move, part in zip(slipping, moves, parts[len(sticking) :], strict=True):
-        change[first : first + 3] = part * move
+    for own_rows, move, part in zip(slipping, moves, parts[len(sticking) :], strict=True):
+        change[own_rows] = part * move
     return change
 
 
@@ -190,7 +195,7 @@ def _allowed(impulse: Sequence[float], block: Block) -> bool:
     """True if a block can have an impulse, but for round-off."""
     if block.friction is None:
         return block.least <= impulse[0] <= block.bound
-    return math.hypot(*impulse[:2]) <= block.friction * impulse[2] * (1 + _SETTLED)
+    return math.hypot(*impulse[:-1]) <= block.friction * impulse[-1] * (1 + _SETTLED)
 
 
 def _contact(
@@ -215,6 +220,47 @@ def _contact(
         if least < _ALONG * speed:
             break
     return best
+
+
+class _SharedCone:
+    """A contact whose slips and turns share a cone.
+
+    What slips has friction F against its slip u = -λ F: with the eigenvalues of the mobility along the surface, while
+    the normal velocity is 0, |F| = mu N is one equation for λ.
+    """
+
+    def __init__(self, G: Array, block: Block) -> None:
+        """Takes the responses of its rows, the normal last."""
+        self._mu, self._easy, self._push = block.friction or 0.0, float(G[-1, -1]), G[:-1, -1]
+        sizes, self._ways = np.linalg.eigh(G[:-1, :-1] - np.outer(self._push, self._push) / self._easy)
+        self._sizes = np.where(sizes > _FLAT * sizes[-1], sizes, math.inf).tolist()  # nothing moves along the others
+        self._pulls: list[float] = (self._ways.T @ self._push).tolist()
+
+    def impulse(self, b: Sequence[float]) -> list[float]:
+        """Impulse of its rows; ``b``: its velocity without it."""
+        from scipy.optimize import brentq  # half a second, which few runs need
+
+        if b[-1] >= 0:
+            return [0.0] * len(b)
+        parts = ((self._push * (b[-1] / self._easy) - b[:-1]) @ self._ways).tolist()
+
+        def along(resistance: float) -> list[float]:
+            return [part / (size + resistance) for part, size in zip(parts, self._sizes, strict=True)]
+
+        def normal(friction: Sequence[float]) -> float:
+            return -float(sum(map(mul, self._pulls, friction)) + b[-1]) / self._easy
+
+        def excess(resistance: float) -> float:
+            friction = along(resistance)
+            return math.hypot(*friction) - self._mu * normal(friction)
+
+        resistance, most = 0.0, max(size for size in self._sizes if math.isfinite(size))
+        if excess(0.0) > 0:
+            while excess(most) > 0:
+                most *= 4.0
+            resistance = float(brentq(excess, 0.0, most, xtol=_SETTLED**2 * most, rtol=_SETTLED))
+        friction = along(resistance)
+        return [*(self._ways @ friction).tolist(), normal(friction)]
 
 
 def _sticking(G: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[float, float, float]:

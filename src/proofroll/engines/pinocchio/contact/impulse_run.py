@@ -1,7 +1,7 @@
 """Formulation ``impulses``: run of a mechanism with contacts, dry friction and stops, and its samples."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,15 +15,35 @@ from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
 from proofroll.core.number_format import number
 from proofroll.elements.mechanism import WORLD, Mechanism
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, ALL_SHAPES, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.pinocchio.contact.impulses import ImpulseSteps
+from proofroll.engines.pinocchio.contact.shared_cones import BY_BLOCKS
 from proofroll.engines.pinocchio.contact.step_terms import Impulses
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.smooth.null_space import LoopRows, NullSpace
 
+_CAPABILITY = MechanismCapability
+PROVIDES: frozenset[str] = (
+    ALL_JOINTS
+    | FORCES
+    | ALL_SHAPES
+    | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
+    | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
+    | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD, _CAPABILITY.SHARED_CONE}
+    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS, _CAPABILITY.MOTIONS}
+)
+_OF_A_TREE = "its steps are those of a tree with contacts"
+LACKING: Mapping[str, str] = {
+    **dict.fromkeys(
+        ALL_LOOPS | {_CAPABILITY.COUPLINGS, _CAPABILITY.COUPLINGS_OF_MANY, _CAPABILITY.MASSLESS}, _OF_A_TREE
+    ),
+    _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
+}
 # Fraction of a step over which the initial accelerations are evaluated, and factor on their errors.
 _PART, _MARGIN = 1 / 16, 4.0
 _BLOCKS = (
@@ -33,6 +53,11 @@ _BLOCKS = (
 _PARTS = "in the convex problem a slipping contact separates"
 _FOUND = "an impulse opposes the slip at its end, which turns, is found to solver_tolerance"
 _LATER = f"{_FOUND}, and follows the turning of its contact (J̇v) one step later"
+
+
+def family(settings: PinocchioSettings) -> Mapping[str, str]:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
+    return of_contact(Family.CONVEX if settings.convex else Family.HARD)
 
 
 class ImpulseRun(MechanismRun):
@@ -107,8 +132,9 @@ class ImpulseRun(MechanismRun):
         blocks = self.steps.blocks
         if not blocks.solved:
             return []
+        by_blocks = BY_BLOCKS if self.steps.sharing else _BLOCKS
         rough = blocks.worst > float(self._settings.solver_tolerance or 0.0)
-        return [f"{_BLOCKS}, to {number(blocks.worst, 1)} of the largest speed" if rough else _BLOCKS]
+        return [f"{by_blocks}, to {number(blocks.worst, 1)} of the largest speed" if rough else by_blocks]
 
     def events(self) -> Sequence[Event] | None:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""

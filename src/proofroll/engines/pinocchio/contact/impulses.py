@@ -6,7 +6,7 @@ contacts separate.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import accumulate, compress, pairwise, starmap
 from typing import Any
 
@@ -17,13 +17,12 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.contact.rolling_and_spin import rolling_levers
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import ONE_POINT, Touching, touch
-from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, ALL_SHAPES, FORCES, MechanismCapability
 from proofroll.elements.mechanism.run.contacts import step_events
-from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK
 from proofroll.elements.mechanism.scene.rotations import Array, carried, frame_of_axis
 from proofroll.engines.pinocchio.contact.blocks import Block, BlockSolver
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
+from proofroll.engines.pinocchio.contact.shared_cones import SharedCones
 from proofroll.engines.pinocchio.contact.step_terms import (
     LARGEST_FRICTION,
     Impulses,
@@ -36,23 +35,6 @@ from proofroll.engines.pinocchio.contact.turning_moments import Pressed, Turning
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
-_CAPABILITY = MechanismCapability
-PROVIDES: frozenset[str] = (
-    ALL_JOINTS
-    | FORCES
-    | ALL_SHAPES
-    | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-    | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS, _CAPABILITY.TURNING_FRICTION, _CAPABILITY.ORIENTATION}
-    | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
-    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS, _CAPABILITY.MOTIONS}
-)
-_OF_A_TREE = "its steps are those of a tree with contacts"
-LACKING: Mapping[str, str] = {
-    **dict.fromkeys(
-        ALL_LOOPS | {_CAPABILITY.COUPLINGS, _CAPABILITY.COUPLINGS_OF_MANY, _CAPABILITY.MASSLESS}, _OF_A_TREE
-    ),
-    _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
-}
 # Approach speed, in steps of gravity, below which nothing rebounds.
 _SOFT = 5.0
 # Fraction of a gap that a step by the midpoint rule closes; closing all of it would eject what has penetrated.
@@ -71,11 +53,6 @@ _UNEQUAL = 2.0
 _NARROW, _WIDER = 1.0, 3.0
 
 
-def family(settings: PinocchioSettings) -> Mapping[str, str]:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
-    return of_contact(Family.CONVEX if settings.convex else Family.HARD)
-
-
 class ImpulseSteps:
     """Steps of a tree with contacts, dry friction and stops of joints.
 
@@ -85,6 +62,7 @@ class ImpulseSteps:
         events: of the contacts.
         joints: joint rows, numbered after the contacts.
         blocks: solver that goes on where Pinocchio's ADMM stops.
+        sharing: cones that turns share with slips, which blocks alone solve.
         ahead: bodies later in a step, or in a sample.
         coming: impulses of the next step, where a sample has found them.
     """
@@ -93,7 +71,8 @@ class ImpulseSteps:
         """Starts at time 0.
 
         Raises:
-            Refused: Pinocchio's solver returns wrong impulses for such contacts, or one point does not hold a body.
+            Refused: Pinocchio's solver returns wrong impulses for such contacts, or has no cone of theirs, or one point
+                does not hold a body.
         """
         bodies = {body for contact in tree.mechanism.contacts for body in (contact.body_a, contact.body_b)}
         self._tree, self._model, self._bodies = tree, tree.model, MovingBodies(tree, bodies)
@@ -117,8 +96,10 @@ class ImpulseSteps:
         self._solvers: dict[tuple[int, ...], SolverParts] = {}
         self.blocks = BlockSolver(float(settings.solver_tolerance or 0.0))
         nv, self._all = tree.model.nv, tuple(range(len(self.contacts)))
-        ends = list(accumulate([3] * len(self.contacts) + [1] * len(self.joints.J), initial=0))
+        self.sharing = sharing = SharedCones(tree, settings)
+        ends = list(accumulate([*(3 + turns for turns in sharing.turns), *[1] * len(self.joints.J)], initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
+        self._slides = [row for rows in self._rows[: len(self.contacts)] for row in rows[-3:]]
         self._upper = np.triu(np.ones((nv, nv), dtype=bool))
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
@@ -177,8 +158,9 @@ class ImpulseSteps:
     def beginning(self, span: float, *, convex: bool) -> Impulses:
         """Impulses of a short time from now on, with the turning of the contacts (J̇v); open gaps stay open."""
         terms = self.terms(self.q, self.v, span)
-        shifts = [change for changes in self._turning(self.q, self.v, terms, span) for change in changes]
-        shifts += [0.0] * len(self.joints.J)
+        shifts = [0.0] * len(terms.rows)
+        for rows, changes in zip(self._rows, self._turning(self.q, self.v, terms, span), strict=False):
+            shifts[rows[-3] : rows[-1] + 1] = changes
         apart = [touch.absent or touch.gap > self._touching for touch in terms.touching]
         apart += [False] * len(self.joints.friction) + [not item.closed(self.q) for item in self.joints.stops]
         for rows in compress(self._rows, apart):
@@ -201,7 +183,7 @@ class ImpulseSteps:
             "contact_place": place,
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
             "contact_restitution": self.restitution.copy(),
-            "contact_rolling": rolling_levers(self._moments.frictions, len(touching)),
+            "contact_rolling": rolling_levers(self._moments.frictions, len(touching)) + self.sharing.rolling,
             "contact_tangential": np.array([contact.tangential_restitution for contact in self.contacts]),
             "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
         }
@@ -222,8 +204,12 @@ class ImpulseSteps:
         pin.computeJointJacobians(model, data, q)
         frames, all_of = [frame_of_axis(point.normal) for point in touching], self._solver(self._all)
         contact_rows = [self._posed(all_of, k, *placed) for k, placed in enumerate(zip(touching, frames, strict=True))]
+        if self.sharing:
+            contact_rows = [
+                row for k, rows in enumerate(contact_rows) for row in (self.sharing.rows(data, k, frames[k]), rows)
+            ]
         rows = np.concatenate([*contact_rows, self.joints.J])
-        J = rows[: 3 * len(frames)].reshape(-1, 3, model.nv)
+        J = rows[self._slides if self.sharing else slice(len(self._slides))].reshape(-1, 3, model.nv)
         return StepTerms(rows=rows, J=J, free=free, inverse=inverse, touching=touching, frames=frames)
 
     def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
@@ -350,7 +336,7 @@ class ImpulseSteps:
         if not self._moments.frictions:
             return self._solved(terms, shifts, span, convex=convex)
         J, free, inverse, touching = terms.J, terms.free, terms.inverse, terms.touching
-        rows, count = self._moments.rows(self._data, terms.touching, terms.frames, J), len(touching)
+        rows = self._moments.rows(self._data, terms.touching, terms.frames, J)
         approach, soft_speed = J[:, 2] @ v, -_SOFT * self._gravity * span
         soft = approach >= soft_speed
         if not soft.all():  # a curved wall turns away from a fast ball
@@ -368,7 +354,7 @@ class ImpulseSteps:
             return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(sticking_rows), kick.states)
 
         moments, impulses = self._moments.found(rows, v, inverse, pressed, self.t)
-        by_contact = np.zeros((count, 3))
+        by_contact = kicks[0].moment.copy()
         np.add.at(by_contact, self._pressed_by, moments)
         driving = kicks[0].driving - self._motions[1].T @ impulses
         return kicks[0]._replace(moment=by_contact, driving=driving)
@@ -380,6 +366,7 @@ class ImpulseSteps:
         rubs = count + len(self.joints.friction)
         gaps = [k for k in (*self._all, *range(rubs, len(own_rows))) if math.isfinite(shifts[own_rows[k][-1]])]
         impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(own_rows) - count), tuple(range(count, rubs))
+        moment = np.zeros((count, 3))
         states = [OPEN] * count
         grown, pushed = bool(which), np.zeros(len(free))
         alone, motor_responses = self._motions
@@ -396,9 +383,9 @@ class ImpulseSteps:
                 driving = alone - motor_responses.T @ pushed if alone.size else alone
                 for k, held in enumerate(self._held):
                     if states[k] == SLIP:
-                        slips = [speeds[row] + shifts[row] for row in own_rows[k][:2]]
+                        slips = [speeds[row] + shifts[row] for row in own_rows[k][:-1]]
                         states[k] = STICK if math.hypot(*slips) <= held else SLIP
-                moment, seen = np.zeros((count, 3)), tuple(states)
+                seen = tuple(states)
                 return Impulses(v=v, impulse=impulse, states=seen, moment=moment, along=along_rows, driving=driving)
             which, grown = tuple(sorted(closing.union(which))), False
             parts = self._solver(which)
@@ -407,12 +394,15 @@ class ImpulseSteps:
             got = self._by_any(which, chosen @ to_joints, g, terms, span, convex=convex)
             v, pushed = free + to_joints @ got, chosen.T @ got if alone.size else pushed
             speeds, sizes = (rows @ v).tolist(), got.tolist()
-            impulse[:], along_rows[:] = 0.0, 0.0
+            impulse[:], moment[:], along_rows[:] = 0.0, 0.0, 0.0
             for end, k in zip(parts.ends, which, strict=True):
                 if k < count:
                     impulse[k] = frames[k] @ got[end - 3 : end]
-                    F1, F2, N = sizes[end - 3 : end]
-                    states[k] = step_events.state_of(N, math.hypot(F1, F2), _INSIDE * self.contacts[k].friction * N)
+                    turns, (F1, F2, N) = got[end - len(own_rows[k]) : end - 3], sizes[end - 3 : end]
+                    F, bound = math.hypot(F1, F2, *turns), _INSIDE * self.contacts[k].friction * N
+                    states[k] = step_events.state_of(N, F, bound)
+                    if turns.size:
+                        moment[k] = self.sharing.moment(k, frames[k], turns)
                 else:
                     along_rows[k - count] = sizes[end - 1]
 
@@ -424,7 +414,7 @@ class ImpulseSteps:
         Raises:
             Diverged: neither finds them.
         """
-        if not self.blocks.solved:
+        if not self.blocks.solved and not self.sharing:
             try:
                 return self._found(which, G, g, terms, span, convex=convex)
             except Diverged:
@@ -434,7 +424,8 @@ class ImpulseSteps:
         for k, end in zip(which, self._solver(which).ends, strict=True):
             if k < count:
                 self._check(k, diagonal[end - 3 : end].tolist(), terms.touching[k].flat)
-                parts[k] = Block(end - 3, self._friction(k))
+                turns = self.sharing.turns[k]
+                parts[k] = Block(end - 3 - turns, self._friction(k), turns=turns)
             else:
                 rubs = k < count + len(rubbing)
                 parts[k] = Block(end - 1, None, span * rubbing[k - count].joint.friction if rubs else math.inf)
@@ -451,6 +442,7 @@ class ImpulseSteps:
         Raises:
             Diverged: Pinocchio's solver does not find them.
         """
+        self.sharing.require_none(self.t)
         count, solver = len(self.contacts), self._solver(which)
         # Pinocchio's tolerances and regularisations are numbers without scale: 1e-8, below which its ADMM adapts
         # its penalty the wrong way, would be a large part of the impulses of short steps or light bodies. In these

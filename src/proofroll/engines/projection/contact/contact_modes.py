@@ -42,7 +42,7 @@ from proofroll.elements.mechanism.contact.start import closed_and_still, natural
 from proofroll.elements.mechanism.contact.touching import Touching, torn
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.elements.mechanism.scene.shapes.geometry import coefficients_of
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.signal import breaks, varies
 from proofroll.engines.projection.contact.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.contact.contact_geometry import ContactGeometry
@@ -450,3 +450,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             direction = -force[place, 1:] if slides is None else slides
             mode[k] = first_mode(done[place], frame, direction, frame.T @ response @ frame)
         return tuple(mode)
+
+
+def coefficients_of(contacts: Sequence[BodyContact]) -> dict[str, Array]:
+    """Coefficients of contacts by their names in :class:`.MechanismBuilt`."""
+    laws = {"friction": "friction", "restitution": "restitution", "static": "static"}
+    laws["tangential"] = "tangential_restitution"
+    return {f"contact_{name}": np.array([getattr(contact, law) for contact in contacts]) for name, law in laws.items()}

@@ -14,12 +14,12 @@ from typing_extensions import override
 from proofroll.core.arrays import cross, read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism.scene import checks, rotations
-from proofroll.elements.mechanism.scene.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Against, Vector, Z
+from proofroll.elements.mechanism.scene.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Against, Cone, Vector, Z
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.box_features import BoxSlot
 from proofroll.elements.mechanism.scene.shapes.capsule_box import CapsuleBoxSlot
 from proofroll.elements.mechanism.scene.shapes.features import SolidFeatures, features_between
-from proofroll.elements.mechanism.scene.shapes.pair_rules import CURVED, require_rule
+from proofroll.elements.mechanism.scene.shapes.pair_rules import CURVED, check_shared, require_rule
 from proofroll.elements.mechanism.scene.shapes.shapes import (
     BoxShape,
     CapsuleShape,
@@ -251,6 +251,9 @@ class Pair:
         spinning_friction: largest moment against spin about the normal over the normal force [m].
         against: law of rolling resistance where the pair slips: against the ``turning`` of the bodies, or against the
             ``motion`` of a ball's centre over a plane or a curved wall; while a ball rolls both are one.
+        cone: bounds of friction. "separate": sliding, spin and rolling have their own ones; "shared": what one takes
+            the others lack, as force over ``friction`` and moments over their coefficients are together at most the
+            normal force, by the root of the sum of their squares, and oppose slip and turning with most power.
     """
 
     name: str
@@ -262,6 +265,7 @@ class Pair:
     rolling_resistance: float = field(default=0.0, metadata=METRES)
     spinning_friction: float = field(default=0.0, metadata=METRES)
     against: Against = "turning"
+    cone: Cone = "separate"
 
     def __post_init__(self) -> None:
         where = f"pairs.{checks.name(self.name, 'pairs')}"
@@ -271,6 +275,9 @@ class Pair:
         checks.read(self, where, checks.number, "friction", at_least=0, bounded=False)
         checks.read(self, where, checks.number, "rolling_resistance", "spinning_friction", at_least=0)
         require_known(f"{where}.against", self.against, get_args(Against))
+        require_known(f"{where}.cone", self.cone, get_args(Cone))
+        if self.cone == "shared":
+            check_shared(where, self)
         checks.read(self, where, checks.number, "restitution", at_least=0)
         if self.restitution > 1:
             advice = "no impact returns more than it takes; give 0 to 1"
@@ -292,6 +299,8 @@ class Pair:
 
     def with_friction(self, friction: float) -> Pair:
         """The pair with another coefficient; its static one changes by the same factor."""
+        if self.cone == "shared" and not friction:
+            return Pair(self.name, self.geometries, friction, self.restitution)
         if self.static_friction is None or not friction:
             return replace(self, friction=friction, static_friction=None)
         return replace(self, friction=friction, static_friction=self.static * friction / self.friction)
@@ -311,7 +320,7 @@ class BodyContact:
         static_friction: coefficient while it sticks; None: the same.
         tangential_restitution: of the pair.
         rolling_resistance, spinning_friction: of the pair [m].
-        against: see :class:`Pair`.
+        against, cone: see :class:`Pair`.
         slot: number among the contacts of two boxes, or of a box and a capsule.
         bound: largest friction without a normal force; always 0 between bodies [N].
         presses: True, as it has a normal force.
@@ -334,7 +343,16 @@ class BodyContact:
     rolling_resistance: float = 0.0
     spinning_friction: float = 0.0
     against: Against = "turning"
+    cone: Cone = "separate"
     slot: int = 0
+
+    @property
+    def shared_arms(self) -> tuple[float, ...]:
+        """Moments that a shared cone holds over its force of sliding [m]: of spin, and of rolling about two axes."""
+        if self.cone == "separate":
+            return ()
+        rolling = (self.rolling_resistance,) * 2 if self.rolling_resistance else ()
+        return tuple(moment / self.friction for moment in (self.spinning_friction, *rolling))
 
     @property
     def static(self) -> float:
@@ -417,17 +435,11 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
                     rolling_resistance=pair.rolling_resistance,
                     spinning_friction=pair.spinning_friction,
                     against=pair.against,
+                    cone=pair.cone,
                     slot=number - 1,
                 )
             )
     return tuple(contacts)
-
-
-def coefficients_of(contacts: Sequence[BodyContact]) -> dict[str, Array]:
-    """Coefficients of contacts by their names in :class:`.MechanismBuilt`."""
-    laws = {"friction": "friction", "restitution": "restitution", "static": "static"}
-    laws["tangential"] = "tangential_restitution"
-    return {f"contact_{name}": np.array([getattr(contact, law) for contact in contacts]) for name, law in laws.items()}
 
 
 def shared_pairs(contacts: Sequence[BodyContact]) -> dict[str, list[int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from proofroll.core.errors import InputError
@@ -46,14 +47,25 @@ def require_rule(key: str, pair: Pair, a: Geometry, b: Geometry) -> None:
         raise InputError(f"pairs.{pair.name}.against", pair.against, advice)
 
 
+def check_shared(where: str, pair: Pair) -> None:
+    """Raises InputError for laws of a pair that a shared cone has not."""
+    for key in ("friction", "spinning_friction"):
+        if not 0 < getattr(pair, key) < math.inf:
+            advice = "a shared cone needs one above 0, and finite; give it, or leave cone out"
+            raise InputError(f"{where}.{key}", getattr(pair, key), advice)
+    for key, default in (("static_friction", None), ("against", "turning"), ("tangential_restitution", 0.0)):
+        if getattr(pair, key) != default:
+            raise InputError(f"{where}.{key}", getattr(pair, key), "a shared cone has none; leave it out")
+
+
 def _require_one_place(pair: Pair, kinds: set[GeometryKind]) -> None:
     """Raises InputError for friction against turning at both ends of a capsule or cylinder, or between boxes."""
     long_body = next(iter(kinds & {"capsule", "cylinder"}), None) if "plane" in kinds else None
     several = "boxes and capsules touch at several places" if "box" in kinds <= {"capsule", "box"} else ""
     several = f"a {long_body} touches at two ends" if long_body else several
     for key in ("rolling_resistance", "spinning_friction"):
-        if several and getattr(pair, key):
-            advice = f"{several}, whose moments are not followed together; leave it out"
+        if several and getattr(pair, key) and pair.cone != "shared":
+            advice = f'{several}, whose moments are not followed together; leave it out, or give cone = "shared"'
             raise InputError(f"pairs.{pair.name}.{key}", getattr(pair, key), advice)
 
 
