@@ -164,8 +164,8 @@ def _name_of(command: Any) -> str:
 
 # Cached: a call of ``app`` would make all commands again, which takes longer than many of them.
 @cache
-def _made(commands: typer.Typer, named: str) -> Any:
-    """The commands, or only the one that is ``named``, if there is one: making all takes a fifth of a short run."""
+def _made(commands: typer.Typer, named: str = "") -> Any:
+    """The commands, or only the one that is ``named``, if there is one, as making all takes a fifth of ``--help``."""
     alone = copy.copy(commands)
     alone.registered_commands = [item for item in commands.registered_commands if _name_of(item) == named]
     alone.registered_groups = [item for item in commands.registered_groups if item.name == named]

@@ -89,7 +89,7 @@ def run(
     from proofroll.studies.cases import scene_of_run, single_case
 
     chosen, asks = options.assignments(settings), tuple(dict.fromkeys(ask or []))
-    scene_of_run(scene, chosen, asks)  # a mistyped name is answered before more is imported
+    loaded = scene_of_run(scene, chosen, asks)  # a mistyped name is answered before more is imported
     if control is not None or settings:
         options.doubt_numbers(scene, settings)
 
@@ -116,12 +116,13 @@ def run(
             time_limit=time_limit,
             asks=asks,
             workers=workers,
+            loaded=loaded,
         )
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"run{STORED}"
         with options.spinner(f"{scene} in {case.engine.name}"):
             result = run_one(case, target, workers)
-        content = run_content(case, result, target)
+        content = run_content(case, result, target, loaded)
         if result.trajectory is not None:
             path_of_scene = {"scene_path": resolved(scene)} if scene not in scene_names() else {}
             content = _written(content, target, path_of_scene, trajectories, events=events, plot=plot)

@@ -12,6 +12,7 @@ AT = "truth at "  # beginning of a line that a worker prints about it
 # Route -> part of the limit that is used when it ends; of a smooth motion the second is followed twice, and sampled.
 _ROUTES = {"first": 0.5, "second": 1.0}
 _SMOOTH = 0.55
+_CHECKED = "its end, held against the laws"
 
 
 class OutOfTime(Diverged):
@@ -23,7 +24,7 @@ class Pace:
 
     Attributes:
         until: last time of the truth [s].
-        text: time that is reached and time that is still needed; empty: no truth is being followed.
+        text: time that is reached and time that is still needed, or that routes have ended; empty: no truth is made.
         over: True if the last truth was ended by its limit.
         aloud: True in a worker, whose lines the process that started it reads.
     """
@@ -48,7 +49,7 @@ class Pace:
             yield
         finally:
             self._limit = math.inf
-            self.leave()
+            self._route = self.text = ""
             self._tell("")  # what was told before is over
 
     def follow(self, route: str, end: float, *, smooth: bool = False) -> None:
@@ -60,8 +61,10 @@ class Pace:
         self._part = _ROUTES[route] * (_SMOOTH if smooth else 1.0)
 
     def leave(self) -> None:
-        """Ends a route: what follows has no limit."""
-        self._route = self.text = ""
+        """Ends a route: what follows, which may take as long, has no limit and no forecast."""
+        self._route, self.text = "", _CHECKED if self.text and self._limit < math.inf else ""
+        if self.text:
+            self._tell(self.text)
 
     def reached(self, t: float) -> None:
         """Records the time that a route has reached, in its own unit.

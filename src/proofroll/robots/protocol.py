@@ -114,7 +114,8 @@ class RobotReader(Protocol):
     A reader may have ``as_written(request)``, which loads the user's own file as a user of the engine would, and
     returns a :class:`Whole`; :meth:`read` gets a copy without looks, contacts and meshes that give no mass.
 
-    A reader whose engine has no importer, and that feeds it from ``request.robot``, sets ``fed = True``.
+    A reader whose engine has no importer, and that feeds it from ``request.robot``, sets ``fed = True``. One with the
+    engine's name for people as ``title`` spares the command from loading the engine for it.
 
     Attributes:
         kinds: formats that it reads.

@@ -82,7 +82,7 @@ class EngineFacts:
     Attributes:
         name: of the engine; with ``@`` and the place of its interpreter, if another one, ``mujoco@3.8.1``.
         version: of the engine.
-        code: hash of the adapter and of all code that it runs on; a change invalidates stored results.
+        code: hash of the adapter and of all code that it runs on; a change invalidates stored results; or empty.
         settings: complete settings of the formulation, by name.
         resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
         order: declared order of convergence, or None.

@@ -98,13 +98,17 @@ def describe_each(
 
 
 def resolve(
-    engines: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None = None, requires: Collection[str] = ()
+    engines: Sequence[tuple[str, Mapping[str, Any]]],
+    workers: Workers | None = None,
+    requires: Collection[str] = (),
+    *,
+    stored: bool = True,
 ) -> list[EngineFacts | ProofrollError]:
     """Complete settings and facts for engines with options, or an error for each, in the order given.
 
-    Without a given formulation, what the scene ``requires`` decides it.
+    Without a given formulation, what the scene ``requires`` decides it; ``stored``: False for runs that are not stored.
     """
-    common = {"do": "resolve", "requires": sorted(requires)}
+    common = {"do": "resolve", "requires": sorted(requires), "stored": stored}
     requests = [(name, {**common, "engine": name, "options": dict(options)}) for name, options in engines]
     answers = _answers(requests, workers)
     facts = [answer if isinstance(answer, ProofrollError) else EngineFacts(**answer) for answer in answers]
@@ -147,7 +151,7 @@ def prepare(engine: str, workers: Workers) -> None:
     """
     with contextlib.suppress(ProofrollError):
         name = parse_engine(engine).name
-        _ask(name, {"do": "resolve", "engine": name, "options": {}}, workers, HELLO_TIME_LIMIT)
+        _ask(name, {"do": "resolve", "engine": name, "options": {}, "stored": False}, workers, HELLO_TIME_LIMIT)
         if name == "truth":
             importing = {"function": "proofroll.files.trajectory_file:import_xarray", "arguments": {}}
             _ask(name, {"do": "call", **importing}, workers, HELLO_TIME_LIMIT)

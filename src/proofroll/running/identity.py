@@ -65,8 +65,13 @@ def describe(engine: str) -> dict[str, Any]:
     return dataclasses.asdict(description)
 
 
-def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) -> dict[str, Any]:
-    """Complete settings of an engine and further facts that decide its results (fields of :class:`EngineFacts`)."""
+def resolve(
+    engine: str, options: dict[str, Any], requires: Sequence[str] = (), *, stored: bool = True
+) -> dict[str, Any]:
+    """Complete settings of an engine and further facts that decide its results (fields of :class:`EngineFacts`).
+
+    ``stored``: False for a run that is not stored, which needs no hash of code.
+    """
     if engine == "truth":
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
@@ -91,7 +96,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
     facts = EngineFacts(
         name=engine,
         version=kind.version(),
-        code=_code_of(kind, *([added.build] if added else [])),
+        code=_code_of(kind, *([added.build] if added else [])) if stored else "",
         settings=used(settings),
         resolution=settings.resolution,
         order=settings.order,

@@ -79,8 +79,9 @@ def single_case(
     time_limit: float,
     asks: Sequence[str] = (),
     workers: Workers | None = None,
+    loaded: Scene | None = None,
 ) -> Case:
-    """Case of one run on the command line.
+    """Case of one run on the command line, which is not stored.
 
     Args:
         scene: name or path.
@@ -91,6 +92,7 @@ def single_case(
         time_limit: wall time of the run [s].
         asks: results wanted besides the motion.
         workers: pool of the worker that is asked for the settings, so that it can also run the case; None: a new one.
+        loaded: the scene with these parameters, if it was loaded before.
 
     Raises:
         InputError, Missing: an argument names something unknown or makes no sense.
@@ -98,8 +100,8 @@ def single_case(
     if not 0 < time_limit <= threading.TIMEOUT_MAX:
         raise InputError("time_limit", time_limit, "give a positive, finite time in s")
     spec = parse_engine(engine)
-    loaded = scene_of_run(scene, parameters, asks)
-    facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
+    loaded = loaded or scene_of_run(scene, parameters, asks)
+    facts = resolve([(spec.name, spec.options)], workers, loaded.requires, stored=False)[0]
     if isinstance(facts, ProofrollError):
         raise facts
     facts = on_scene(facts, loaded, workers) if facts.name == "truth" else facts

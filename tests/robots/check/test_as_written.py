@@ -26,14 +26,16 @@ def _rows(path: Path, *engines: str, **given: Any) -> dict[str, ImporterRow]:
     return {row.engine: row for row in check.check(path, engines, CheckSettings(states=2, **given)).engines}
 
 
-def test_read(tmp_path: Path) -> None:
-    """An engine that reads the file as it is says so; one that is fed says nothing."""
+def test_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An engine that reads the file as it is says so; one that is fed says nothing; all say their names for people."""
+    monkeypatch.setattr("proofroll.robots.files.reading.KNOWN_TITLES", titles := dict[str, str]())
     path = tmp_path / "robot.xml"
     path.write_text(mjcf())
     rows = _rows(path, "mujoco", "pinocchio", "exudyn")
     assert {name: row.as_written for name, row in rows.items()} == {
         "mujoco": "read", "pinocchio": "read", "exudyn": None,
     }  # fmt: skip
+    assert titles == {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn"}
 
 
 def test_what_no_joint_moves_has_no_part(tmp_path: Path) -> None:

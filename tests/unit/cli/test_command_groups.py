@@ -21,7 +21,7 @@ def test_every_command_has_one_group() -> None:
     """Each command that is installed here is in one group by name."""
     named = [name for names in GROUPS.values() for name in names]
     assert len(named) == len(set(named))
-    assert set(_made(app, "").commands) <= set(named)
+    assert set(_made(app).commands) <= set(named)
 
 
 def test_the_commands_fit_a_screen(proofroll: Proofroll) -> None:
@@ -39,7 +39,7 @@ def test_an_old_command_is_answered_by_the_new_one(proofroll: Proofroll, name: s
     assert (code, out, err) == (2, "", f"proofroll: {name} is now {NOW[name]}\n")
     program, *words = shlex.split(NOW[name].partition(";")[0].partition(",")[0])
     if program == "proofroll":
-        known = _made(app, "").commands
+        known = _made(app).commands
         assert words[0] in known
         options = {option for item in known[words[0]].params for option in item.opts}
         assert {word for word in words if word.startswith("--")} <= options
@@ -55,11 +55,24 @@ def test_a_command_whose_package_is_lacking_names_it(
     """Without the package that announces a command, one line says from where to install it; both places are there."""
     project = tomllib.loads((_PACKAGES[name] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert name in project["entry-points"]["proofroll.commands"]
-    monkeypatch.delitem(_made(app, name).commands, name)
+    left = [item for item in app.registered_groups if item.name != name]
+    monkeypatch.setattr(app, "registered_groups", left)
+    monkeypatch.setattr(app, "registered_commands", [item for item in app.registered_commands if item.name != name])
+    monkeypatch.setattr("proofroll.cli._made", _made.__wrapped__)
     code, out, err = proofroll(name, "--json")
     assert (code, out, err) == (2, "", f"proofroll: {name} is now {NOW[name]}\n")
     assert f"pip install {project['name']};" in err
     assert ROOT / err.split()[-1] == _PACKAGES[name]
+
+
+def test_the_command_that_is_asked_for_is_made_alone() -> None:
+    """A known name makes its own command with all options, as all are made otherwise."""
+    every = _made(app).commands
+    for name, command in every.items():
+        (alone,) = _made(app, name).commands.values()
+        assert [item.opts for item in alone.params] == [item.opts for item in command.params]
+        assert alone.short_help == command.short_help
+    assert _made(app, "comparre").commands.keys() == every.keys()
 
 
 def test_another_command_is_unknown() -> None:

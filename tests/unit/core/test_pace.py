@@ -28,8 +28,10 @@ def test_it_says_how_far_a_truth_has_come() -> None:
         pace.follow("second", 2.0)
         for step in range(200):
             pace.reached(1.0 + step / 200)
+        pace.leave()
     # half of the first route took a second: as much again is left of it, and twice that for the second route
-    assert told == ["1.98 of 4 s, about 3 s left", "2.98 of 4 s, about 1 s left", "3.99 of 4 s, about 0 s left", ""]
+    texts = ["1.98 of 4 s, about 3 s left", "2.98 of 4 s, about 1 s left", "3.99 of 4 s, about 0 s left"]
+    assert told == [*texts, "its end, held against the laws", ""]
     assert pace.text == ""
 
 

@@ -87,9 +87,9 @@ class RunContent:
     quiet: str | None = field(default=None, metadata=OPTIONAL)
 
 
-def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
-    """Content of a case and its result; ``trajectory``: path of its stored trajectory."""
-    scene = load_scene(case.scene, asks=case.asks, **case.parameters)
+def run_content(case: Case, result: Result, trajectory: Path, loaded: Scene | None = None) -> RunContent:
+    """Content of a case and its result; ``trajectory``: path of its stored trajectory, ``loaded``: the case's scene."""
+    scene = loaded or load_scene(case.scene, asks=case.asks, **case.parameters)
     causes = diagnose_scene(scene, result.certificate) if result.trajectory is None and result.certificate else []
     content = RunContent(
         scene=case.scene,

@@ -13,6 +13,7 @@ import numpy as np
 
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, Refused, require_known
+from proofroll.core.plugins import KNOWN_TITLES, plain_name
 from proofroll.files.json_data import plain
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.model import Cord, Mimic, Robot, RobotActuator, RobotBody, RobotJoint, RobotLoop, Tie
@@ -90,6 +91,8 @@ def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit:
     asked, arrays = folder / "request.json", folder / "answer.npz"
     asked.write_text(json.dumps(plain(request) | {"path": str(request.path)}), encoding="utf-8")
     answer = worker.request(call(read_robot, engine=engine, asked=str(asked), arrays=str(arrays)), time_limit)
+    if answer["title"]:  # without it, readers of the answer load the engine for its name
+        KNOWN_TITLES[plain_name(engine)] = answer["title"]
     reading = None
     if not answer["refused"]:
         with np.load(arrays, allow_pickle=False) as stored:
@@ -113,7 +116,7 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     if request.kind not in reader.kinds:
         raise Missing(f"{engine} reads no {request.kind.upper()}")
     answer: dict[str, Any] = {"version": reader.version(), "says": reader.says, "tolerances": dict(reader.tolerances)}
-    answer["fed"] = getattr(reader, "fed", False)
+    answer |= {"fed": getattr(reader, "fed", False), "title": getattr(reader, "title", "")}
     try:
         with contextlib.chdir(Path(arrays).parent):  # where an engine may leave its log
             reading = reader.read(request)

@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from proofroll.robots.hypotheses import RobotEvidence, hypothesis
@@ -12,6 +11,8 @@ from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody
 
 def _moments(inertia: Array) -> Array:
     """Principal moments, each at the index of the coordinate axis nearest to its own axis, shape (3,)."""
+    from scipy.optimize import linear_sum_assignment  # a tenth of a second, which few checks need
+
     values, axes = np.linalg.eigh(inertia)
     _, order = linear_sum_assignment(-np.abs(axes))
     return np.asarray(values[order])

@@ -30,6 +30,7 @@ class ExudynRobots:
     Single joints are about or along z. A ball joint is three hinges about x, y, z; a free joint has three slides first.
     """
 
+    title: ClassVar[str] = "Exudyn"
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
     fed: ClassVar[bool] = True
     options: ClassVar[Mapping[str, str]] = {}

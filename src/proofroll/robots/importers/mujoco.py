@@ -39,6 +39,7 @@ _NOT_COMPARED = ("EQUALITY", "LIMIT", "CONTACT", "ACTUATION")
 class MujocoRobots:
     """Robot files as MuJoCo's compiler reads them."""
 
+    title: ClassVar[str] = "MuJoCo"
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
     defines: ClassVar[str] = "mjcf"
     options: ClassVar[Mapping[str, str]] = {

@@ -16,6 +16,7 @@ from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 class PinocchioRobots:
     """Robot files as ``buildModelFromUrdf`` and ``buildModelFromMJCF`` read them."""
 
+    title: ClassVar[str] = "Pinocchio"
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
     options: ClassVar[Mapping[str, str]] = {"mimic": "reduce following joints (default: they move freely)"}
     tolerances: ClassVar[Mapping[str, float]] = {}

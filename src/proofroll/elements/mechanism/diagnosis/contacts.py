@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray, longest
-from proofroll.core.diagnosis import Cause, Difference, Evidence, hypothesis
+from proofroll.core.diagnosis import METHOD, Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.fitting import cached_on_evidence, change_by, factor_text
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
@@ -149,7 +149,8 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
             says = f"friction of {name} is {'off' if off else factor_text(factor)}"
             remainder = longest(T - (0.0 if off else factor) * full)
             remedy, change = "give each pair its own coefficient", change_by(factor)
-            friction = Difference("friction of what slides", "N", longest(T - full), COVERS)
+            # one number takes away a part of any difference; of a right one the error of the step alone is left
+            friction = Difference("friction of what slides", "N", longest(T - full), COVERS, closes=METHOD)
             yield friction.cause("friction", says, remainder, remedy, 0 if off else 1, change=change)
 
 

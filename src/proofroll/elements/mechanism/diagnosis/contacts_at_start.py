@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, longest
-from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, hypothesis
+from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.fitting import (
     change_by,
     factor_text,
@@ -45,8 +45,13 @@ class _FirstAccelerations:
         self.pairs: Sequence[Any] = self.mechanism.pairs
         self._found = accelerations * np.array([1.0, 1.0, 1.0, *[self.element.length] * 3])
         # beyond the allowance of a line nothing is the error of a step, however near to the scene's
-        self._wrong = any(OF_FIRST_STEPS in str(line["quantity"]) and not line["holds"] for line in evidence.lines)
+        lines = [line for line in evidence.lines if OF_FIRST_STEPS in str(line["quantity"])]
+        self._wrong = any(not line["holds"] for line in lines)
         self.before = self.off(self.pairs)
+        # what the steps from which the accelerations come, and round-off, leave of a right cause
+        motion, allowed = self.element.first_motion, max((float(line["tolerance"]) for line in lines), default=0.0)
+        size = max(motion.scale, self.element.length * longest(motion.angular_acceleration))
+        self._left = max(allowed * size, CLOSES_EXACTLY * self.before)
 
     def apart(self, pairs: Sequence[Any], geometries: Sequence[Any] | None = None) -> FloatArray:
         """Accelerations [m/s²] of a mechanism with these contacts minus those of the run; inf if it is refused."""
@@ -73,7 +78,11 @@ class _FirstAccelerations:
     def cause(
         self, says: str, remainder: float, remedy: str, number: int = 0, change: float = np.inf, closes: float = CLOSES
     ) -> Cause:
-        """Cause that leaves ``remainder`` of the accelerations, with ``number`` fitted values."""
+        """Cause that leaves ``remainder`` of the accelerations, with ``number`` fitted values.
+
+        It may leave no more than the steps and round-off do: a fitted number takes away a part of any difference.
+        """
+        closes = min(closes, self._left / self.before)
         off = Difference("acceleration at time 0", "m/s^2", self.before, COVERS, closes=closes)
         change, explains = np.inf if self._wrong else change, self._found.size
         return off.cause("contacts at time 0", says, remainder, remedy, number, explains=explains, change=change)

@@ -14,7 +14,7 @@ from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.mechanism.diagnosis.contacts import convex_cone_from_rest
+from proofroll.elements.mechanism.diagnosis.contacts import convex_cone_from_rest, friction_factor
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
@@ -79,6 +79,20 @@ def test_creep_of_a_regularised_law_is_named_with_its_speed() -> None:
     for settled in (frozenset[str](), frozenset({"positions"})):
         causes = diagnose(Evidence(element, [], run, true, 1e-3, settled), hypotheses_of(element))
         assert any("stick creep at 0.0001 m/s" in cause.says for cause in causes) == (not settled), causes
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize(("unexplained", "proven"), [(0.0, True), (0.03, False)])
+def test_a_factor_of_friction_leaves_no_more_than_a_step_does(unexplained: float, proven: bool) -> None:
+    """Halved friction is named from the forces of a run; a factor that leaves 3 % of the difference is by chance."""
+    scene, times = load_scene("sled"), np.linspace(0, 0.1, 11)
+    run, true = truth(load_scene("sled", friction=scene.parameters["friction"] / 2), times), truth(scene, times)
+    force = run["contact_forces"].to_numpy().copy()
+    across = np.linspace(-1, 1, force[..., 0].size).reshape(force.shape[:-1])  # along the floor, in no law
+    force[..., 0] += unexplained * across * np.abs(force[..., :2]).max()
+    run["contact_forces"] = (run["contact_forces"].dims, force, run["contact_forces"].attrs)
+    causes = list(friction_factor.test(Evidence(scene.elements[0], [], run, true, 1e-3)))
+    assert [cause.says for cause in causes if cause.proven][:1] == ["friction of all contacts is halved"] * proven
 
 
 BOX = """
