@@ -376,7 +376,7 @@ def test_what_is_not_judged_is_named() -> None:
     assert found.agrees
     assert str(found).splitlines()[2:] == [
         "  not judged: q.pviot; the truth has nothing of that name",
-        "  not judged: v.pivot; no tolerance is given for it",
+        "  not judged: v.pivot; no tolerance is given",
     ]
     assert not proofroll.judge(own, "pendulum", {"q.pivot": "1e-6 rad"}).unjudged
     run = proofroll.simulate("pendulum", "projection", until=0.1)
@@ -384,7 +384,7 @@ def test_what_is_not_judged_is_named() -> None:
     state = {name: run[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB", "energy")}
     assert proofroll.judge(state, "pendulum").unjudged == {"energy": "it follows from the state, which is judged"}
     of_places = proofroll.judge(state, "pendulum", {"positions": "1 %"}).unjudged
-    assert of_places == dict.fromkeys(("p_WB", "v_WB", "w_WB", "q_WB", "energy"), "no tolerance is given for it")
+    assert of_places == dict.fromkeys(("p_WB", "v_WB", "w_WB", "q_WB", "energy"), "no tolerance is given")
 
 
 @pytest.mark.nightly
@@ -395,7 +395,7 @@ def test_bodies_beside_the_tracked_points_are_named_where_no_tolerance_judges_th
     state["p_WB"] = state["p_WB"] + np.array([1.0, 0.0, 0.0]) * (np.arange(3) == 0)[:, None]
     found = proofroll.judge(state, "slider_crank", {"positions": "1 mm"})
     assert found.agrees
-    assert str(found).endswith("not judged: p_WB, v_WB, w_WB, q_WB; no tolerance is given for it")
+    assert str(found).endswith("not judged: p_WB, v_WB, w_WB, q_WB; no tolerance is given")
     assert not proofroll.judge(state, "slider_crank").agrees
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import itertools
 import json
 import subprocess
@@ -358,18 +359,23 @@ def test_only_some_groups_of_scenes_are_run(proofroll: Proofroll, tmp_path: Path
     assert _of_groups([claim, other], "ball rolling") == [claim]
 
 
-@pytest.mark.nightly
+@pytest.mark.drill
 def test_each_scene_is_searched_for_the_first_screen(proofroll: Proofroll, tmp_path: Path) -> None:
-    """Page, terminal and JSON have one sentence from one record, which recommend prints, too, and compare first."""
-    given = ["double_pendulum", "--tolerance", "1e-4", "--engine", "mujoco", "--out", str(tmp_path)]
-    code, recommended, err = proofroll("recommend", *given)
+    """Page, terminal and JSON have one sentence from one record, which recommend and compare find and print, too."""
+    given = ["double_pendulum", "--engine", "mujoco", "--out", str(tmp_path)]
+    code, said, err = proofroll("report", *given, "--tolerance", "1e-4")
     assert code == 0, err
-    code, said, err = proofroll("report", *given)
+    code, recommended, err = proofroll("recommend", *given, "--tolerance", "1e-4")
+    assert (code, err) == (0, "")
+    code, compared, err = proofroll("compare", *given)
     assert code == 0, err
     content = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     (entry,) = content["answers"]
     sentence = entry["sentence"]
     assert sentence.startswith("Take MuJoCo joints, ")
     assert f"double pendulum: {sentence}" in " ".join(said.split())
-    assert entry["answer"]["engines"][0]["spec"] in whole((tmp_path / "report.html").read_text(encoding="utf-8"))
+    page = whole((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert entry["answer"]["engines"][0]["spec"] in page
+    assert sentence in html.unescape(page)
     assert " ".join(recommended.split()).startswith(sentence)
+    assert " ".join(compared.split()).startswith(f"To 1e-4 of the path: {sentence}")

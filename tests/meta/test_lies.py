@@ -166,7 +166,7 @@ UNASKED = [
     ("rolls", "spins x 3 between samples", "w_WB is"),
     ("tree", "moments + 5 N m", "torques are"),
     ("bounces", "right on the grid alone, an impact in each interval", "positions are"),
-    ("slips", "nothing", "not judged: event_times, event_order; no tolerance is given for it"),
+    ("slips", "nothing", "not judged: event_times, event_order; no tolerance is given"),
 ]
 
 

@@ -12,7 +12,15 @@ import pytest
 from browsing import UNDRAWN, Visit
 from invented_answers import FINER, HELD, THROUGH, reported, scene_answer
 
-from proofroll.report.page.first_screen import FirstScreen, ReportedAnswer, answers_sentence, bar, figure_of, how
+from proofroll.report.page.first_screen import (
+    FirstScreen,
+    ReportedAnswer,
+    answers_sentence,
+    bar,
+    figure_of,
+    how,
+    place_words,
+)
 from proofroll.studies.answer.setting_search import State
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
@@ -32,16 +40,25 @@ def test_a_chip_for_each_engine_and_one_for_a_part_of_proofroll(screen: FirstScr
         ("alpha", False, "for sphere in cylinder (invented)"),
         ("beta", True, "for four bar"),
     ]
-    assert [chip.title for chip in whole.chips("1e-6")] == ["None shown"]
+    assert [chip.title for chip in whole.chips("1e-6")] == ["None confirmed"]
 
 
 def test_counts_are_of_engines(screen: FirstScreen) -> None:
-    """Pairs of an engine and a scene are counted by what was found; an unconfirmed winner wins no scene alone."""
+    """Pairs of an engine and a scene are counted by what was found; what is not confirmed wins no scene."""
     counts = screen.counts("1e-4")
     assert counts.states == {"holds": 2, "unsure": 0, "finer": 1, "elsewhere": 0, "cannot": 0, "open": 0}
-    assert (counts.scenes, counts.alone) == (1, 1)
-    unsure = ReportedAnswer(scene_answer(replace(HELD, state=State.UNCONFIRMED)), "x", "loops", "")
-    assert FirstScreen(replace(screen.content, answers=[unsure])).counts("1e-4").alone == 0
+    assert (counts.scenes, counts.alone, counts.aided) == (1, 1, 0)
+    through = ReportedAnswer(scene_answer(THROUGH, HELD), "x", "loops", "")
+    unsure = ReportedAnswer(scene_answer(replace(HELD, state=State.UNCONFIRMED)), "y", "loops", "")
+    others = FirstScreen(replace(screen.content, answers=[through, unsure]))
+    assert others.counts("1e-4")[1:] == (2, 0, 1, 0)
+    faster = ReportedAnswer(scene_answer(HELD, replace(THROUGH, state=State.UNCONFIRMED)), "z", "loops", "")
+    assert FirstScreen(replace(screen.content, answers=[faster])).counts("1e-4")[1:] == (1, 1, 0, 1)
+    assert [chip.title for chip in others.chips("1e-4")] == ["beta through a part of proofroll", "None confirmed"]
+    assert answers_sentence([through, unsure]) == (
+        "The fastest confirmed to hold 1e-4 of the path: beta for sphere in cylinder (x); "
+        "none for sphere in cylinder (y)."
+    )
 
 
 def test_a_number_has_its_measure() -> None:
@@ -55,8 +72,9 @@ def test_a_number_has_its_measure() -> None:
     assert bar(FINER) == 0
     assert (
         answers_sentence(reported())
-        == "The cheapest that holds 1e-4 of the path: alpha for sphere in cylinder (invented)."
+        == "The fastest confirmed to hold 1e-4 of the path: alpha for sphere in cylinder (invented)."
     )
+    assert place_words(scene_answer(HELD)) == "over 2 s, speed 3"
     assert answers_sentence([]) == "Nothing was run that could be advised."
 
 

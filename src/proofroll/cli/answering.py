@@ -117,16 +117,11 @@ def answers_of(
 
     Without a truth there are none, with a line on standard error.
     """
-    from proofroll.studies.answer.answers import answer, answer_path, kept, stored
-    from proofroll.studies.answer.records import SceneAnswer
+    from proofroll.studies.answer.answers import answer, answer_path, kept, longest_stored
     from proofroll.studies.answer.setting_search import BRIEF
 
     paths = [answer_path(out, question, item, engines, BRIEF) for item in asked]
-    whole = [answer_path(out, question, item, engines) for item in asked]
-    answers = [
-        None if runner.fresh else stored(longer, SceneAnswer) or stored(path, SceneAnswer)
-        for path, longer in zip(paths, whole, strict=True)
-    ]
+    answers = [None if runner.fresh else longest_stored(out, question, item, engines) for item in asked]
     missing = [item for item, earlier in zip(asked, answers, strict=True) if earlier is None]
     try:
         made = iter(answer(question, missing, engines, runner, caps=BRIEF) if missing else [])

@@ -20,6 +20,7 @@ _WIDE = 80  # columns of a screen
 NOW = {
     "tradeoff": "proofroll recommend SCENE --plot FILE.svg",
     "plot": "proofroll run SCENE --engine NAME --plot FILE, and of a stored run proofroll replay RUN",
+    "history": "proofroll replay [NAME]..., of runs that proofroll run --keep NAME keeps",
     "versions": "proofroll diff ENGINE@OLD ENGINE@NEW [SCENE]...",
     "onset": "proofroll paper onset",
     "regimes": "proofroll paper regimes",

@@ -110,7 +110,8 @@ def compare(
         parts = partial(verdict_parts, content, orders=orders, witnesses=witnesses)
         options.show(content, as_json, lambda: [*cheapest, *parts()], widest=WIDTH)
 
-    runner, cheapest = options.new_runner(out, fresh, jobs, scheduler, workers), stored_sentences(loaded, out)
+    runner = options.new_runner(out, fresh, jobs, scheduler, workers)
+    cheapest = stored_sentences(loaded, bounds, engine or [], out)
     outcomes = outcomes_of([loaded], engine or [], runner, watched=_Watched(show, moves=not as_json))
     show(outcomes[0])
     if not (engine or as_json):

@@ -28,7 +28,7 @@ def answer_steps(
     like: Path | None = None,
     as_json: bool,
 ) -> NoReturn:
-    """Prints a line for each engine, and exits: 1 if a step is not good enough.
+    """Prints a line for each engine, and exits: 1 if a step is not good enough, 3 if that could not be decided.
 
     Args:
         name: of a scene or a comparison.
@@ -80,7 +80,9 @@ def answer_steps(
         lines = [f"{head}{step_sentence(item)}" for head, item in zip(heads, made, strict=True)]
         lines += _change(made[-1]) if like else []
         options.show_lines([*lines, *further, scope_sentence(made[0])], widest=WIDTH)
-    raise typer.Exit(options.OK if all(item.holds for item in made) else options.CONTRADICTED)
+    if all(item.holds for item in made):
+        raise typer.Exit(options.OK)
+    raise typer.Exit(options.ENGINE if all(item.holds or item.undecided for item in made) else options.CONTRADICTED)
 
 
 def _change(made: StepAnswer) -> list[str]:
@@ -93,7 +95,7 @@ def _change(made: StepAnswer) -> list[str]:
     from proofroll.report.answer.sentences import lines_command
     from proofroll.report.page.model_lines import own_lines
 
-    if made.holds:
+    if made.holds or made.undecided:
         return []
     spec = parse_engine(made.advised.spec or made.spec)
     try:
@@ -104,19 +106,19 @@ def _change(made: StepAnswer) -> list[str]:
     return changed or [f"Lines that do, if any: {lines_command(made, spec.name)}"]
 
 
-def stored_sentences(comparison: Comparison, out: Path) -> list[str]:
-    """First sentence of a stored answer for the first point of a comparison at the default tolerance; else none."""
+def stored_sentences(comparison: Comparison, tolerances: Sequence[str], engines: Sequence[str], out: Path) -> list[str]:
+    """First sentence of the stored answer of engines for the first point of a comparison and tolerances; else none."""
     from proofroll.files.scene_file import read_scene_file
-    from proofroll.report.answer.sentences import taken_sentence
-    from proofroll.studies.answer.answers import answer_path, stored
+    from proofroll.report.answer.sentences import parameter_words, taken_sentence, tolerance_words
+    from proofroll.studies.answer.answers import longest_stored
     from proofroll.studies.answer.question import AnswerQuestion
-    from proofroll.studies.answer.records import SceneAnswer
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
 
     point = next(iter(comparison.combinations()), {})
     values = {name: value for name, value in point.items() if isinstance(value, float)}
     until = read_scene_file(comparison.scene).duration or comparison.until
     question = AnswerQuestion.of(comparison.scene, values, until)
-    path = answer_path(out, question, AskedTolerance.of([DEFAULT], question.loaded))
-    answer = stored(path, SceneAnswer) if path.is_file() else None
-    return [f"To {DEFAULT} of the path: {taken_sentence(answer)}"] if answer is not None else []
+    answer = longest_stored(out, question, AskedTolerance.of(tolerances or [DEFAULT], question.loaded), engines)
+    if answer is None:
+        return []
+    return [f"To {', '.join([tolerance_words(answer), *parameter_words(answer)])}: {taken_sentence(answer)}"]

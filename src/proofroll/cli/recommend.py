@@ -133,12 +133,10 @@ def _answer(
 ) -> SceneAnswer:
     """Stored answer, or a new one, whose parts are printed on standard error as they are found."""
     from proofroll.report.answer.sentences import sentence
-    from proofroll.studies.answer.answers import answer, answer_path, kept, stored
-    from proofroll.studies.answer.records import SceneAnswer
+    from proofroll.studies.answer.answers import answer, answer_path, kept, longest_stored
     from proofroll.studies.answer.setting_search import WHOLE
 
-    path = answer_path(out, question, asked, engines)
-    if not runner.fresh and (earlier := stored(path, SceneAnswer)) is not None:
+    if not runner.fresh and (earlier := longest_stored(out, question, asked, engines, whole=True)) is not None:
         return earlier
 
     def begin(names: Sequence[str]) -> None:
@@ -154,7 +152,7 @@ def _answer(
 
     with options.progress_bar(f"{question.scene}: the truth") as advance:
         (made,) = answer(question, [asked], engines, runner, begin, tell, lambda engine: advance(f"runs of {engine}"))
-    return kept(made, path)
+    return kept(made, answer_path(out, question, asked, engines))
 
 
 def _print_lines(made: list[SceneAnswer]) -> None:

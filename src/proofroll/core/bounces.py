@@ -137,8 +137,8 @@ def exact_bounces(
     stops = np.unique([*(event.time for event in events if event.kind in JUMPS and event.time <= end), end])
     # of rebounds that are summed the last is followed, and rests in a part of the time until all are over
     settled = np.array([event.time for event in events if event.kind == EventKind.SETTLE and event.time <= end])
-    struck = stops[np.searchsorted(stops, settled) - 1]
-    rebounds = (struck[:, None] + (settled - struck)[:, None] * _GRADED).ravel()
+    impacts = stops[np.searchsorted(stops, settled) - 1]
+    rebounds = (impacts[:, None] + (settled - impacts)[:, None] * _GRADED).ravel()
     parts = np.arange(1, _BETWEEN + 1) / (_BETWEEN + 1)
     inside = (stops[:-1, None] + np.diff(stops)[:, None] * parts).ravel()
     times = np.unique(np.concatenate([*beside, inside, rebounds, [end]]))

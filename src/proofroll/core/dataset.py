@@ -247,7 +247,7 @@ def _of_either_side(scene: Scene, truth: xr.Dataset, run: xr.Dataset, on: npt.ND
     """The run with the truth's values at the samples ``on`` impacts, where its own may be those of either side."""
     indices, run_variables, true_variables = on[on < run.sizes["time"]], run.variables, truth.variables
     last = truth.sizes["time"] - 1
-    changed = {}
+    variables = {}
     for name in map(str, run.data_vars):
         variable, item = run_variables[name], scene.observables.get(name)
         reaction = item is not None and item.role is Role.REACTION
@@ -265,8 +265,8 @@ def _of_either_side(scene: Scene, truth: xr.Dataset, run: xr.Dataset, on: npt.ND
         values[indices] = np.where(
             (reaction | inside) & np.isfinite(true[indices]), true[indices], variable.values[indices]
         )
-        changed[name] = (variable.dims, values, variable.attrs)
-    return run.assign(changed)
+        variables[name] = (variable.dims, values, variable.attrs)
+    return run.assign(variables)
 
 
 def shared_events(

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
-from simpleeval import FeatureNotAvailable, InvalidExpression, SimpleEval
+from simpleeval import FeatureNotAvailable, InvalidExpression, NameNotDefined, SimpleEval
 
 from proofroll.core.errors import InputError
 from proofroll.core.quantity import OR, Quantity, UnitsDiffer, powers_of
@@ -37,6 +37,7 @@ def parsed_formula(text: str) -> ast.expr:
     Raises:
         FeatureNotAvailable: anything else, or more than 500 characters.
         SyntaxError: an end that is missing.
+        OverflowError: a whole number beyond the largest float.
     """
     source = text.replace("^", "**").strip()
     if len(text) > _LONGEST or not _CHARACTERS.fullmatch(text):
@@ -50,6 +51,8 @@ def parsed_formula(text: str) -> ast.expr:
 
 def _is_arithmetic(node: ast.AST, source: str) -> bool:
     if isinstance(node, ast.Constant):
+        if type(node.value) is int:
+            float(node.value)  # raises OverflowError, which sums and products with floats would raise later
         return type(node.value) in (int, float) and bool(_NUMBER.fullmatch(ast.get_source_segment(source, node) or ""))
     if isinstance(node, ast.Call):
         return isinstance(node.func, ast.Name) and not node.keywords
@@ -59,9 +62,19 @@ def _is_arithmetic(node: ast.AST, source: str) -> bool:
 def evaluator(
     names: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]], power: Callable[[Any, Any], Any]
 ) -> SimpleEval:
-    """Evaluator of formulas with + - * / ^ ** ( ) and the given names and functions; attributes are not allowed."""
+    """Evaluator of formulas with + - * / ^ ** ( ) and the given names and functions; attributes are not allowed.
+
+    The name of a function is no value: ``abs`` alone is not defined.
+    """
     made = SimpleEval(operators={**_OPERATORS, ast.Pow: power}, functions=dict(functions), names=dict(names))
     del made.nodes[ast.Attribute]
+
+    def value(node: ast.Name) -> Any:
+        if node.id not in names:
+            raise NameNotDefined(node.id, made.expr)
+        return names[node.id]
+
+    made.nodes[ast.Name] = value
     return made
 
 

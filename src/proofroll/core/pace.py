@@ -71,15 +71,15 @@ class Pace:
         """
         if not self._route:
             return
-        now, part = time.process_time(), t / self._end
-        if now - self._began > self._part * self._limit:
+        used, part = time.process_time(), t / self._end
+        if used - self._began > self._part * self._limit:
             self.over = True
             raise OutOfTime(f"its limit of {self._limit:g} s of processor time was reached", t)
         if self._begun[1] < 0:  # what came before, like compiling, says nothing of the pace
-            self._begun = now, part
+            self._begun = used, part
         came = part - self._begun[1]
-        if came > 0 and now - self._told > _EVERY:
-            self._told, whole = now, (now - self._begun[0]) / came
+        if came > 0 and used - self._told > _EVERY:
+            self._told, whole = used, (used - self._begun[0]) / came
             left = whole * (1 - part) + (whole if self._route == "first" else 0.0)
             self.text = f"{part * self.until:.3g} of {self.until:.3g} s, about {left:.0f} s left"
             self._tell(self.text)

@@ -16,7 +16,8 @@ from proofroll.core.unit_conversion import in_proportion, in_si, is_known
 
 # Unit of a number, or of each number of a list; "": not checked. Several that are allowed are joined by OR.
 Unit = str | tuple[str, ...]
-_MEASURED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_][^=$]*|°(?:/s)?)\s*")
+# Quantifiers that give nothing back, or a text of n digits without a unit would be read n^2 times.
+_MEASURED = re.compile(r"\s*+([-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?)\s*+([^\W\d_][^=$]*+|°(?:/s)?)\s*+")
 _NUMBERED = re.compile(r"\{([^{}]*)\}")
 
 

@@ -13,6 +13,8 @@ from proofroll.core.errors import InputError
 EVERY = 0.01
 # Latest time of a sample [s], 31 years: no motion can be followed so far.
 LATEST = 1e9
+# Most samples of a run.
+MOST_SAMPLES = 10_000_000
 # Multiples of it modulo 1 spread most evenly over an interval, and are far from simple fractions.
 _GOLDEN = (5**0.5 - 1) / 2
 # Most samples off the grid, and fewest intervals for each: few, as an adaptive step ends at each.
@@ -41,8 +43,9 @@ def time_grid(until: float, every: float) -> FloatArray:
         raise InputError("until", until, f"give a finite time in s that is not negative, at most {LATEST:g} s")
     if not np.isfinite(every) or every <= 0:
         raise InputError("every", every, "give a positive, finite interval in s")
-    if until / every > 1e7:
-        raise InputError("every", every, f"that is more than ten million samples until {until:g} s; sample less often")
+    if until / every > MOST_SAMPLES:
+        advice = f"that is more than {MOST_SAMPLES} samples until {until:g} s; sample less often"
+        raise InputError("every", every, advice)
     count = int(np.floor(until / every * (1 + 1e-12) + 1e-9))
     times = np.arange(count + 1, dtype=np.float64) * every
     if until - times[-1] > 1e-9 * max(every, until):

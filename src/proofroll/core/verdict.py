@@ -345,7 +345,11 @@ def _reason(
 
 def _unlike(values: FloatArray, true: FloatArray, items: str) -> str:
     """Clause on a curve without a finite distance from the truth; ``items``: name of its values."""
-    return "not finite" if values.shape == true.shape else f"{counted(len(values), items)}, the truth has {len(true)}"
+    if values.shape == true.shape:
+        return "not finite"
+    if len(values) == len(true):
+        return f"the shape {values.shape}, the truth has {true.shape}"
+    return f"{counted(len(values), items)}, the truth has {len(true)}"
 
 
 def _distinct_texts(value: float, rival: float) -> tuple[str, str]:

@@ -87,8 +87,12 @@ def study_content(path: Path, study: str) -> dict[str, Any]:
 
 
 def named_file(name: str) -> Path | None:
-    """Path of the file of a study or comparison, from a path or from its name with or without ``.toml``; or None."""
-    paths = [Path(name), *(folder / file for folder in study_folders() for file in (f"{name}.toml", name))]
+    """Path of the file of a study or comparison, from a path or from its name with or without ``.toml``; or None.
+
+    A path never means a shipped file.
+    """
+    folders = study_folders() if name == Path(name).name else ()
+    paths = [Path(name), *(folder / file for folder in folders for file in (f"{name}.toml", name))]
     return next((path for path in paths if path.is_file() and path.name != "scene.toml"), None)
 
 

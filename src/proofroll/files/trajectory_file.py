@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.columns import Columns, Variable
+from proofroll.core.time_grid import MOST_SAMPLES
 from proofroll.files.atomic import ordinary_content, replacing
 
 if TYPE_CHECKING:
@@ -193,9 +194,10 @@ def read_columns(path: Path) -> Columns:
     """
     content = ordinary_content(path)
     what = f"{path} is no stored trajectory"
-    arrays = _arrays(content, what)
     with reading(what), zipfile.ZipFile(io.BytesIO(content)) as archive:
-        about, attrs = map(dict, json.loads(archive.read(_ABOUT)))
+        about, attrs = map(dict, json.loads(archive.read(_ABOUT)))  # first: a foreign file has none
+    arrays = _arrays(content, what)
+    with reading(what):
         variables = {name: Variable(tuple(dims), arrays[name], dict(its)) for name, (dims, its) in about.items()}
     return Columns(variables, attrs)
 
@@ -238,8 +240,10 @@ def _arrays(content: bytes, what: str, times: str = "") -> dict[str, npt.NDArray
 
 
 def _other_rows(headers: Mapping[str, _Header], times: str) -> str:
-    """Clause on the first array whose rows are not as many as the times; empty: there is none."""
+    """Clause on too many times, or on the first array whose rows are not as many; empty: there is none."""
     count = headers[times][0][:1] if times in headers else None
+    if count and count[0] > MOST_SAMPLES:
+        return f"it has {count[0]} times; thin them to at most {MOST_SAMPLES}"
     for name, (shape, _, _) in headers.items():
         if count is not None and shape[:1] != count:
             return f"{name} has the shape {shape}; give one row for each of {count[0] if count else 1} times"

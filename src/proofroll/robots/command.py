@@ -16,7 +16,7 @@ from proofroll.vocabulary.command import show_keys
 def check(
     context: typer.Context,
     file: Annotated[
-        Path | None, typer.Argument(help="A robot file (URDF, MJCF), a scene, or a comparison or other study.")
+        str | None, typer.Argument(help="A robot file (URDF, MJCF), a scene, or a comparison or other study.")
     ] = None,
     engine: options.Engines = None,
     base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
@@ -54,19 +54,20 @@ def check(
         options.require_only(
             context, {"file", "keys", "as_json"}, "this is for files; --keys prints what they may hold"
         )
-        show_keys(str(file or ""), as_json)
+        show_keys(file or "", as_json)
         return
     if file is None:
         raise InputError("FILE", None, "name a scene, a study or a robot file, or give --keys")
     settings = options.with_ground(settings, control, ground)
-    if control is not None or is_text_check(file):
+    path = Path(file)  # which forgets that ./NAME is a path
+    if control is not None or is_text_check(path):
         options.require_only(
             context,
             {"file", "plot", "settings", "as_json", "control", "ground", "_root"},
             "this is for robot files; nothing is run to check a scene or a study",
             {"engine": ", and `proofroll compare SCENE --engine NAME` says what an engine makes of one"},
         )
-        name = options.own_first(str(file)) if control is None else options.controlled(str(file), control)
+        name = options.own_first(file) if control is None else options.controlled(file, control)
         check_text(name, as_json, plot, settings)
         return
     if settings:
@@ -84,13 +85,13 @@ def check(
             raise InputError("--map", ", ".join(names), "this is for two files; name the other by --against FILE")
         with options.progress_bar("engines") as advance:
             accepted = [name.strip() for name in ",".join(accept or ()).split(",") if name.strip()]
-            content = checked(file, engine or (), how, accept=accepted, progress=advance)
+            content = checked(path, engine or (), how, accept=accepted, progress=advance)
     else:
         from proofroll.robots.check.two_files import against as compared
 
         if engine:
             raise InputError("--engine", ", ".join(engine), "--against compares two files and asks no engine; drop one")
-        content = compared(file, against, _partners(names or ()), how)
+        content = compared(path, against, _partners(names or ()), how)
     if out is not None:
         from proofroll.robots.check.page import page
         from proofroll.running.store import write_text

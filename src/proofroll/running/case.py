@@ -32,6 +32,7 @@ class Status(StrEnum):
     CRASHED = "crashed"
     TIMEOUT = "timeout"
     LEFT_OUT = "left out"  # the processor time of a study did not suffice (TimeBudget)
+    NOT_RUN = "not run"  # another step of a row whose own step has no result
 
 
 # Results that are stored for good; a crash, a hang or a missing engine may not occur next time.

@@ -17,11 +17,11 @@ _PACKAGES = "examples/engines"
 
 def example_packages(source: Path = OWN.parents[1]) -> dict[str, Path]:
     """Name of an engine -> folder of its package below a checkout of the source; empty where there is no checkout."""
-    found: dict[str, Path] = {}
+    folders: dict[str, Path] = {}
     for file in sorted(source.glob(f"{_PACKAGES}/*/pyproject.toml")):
         points = tomllib.loads(file.read_text(encoding="utf-8"))["project"].get("entry-points", {})
-        found |= dict.fromkeys(points.get(GROUP, {}), file.parent)
-    return found
+        folders |= dict.fromkeys(points.get(GROUP, {}), file.parent)
+    return folders
 
 
 def install(name: str, packages: dict[str, Path]) -> tuple[str, Path]:

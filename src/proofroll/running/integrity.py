@@ -1,4 +1,4 @@
-"""Checks that an engine did not replace the functions that judge it, in a worker's process."""
+"""Checks that an engine of another package did not replace the functions that judge it, in a worker's process."""
 
 import importlib
 import operator
@@ -18,7 +18,9 @@ _watched: dict[str, tuple[Any, ...]] = {}
 
 
 def watch() -> None:
-    """Stores references to the functions that judge engines; to be called before any engine is loaded."""
+    """Stores references to the functions that judge engines; called before an engine of another package is loaded."""
+    if _watched:
+        return
     for name in _EARLY:
         importlib.import_module(f"proofroll.{name}")
     _watched.update(_judging_members())

@@ -4,23 +4,40 @@ import gc
 from functools import lru_cache
 from typing import Any
 
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, ProofrollError
-from proofroll.core.plugins import load_engine, place_of, plain_name, resolve_settings
+from proofroll.core.formulations import FORMULATIONS
+from proofroll.core.plugins import GROUP, load_engine, place_of, plain_name, resolve_settings
 from proofroll.core.scene import Scene
+from proofroll.core.source_code import OWN
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case
+from proofroll.running.integrity import watch
 from proofroll.running.program import engine, path_of
 
 # Scenes that a process keeps, as most cases are of few.
 _SCENES = 8
 # Place that this process serves: the part after ``@`` of its engines; empty: engines of this interpreter.
 _settled = ""
+# True in a worker: engines of other packages are watched there.
+_watches_foreign = False
 
 
 def serve_place(place: str) -> None:
     """Makes this process serve engines ``NAME@place``."""
     global _settled  # noqa: PLW0603 -- a fact about the process, set once when it starts
     _settled = place
+
+
+def watch_foreign() -> None:
+    """Makes this process watch what judges engines before it loads one of another package, or what one adds to it."""
+    global _watches_foreign  # noqa: PLW0603 -- a fact about the process, set once when it starts
+    _watches_foreign = True
+
+
+def _is_foreign(name: str) -> bool:
+    points = [point for group in (GROUP, FORMULATIONS) for point in announced(group) if point.name == name]
+    return any(point.module.partition(".")[0] != OWN.name for point in points)
 
 
 def local_name(name: str) -> str:
@@ -37,6 +54,8 @@ def load(name: str) -> Any:
     """
     if path_of(name) is not None:
         return engine(name)
+    if _watches_foreign and _is_foreign(local_name(name)):
+        watch()
     try:
         return load_engine(local_name(name))
     except (InputError, Missing) as error:

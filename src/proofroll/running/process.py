@@ -77,8 +77,8 @@ def end_all() -> None:
 
 def truths_at() -> list[str]:
     """Lines about how far truths have come, in this process and its workers."""
-    said = [item for worker in list(_living) for item in worker.said[-1:]]
-    return [*([f"{AT}{PACE.text}"] if PACE.text else []), *(item for item in said if item.startswith(AT))]
+    lines = [item for worker in list(_living) for item in worker.said[-1:]]
+    return [*([f"{AT}{PACE.text}"] if PACE.text else []), *(item for item in lines if item.startswith(AT))]
 
 
 def processor_seconds() -> float:

@@ -58,9 +58,9 @@ class ProcessorProfile:
 
     def _book(self) -> None:
         """Books the time since the last call on the innermost open phase; that of workers on the one that has them."""
-        here = time.process_time()
-        workers = processor_seconds() - here
-        self.phases[self._open[-1]] += here - self._since[0]
+        own_seconds = time.process_time()
+        workers = processor_seconds() - own_seconds
+        self.phases[self._open[-1]] += own_seconds - self._since[0]
         working = next(name for name in reversed(self._open) if name not in _HERE)
         self.phases[working] += workers - self._since[1]
-        self._since = here, workers
+        self._since = own_seconds, workers

@@ -189,9 +189,9 @@ def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
 def _require_state(scene: Scene, start: AnySample, sample: AnySample, t: float) -> None:
     """Raises Diverged if a sample lacks a state variable that the first sample has."""
     for element in scene.elements:
-        start_state, now = sample_of(scene, element, start), sample_of(scene, element, sample)
+        start_state, state = sample_of(scene, element, start), sample_of(scene, element, sample)
         for name in Sample.widths:
-            if getattr(now, name) is None and getattr(start_state, name) is not None:
+            if getattr(state, name) is None and getattr(start_state, name) is not None:
                 raise Diverged(f"{name} is given at 0 s and not at {t:g} s")
 
 

@@ -197,9 +197,9 @@ class _TimeAccounts:
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
-        now = time.process_time()
-        self.processor: dict[str, float] = {"process start": now - _TimeAccounts._counted}
-        self._since = time.perf_counter(), now
+        used = time.process_time()
+        self.processor: dict[str, float] = {"process start": used - _TimeAccounts._counted}
+        self._since = time.perf_counter(), used
 
     def on(self, cause: str, **parts: tuple[float, float]) -> None:
         """Adds the time since the last call to an activity.
@@ -208,10 +208,10 @@ class _TimeAccounts:
             cause: the activity.
             **parts: activity -> wall and processor time of its own [s], which are taken off.
         """
-        now = time.perf_counter(), time.process_time()
+        clocks = time.perf_counter(), time.process_time()
         for index, account in enumerate((self.seconds, self.processor)):
             spent = {key.replace("_", " "): part[index] for key, part in parts.items()}
-            spent[cause] = now[index] - self._since[index] - sum(spent.values())
+            spent[cause] = clocks[index] - self._since[index] - sum(spent.values())
             for key, value in spent.items():
                 account[key] = account.get(key, 0.0) + value
-        self._since, _TimeAccounts._counted = now, now[1]
+        self._since, _TimeAccounts._counted = clocks, clocks[1]

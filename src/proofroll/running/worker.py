@@ -27,7 +27,7 @@ from proofroll.core.pace import PACE
 from proofroll.running.case import Case
 from proofroll.running.handshake import identify_and_settle
 from proofroll.running.identity import describe, resolve
-from proofroll.running.integrity import watch
+from proofroll.running.loading import watch_foreign
 from proofroll.running.memory import volunteer
 from proofroll.running.process_end import end_with, end_with_pipe
 from proofroll.running.run_case import run
@@ -46,8 +46,8 @@ def main(answers: int, parent: int, life: int) -> None:
     end_with_pipe(life)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # an engine might catch KeyboardInterrupt as its own failure
     volunteer()
+    watch_foreign()
     gc.disable()  # until the engine is loaded: imports leave no garbage, and collection takes a tenth of the start
-    watch()
     requests = os.fdopen(os.dup(0), encoding="utf-8")
     with open(os.devnull, "rb") as nothing:
         os.dup2(nothing.fileno(), 0)  # an engine that asks its user something must not read the next request

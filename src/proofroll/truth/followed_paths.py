@@ -355,8 +355,8 @@ def _goes_on(stretches: Sequence[Stretch[Any]], kinds: Callable[[Any], Any]) -> 
     """True if the first of some stretches goes on in the next, in the same kinds of mode and without a jump."""
     if len(stretches) < 2 or kinds(stretches[0].mode) != kinds(stretches[1].mode):
         return False
-    last, first = stretches[0].last[:-1], stretches[1].first[:-1]  # each time has its own last digit
-    return bool(np.all(np.abs(first - last) <= CLOSE * np.maximum(1.0, np.abs(last))))
+    last, begin = stretches[0].last[:-1], stretches[1].first[:-1]  # each time has its own last digit
+    return bool(np.all(np.abs(begin - last) <= CLOSE * np.maximum(1.0, np.abs(last))))
 
 
 def _parts(stretches: Sequence[Stretch[Any]], kinds: Callable[[Any], Any]) -> int:

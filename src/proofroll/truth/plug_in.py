@@ -182,12 +182,12 @@ def _unknown_from(element: MechanismElement, motion: TwoRouteMotion) -> tuple[fl
     beyond = np.flatnonzero((bar > size) & told)
     if not beyond.size:
         return None
-    first = int(np.flatnonzero((bar > _PARTED * size) & told)[0])
+    number = int(np.flatnonzero((bar > _PARTED * size) & told)[0])
     text = (
         f"the two routes part, and the error bar of places grows to {bar[beyond[0]]:.2g} m, more than anything has "
         "moved; please report it"
     )
-    return float(motion.record.time[first]), text
+    return float(motion.record.time[number]), text
 
 
 def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:

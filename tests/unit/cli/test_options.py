@@ -46,6 +46,21 @@ def test_a_command_reads_the_folder_here(own: Path, command_line: CommandLine) -
     assert "extra" not in out
 
 
+def test_a_path_of_a_command_never_means_what_is_shipped(own: Path, command_line: CommandLine) -> None:
+    """``./NAME`` of a folder without a scene, or of no file, is refused; its own scene is read without a line."""
+    code, _, err = command_line("check", "./pendulum")
+    assert (code, err) == (0, "")
+    (own / "cone").mkdir()
+    assert command_line("check", "cone")[0] == 0
+    for words, reason in (("./cone", "has no scene.toml"), ("./stop", "no such scene"), ("./stick_slip", "no such")):
+        code, _, err = command_line("check", words)
+        assert code == 2
+        assert reason in err
+    code, _, err = command_line("check", "n" * 5000)
+    assert (code, err.count("\n")) == (2, 1)
+    assert len(err) < 500
+
+
 def test_a_shipped_scene_in_its_own_folder(monkeypatch: pytest.MonkeyPatch, command_line: CommandLine) -> None:
     """In the folder of the shipped scenes nothing is said."""
     monkeypatch.chdir(data_folder("models"))

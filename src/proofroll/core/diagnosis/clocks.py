@@ -108,7 +108,7 @@ def best_clock_factor(time: FloatArray, reported: FloatArray, true: FloatArray) 
 
 def mistaken_rate(rate: float) -> bool:
     """True if the rate of a clock [1] is that of a known mistake: half, twice, a quarter, four times."""
-    return any(abs(rate - known) <= _FIT * known for known in _RATES[1:])
+    return any(abs(rate - mistake) <= _FIT * mistake for mistake in _RATES[1:])
 
 
 def in_steps(delay: float, step: float | None) -> float:

@@ -137,10 +137,10 @@ class Residuals(Generic[M]):
         Changes that are round-off are left out, as by numbers that act on accelerations where there are none.
         """
         plain_residual = self.left(self.plain)
-        changed = np.stack([self.left(model) - plain_residual for model in self.others()], axis=-1)
-        sizes = np.linalg.norm(changed, axis=0)
+        changes = np.stack([self.left(model) - plain_residual for model in self.others()], axis=-1)
+        sizes = np.linalg.norm(changes, axis=0)
         seen = sizes > _CHANGED * self.before
-        return np.asarray(changed[:, seen] / sizes[seen])
+        return np.asarray(changes[:, seen] / sizes[seen])
 
     @property
     def single_equation(self) -> bool:

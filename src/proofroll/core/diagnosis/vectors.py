@@ -153,13 +153,13 @@ class ReportedVector:
             local = self.true if frame is None else components_along(frame, self.true)
             reported = self.reported if frame is None else components_along(frame, self.reported)
             for order, signs in _PERMUTATIONS:
-                changed = local[..., order] * signs
-                if known_difference(reported, changed) * 4 > self.before:
+                permuted = local[..., order] * signs
+                if known_difference(reported, permuted) * 4 > self.before:
                     continue
                 frame_words = "" if frame is None else f" in {name}"
                 shown = ", ".join("-" * (s < 0) + "xyz"[k] for k, s in zip(order, signs, strict=True))
                 says = f"{self.name} has other axes or signs{frame_words}: its x, y, z are the true {shown}"
-                explained = changed if frame is None else product(frame, changed)
+                explained = permuted if frame is None else product(frame, permuted)
                 yield self.cause("axes", says, explained, f"look at the signs and the order of axes of {self.name}")
 
     def _scaled(self, step: float | None) -> Iterator[Cause]:

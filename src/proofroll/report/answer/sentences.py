@@ -11,6 +11,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.files.scene_sources import root_words
 from proofroll.report.labels import engine_title, engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
+from proofroll.report.run.last_values import FORCES
 from proofroll.running.case import Status
 from proofroll.studies.answer.records import (
     AllowedError,
@@ -35,6 +36,8 @@ SIGNS = {
 }
 INSTALLED = "as installed"
 _QUANTITIES = {"p_WB": "body positions"}
+# Least ratio of two speeds that is told.
+_FASTER = 1.1
 _PREFIXES = {-3: "m", -6: "µ", -9: "n"}
 
 
@@ -58,12 +61,6 @@ def error_words(bound: AllowedError, error: float) -> str:
     if bound.relative and bound.size:
         return f"{number(error / bound.size)} of {number(bound.allowed / bound.size)}"
     return f"{measure(error, bound.unit)} of {measure(bound.allowed, bound.unit)}"
-
-
-def off_words(bound: AllowedError, of_allowed: float) -> str:
-    """An error by its part of what is allowed: ``0.12 mm``, or ``6e-5`` as a part of the size."""
-    error = of_allowed * bound.allowed
-    return number(error / bound.size) if bound.relative and bound.size else measure(error, bound.unit)
 
 
 def quantity_words(name: str) -> str:
@@ -101,9 +98,9 @@ def installed_words(item: EngineAnswer) -> str:
     failed = [(setting, run) for setting in tried for run in setting.steps if run.of_allowed is not None]
     if failed:
         setting, run = min(failed, key=lambda pair: pair[1].of_allowed or math.inf)
-        dearer = "dearer, " if setting.state is State.DEARER else ""
-        return f"{INSTALLED}: {dearer}{number(run.of_allowed)} times too far off at {_at(item, setting, run)}"
-    return f"{INSTALLED}: {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
+        told = f"{_at(item, setting, run)} is off by {number(run.of_allowed)} times what is allowed"
+        return f"{INSTALLED}: dearer ({told})" if setting.state is State.DEARER else f"{INSTALLED}: {told}"
+    return f"{INSTALLED}: refused, {tried[0].why}" if tried and tried[0].state is State.REFUSED else ""
 
 
 def _at(item: EngineAnswer, setting: SettingTried, run: StepTried) -> str:
@@ -149,14 +146,14 @@ def reason(item: EngineAnswer) -> str:
 def coarser_words(item: EngineAnswer) -> str:
     """Clause on twice the step of an answer that holds; empty if it was not run."""
     tried = item.coarser
-    if tried is None or item.bound is None:
+    if tried is None:
         return ""
     double = "twice the step" if item.resolution == "dt" else "ten times the tolerance"
     if tried.status != Status.DONE:
         return f"{double} {ended_words(tried)}"
     if tried.of_allowed is None or tried.of_allowed <= 1:
         return ""
-    return f"{double} is off by {off_words(item.bound, tried.of_allowed)}"
+    return f"{double} is off by {number(tried.of_allowed)} times what is allowed"
 
 
 def ended_words(tried: StepTried) -> str:
@@ -167,17 +164,32 @@ def ended_words(tried: StepTried) -> str:
 
 
 def taken_sentence(made: SceneAnswer) -> str:
-    """First sentence of an answer: what to take, or that nothing was shown to hold the tolerance."""
+    """First sentence of an answer: what to take, or that nothing was shown to hold the tolerance.
+
+    A step that is not confirmed is not advised; where one may be faster than what is, another sentence says so.
+    """
     if made.open:
         return f"Nothing can be advised for {made.tolerance}: {made.open}."
+    asked = f"{tolerance_words(made)} over {made.until:g} s"
     if made.taken is None:
-        return f"No engine is shown to hold {tolerance_words(made)} over {made.until:g} s."
-    return f"Take {sentence(made.taken, made.until)}"
+        return f"No engine is shown to hold {asked}."
+    if made.confirmed is None:
+        return f"No engine is confirmed to hold {asked}; the fastest that may: {sentence(made.taken, made.until)}"
+    told = f"Take {sentence(made.confirmed, made.until)}"
+    if (rival := made.perhaps_faster) is None:
+        return told
+    ratio = (made.confirmed.seconds_per_second or 0.0) / (rival.seconds_per_second or math.inf)
+    return f"{told} {engine_words(rival.engine, rival.formulation)} may be {number(ratio)} times faster, not confirmed."
 
 
 def tolerance_words(made: SceneAnswer) -> str:
     """The tolerance for a reader: a part is one of the path."""
     return f"{made.tolerance} of the path" if _is_number(made.tolerance) else made.tolerance
+
+
+def parameter_words(made: SceneAnswer) -> list[str]:
+    """Parameters of the scene that were given, for a reader: ``speed 4``."""
+    return [f"{symbol(name)} {number(value)}" for name, value in made.parameters.items()]
 
 
 def _is_number(text: str) -> bool:
@@ -197,9 +209,10 @@ def unaided(made: SceneAnswer) -> EngineAnswer | None:
 def scope_sentence(made: SceneAnswer | StepAnswer) -> str:
     """Sentence on what was judged, over which time, and that attitudes were not."""
     names = ", ".join(quantity_words(bound.quantity) for bound in made.bounds)
+    loads = ", forces after the start" if any(bound.unit in FORCES for bound in made.bounds) else ""
     unjudged = f" Not judged: {' and '.join(made.unjudged)}." if made.unjudged else ""
     beyond = f" No longer: {made.beyond}." if made.beyond else ""
-    return f"Judged: {names}, every {made.every:g} s over {made.until:g} s.{beyond}{unjudged}"
+    return f"Judged: {names}, every {made.every:g} s over {made.until:g} s{loads}.{beyond}{unjudged}"
 
 
 def answer_lines(made: SceneAnswer) -> Iterator[str]:
@@ -243,7 +256,7 @@ def _given(made: SceneAnswer | StepAnswer) -> list[str]:
 
 
 def step_sentence(made: StepAnswer) -> str:
-    """Answer for a person's own step in one sentence: yes or no, by how much, and which step would do."""
+    """Answer for a person's own step in one sentence: yes, no or perhaps, by how much, and which step would do."""
     if made.open:
         return f"Not judged: {made.open}."
     item, size = made.advised, step(made.resolution, made.step)
@@ -252,16 +265,18 @@ def step_sentence(made: StepAnswer) -> str:
         until = f", it holds until {number(made.held_until, 3)} s" if made.held_until else ""
         return f"No: {ended}{until}{_would_do(made)}."
     error = f"{error_words(made.bound, made.error)} over {made.until:g} s"
+    if made.undecided:
+        why = item.why or "no finer step was run"
+        return f"Perhaps: {error} ({size}, {speed(made.seconds_per_second)} real time); not confirmed: {why}."
     if not made.holds:
         luck = f" is luck: {made.luck}" if made.luck else ""
-        until = "" if made.luck else f"; it holds until {number(made.held_until, 3)} s"
+        until = f"; it holds until {number(made.held_until, 3)} s" if made.held_until and not made.luck else ""
         return f"No: {error}{luck}{until}{_would_do(made)}."
     told = f"Yes: {error} ({size}, {speed(made.seconds_per_second)} real time)"
     if item.step is not None and item.step > made.step * (1 + 1e-9):
         ratio = (made.seconds_per_second or 0.0) / (item.seconds_per_second or math.inf)
-        return f"{told}; {step(item.resolution, item.step)} would do, {number(ratio)} times faster."
-    if item.state is State.UNCONFIRMED:
-        return f"{told}; not confirmed: {item.why}."
+        faster = f", {number(ratio)} times faster" if ratio > _FASTER else ""
+        return f"{told}; {step(item.resolution, item.step)} would do{faster}."
     double = "twice the step" if made.resolution == "dt" else "ten times the tolerance"
     return f"{told}; {double} does not do."
 
@@ -270,7 +285,7 @@ def _would_do(made: StepAnswer) -> str:
     """Clause on the step of the same setting that holds, or on why none was found."""
     item = made.advised
     if item.holds and item.step is not None and item.bound is not None and item.error is not None:
-        off = off_words(item.bound, item.error / item.bound.allowed)
+        off = error_words(item.bound, item.error).partition(" of ")[0]
         sure = "" if item.state is State.HOLDS else ", not confirmed"
         return (
             f"; {step(item.resolution, item.step)} would do ({off}{sure}), {speed(item.seconds_per_second)} real time"

@@ -12,6 +12,7 @@ from proofroll.report.answer.sentences import (
     brought_words,
     error_words,
     installed_words,
+    parameter_words,
     reason,
     setting_words,
     speed,
@@ -52,11 +53,17 @@ class Chip(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Number of pairs of an engine and a scene by what was found, and of scenes that are won by an engine alone."""
+    """Number of pairs of an engine and a scene by what was found, and of scenes by what is advised.
+
+    ``alone``: an engine without a part of proofroll; ``aided``: one with such a part; ``doubtful``: of both, how many
+    have an unconfirmed one that may be faster.
+    """
 
     states: dict[str, int]
     scenes: int
     alone: int
+    aided: int
+    doubtful: int
 
 
 @dataclass(frozen=True)
@@ -93,24 +100,26 @@ class FirstScreen:
         won: dict[tuple[str, bool], list[str]] = {}
         nobody = []
         for item in self.answers(tolerance):
-            taken = item.answer.taken
-            if taken is None or taken.state is not State.HOLDS:
+            confirmed = item.answer.confirmed
+            if confirmed is None:
                 nobody.append(item.words)
             else:
-                won.setdefault((taken.engine, bool(taken.brought)), []).append(item.words)
+                won.setdefault((confirmed.engine, bool(confirmed.brought)), []).append(item.words)
         chips = []
         for (engine, hollow), names in sorted(won.items(), key=lambda pair: (pair[0][1], -len(pair[1]))):
             through = " through a part of proofroll" if hollow else ""
             chips.append(Chip(engine, f"{engine_title(engine)}{through}", f"for {', '.join(names)}", hollow))
-        return chips + ([Chip("", "None shown", f"for {', '.join(nobody)}")] if nobody else [])
+        return chips + ([Chip("", "None confirmed", f"for {', '.join(nobody)}")] if nobody else [])
 
     def counts(self, tolerance: str) -> Counts:
         """Counts over all engines and scenes."""
         answers = [item.answer for item in self.answers(tolerance)]
         looks = [_LOOKS.get(engine.state, "open") for made in answers for engine in made.engines]
-        taken = [made.taken for made in answers if made.taken is not None and made.taken.state is State.HOLDS]
+        brought = [bool(made.confirmed.brought) for made in answers if made.confirmed is not None]
         states = {name: looks.count(name) for name in _STATES}
-        return Counts(states, len(answers), sum(not item.brought for item in taken))
+        doubtful = sum(made.perhaps_faster is not None for made in answers)
+        alone, aided = brought.count(False), brought.count(True)
+        return Counts(states=states, scenes=len(answers), alone=alone, aided=aided, doubtful=doubtful)
 
     @property
     def chapters(self) -> dict[str, list[tuple[type[Part], PartEntry, int]]]:
@@ -158,13 +167,18 @@ class ReportedAnswer:
         return scene if self.study == self.answer.scene else f"{scene} ({study})"
 
 
+def place_words(made: SceneAnswer) -> str:
+    """Length of the runs, and the parameters that differ from the scene's own, for a reader."""
+    return ", ".join([f"over {made.until:g} s", *parameter_words(made)])
+
+
 def how(item: EngineAnswer) -> str:
     """Setting and step of an engine that holds, with the part that is not its own; or why none is shown to hold."""
+    name = setting_words(item).removeprefix(f"{engine_title(item.engine)} ")
     if not item.holds:
         told = reason(item).partition("; ")[2]
-        return f"{setting_words(item)}: {told}" if item.spec and told else told
+        return f"{name}: {told}" if item.spec and told else told
     error = error_words(item.bound, item.error) if item.bound is not None and item.error is not None else ""
-    name = setting_words(item).removeprefix(f"{engine_title(item.engine)} ")
     unsure = f"not confirmed: {item.why}" if item.state is State.UNCONFIRMED else ""
     return "; ".join(filter(None, (name, error, brought_words(item), unsure, installed_words(item))))
 
@@ -197,10 +211,10 @@ def answers_sentence(answers: Sequence[ReportedAnswer]) -> str:
     of_first = [item for item in answers if item.answer.tolerance == answers[0].answer.tolerance]
     won: dict[str, list[str]] = {}
     for item in of_first:
-        taken = item.answer.taken
-        won.setdefault(engine_title(taken.engine) if taken else "none shown", []).append(item.words)
+        confirmed = item.answer.confirmed
+        won.setdefault(engine_title(confirmed.engine) if confirmed else "none", []).append(item.words)
     clauses = "; ".join(f"{title} for {', '.join(names)}" for title, names in won.items())
-    return f"The cheapest that holds {tolerance_words(of_first[0].answer)}: {clauses}."
+    return f"The fastest confirmed to hold {tolerance_words(of_first[0].answer)}: {clauses}."
 
 
 def small(picture: Picture) -> Picture:

@@ -10,7 +10,7 @@ from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.conclusions import standings
 from proofroll.report.comparison.records import ReportedComparison, ReportedRun
 from proofroll.report.comparison.spread import ALONE
-from proofroll.report.labels import off_by, with_caveat
+from proofroll.report.labels import off_by, scene_words, with_caveat
 from proofroll.report.page.first_screen import ReportedAnswer, answers_sentence
 from proofroll.report.parts import PartEntry, part_kinds
 
@@ -115,6 +115,7 @@ def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
         relative = 0.0 if worst is None else worst.error / worst.scale
         text = "a reaction or an event is wrong" if worst is None else off_by(worst)
         text = row.reason if comparison.laws_alone else text
+        text = f"{text} in {scene_words(comparison.scene).lower()}"
         wrong.append((relative, with_caveat(name, row.caveat), text))
     return wrong
 

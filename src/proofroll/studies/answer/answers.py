@@ -37,7 +37,7 @@ from proofroll.studies.answer.search import (
     searching,
     settings_of,
 )
-from proofroll.studies.answer.setting_search import WHOLE, SearchCaps, SettingSearch, State
+from proofroll.studies.answer.setting_search import BRIEF, WHOLE, SearchCaps, SettingSearch, State
 from proofroll.studies.judging.asked_tolerance import AskedTolerance, orientations_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.study_store import conditions_now, keep_study, valid_study
@@ -105,7 +105,7 @@ def _answered(
 ) -> SceneAnswer:
     """Answer for one tolerance; ``spent``: processor time before it that counts as its own [s]."""
     begin = processor_seconds() - spent
-    reference, runner = abreast.references[question.every], abreast.runner
+    reference = abreast.references[question.every]
     bounds = bounds_of(tolerance, reference)
     unanswerable = unanswerable_because(bounds, reference)
     allowed = {bound.quantity: bound.allowed for bound in bounds}
@@ -114,7 +114,7 @@ def _answered(
     lacking = [EngineSearch(engine=name, settings=[], cannot=why) for name, why in absent.items()]
     generators = [searching(search, question) for search in searches]
     abreast.run(generators, lambda number: tell(engine_answer(searches[number], bounds), question.until))
-    speeds = _speeds(searches, question, runner)
+    speeds = _speeds(searches, question, abreast)
     return SceneAnswer(
         scene=question.scene,
         parameters=question.parameters,
@@ -159,29 +159,38 @@ def unanswerable_because(bounds: Sequence[AllowedError], reference: Reference) -
     return f"the truth itself is known to {blurred.truth_bar:.1g} {blurred.unit} of {blurred.quantity} only"
 
 
-def _speeds(searches: Sequence[EngineSearch], question: AnswerQuestion, runner: Runner) -> dict[str, float]:
-    """Setting with its step -> seconds per simulated second, of the cheapest and those near it, measured alone.
-
-    It is the least wall time, or the processor time of the search where that is less: others may have the processor.
-    """
+def _speeds(searches: Sequence[EngineSearch], question: AnswerQuestion, abreast: SearchesAbreast) -> dict[str, float]:
+    """Setting with its step -> seconds per simulated second, of the cheapest and those near it, measured alone."""
     chosen = {
         spec_of(item): (item, run)
         for search in searches
         for item in search.settings
         if item.state in {State.HOLDS, State.UNCONFIRMED} and (run := item.chosen) is not None
     }
-    if not chosen:
-        return {}
-    least = min(run.cost for _, run in chosen.values())
+    least = min((run.cost for _, run in chosen.values()), default=math.inf)
     near = {spec: pair for spec, pair in chosen.items() if pair[1].cost <= _NEAR * least}
-    tasks = {}
+    return speeds_alone(near, question, abreast)
+
+
+def speeds_alone(
+    runs: Mapping[str, tuple[SettingSearch, JudgedRun]], question: AnswerQuestion, abreast: SearchesAbreast
+) -> dict[str, float]:
+    """Setting with its step -> seconds per simulated second of its run, measured with no other run beside it.
+
+    It is the least wall time, or the processor time of the search where that is less: others may have the processor.
+    What was measured for another tolerance is not measured again.
+    """
+    known, runner, tasks = abreast.speeds, abreast.runner, {}
     with Stopwatch(runner.workers) as stopwatch, runner.profile.phase(TIMING):
-        for spec, (item, run) in near.items():
+        for spec, (item, run) in runs.items():
+            if spec in known:
+                continue
             facts = at_step(item.facts, run.step)
             case = question.case(facts, question.every, item.caps.run, item.allowed)
             tasks[spec] = partial(stopwatch, case, _SECONDS)
-        timings = time_in_rounds(tasks, _ROUNDS, once_above=_ONCE)
-    return {spec: min(*timing.values, near[spec][1].cost) for spec, timing in timings.items()}
+        timings = time_in_rounds(tasks, _ROUNDS, once_above=_ONCE) if tasks else {}
+    known |= {spec: min(*timing.values, runs[spec][1].cost) for spec, timing in timings.items()}
+    return {spec: known[spec] for spec in runs if spec in known}
 
 
 def spec_of(item: SettingSearch, run: JudgedRun | None = None) -> str:
@@ -295,6 +304,18 @@ def answer_path(
     content = [question.loaded.digest, question.until, question.every, bounds, sorted(engines), *caps]
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
     return folder / "answers" / f"{question.loaded.name}-{digest}.json"
+
+
+def longest_stored(
+    folder: Path, question: AnswerQuestion, asked: AskedTolerance, engines: Sequence[str] = (), *, whole: bool = False
+) -> SceneAnswer | None:
+    """Stored answer of the longest search, so that every command tells the same; None: there is none.
+
+    ``whole``: not one of a report's briefer searches, unless a longer one would find no more.
+    """
+    paths = (answer_path(folder, question, asked, engines, caps) for caps in (WHOLE, BRIEF))
+    longer, brief = (stored(path, SceneAnswer) for path in paths)
+    return longer or (None if brief is not None and whole and brief.is_cut_short else brief)
 
 
 def stored(path: Path, kind: type[_Answer]) -> _Answer | None:

@@ -7,17 +7,19 @@ from collections.abc import Sequence
 
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.multi_element import represents
+from proofroll.core.number_format import number
 from proofroll.core.plugins import EngineSpec, parse_engine
-from proofroll.running.case import EngineFacts
+from proofroll.running.case import EngineFacts, Status
 from proofroll.running.engine_questions import on_scene, resolve_with_truth
 from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
-from proofroll.studies.answer.answers import bounds_of, engine_answer, unanswerable_because
+from proofroll.studies.answer.answers import bounds_of, engine_answer, spec_of, speeds_alone, unanswerable_because
 from proofroll.studies.answer.question import AnswerQuestion
 from proofroll.studies.answer.records import StepAnswer
 from proofroll.studies.answer.search import EngineSearch, SearchesAbreast, searching
-from proofroll.studies.answer.setting_search import SettingSearch
+from proofroll.studies.answer.setting_search import SettingSearch, State
 from proofroll.studies.judging.asked_tolerance import AskedTolerance, orientations_of
+from proofroll.studies.study_store import conditions_now
 
 # Halvings from the coarsest step that is run to the person's own: samples are at whole steps of its double and of four
 # times it. A relative tolerance is made looser by as many decades, up to the loosest that asks for anything.
@@ -87,8 +89,15 @@ def step_answer(
     run = item.runs.get(item.divisor(coarser))
     worst = run.worst(item.allowed) if run else ""
     error = run.errors.get(worst, math.inf) if run else math.inf
-    within = run is not None and (run.of_allowed(item.allowed) or math.inf) <= 1
-    advised = engine_answer(search, bounds)
+    within = run is not None and item.size(item.divisor(coarser)) <= 1
+    compared = [(item, made) for made in (run, item.chosen) if item.chosen and made and made.status is Status.DONE]
+    speeds = speeds_alone({spec_of(*pair): pair for pair in compared}, question, abreast)
+    advised = engine_answer(search, bounds, speeds)
+    luck, finer = item.unsafe.get(coarser, "").rpartition("holds by luck: ")[2], item.divisor(coarser + 1)
+    if not luck and finer in item.runs and item.size(finer) > 1:
+        part = "half" if item.fixed_step else "a tenth"
+        luck = f"{part} of it is off by {number(item.size(finer))} times what is allowed"
+    cost = speeds.get(spec_of(item, run), run.cost) if run else math.inf
     return StepAnswer(
         scene=question.scene,
         parameters=question.parameters,
@@ -102,15 +111,16 @@ def step_answer(
         spec=engine,
         resolution=resolution,
         step=size,
-        holds=within and advised.holds and item.level is not None and item.level <= coarser,
-        luck="" if not within else item.unsafe.get(coarser, ""),
+        holds=within and not luck and item.state is State.HOLDS and (item.level or 0) <= coarser,
+        luck=luck if within else "",
         bound=next((bound for bound in bounds if bound.quantity == worst), None),
         error=error if math.isfinite(error) else None,
         status=str(run.status) if run else "",
         message=run.message if run else "",
         reached=run.reached if run else 0.0,
         held_until=run.held_until(item.allowed) if run else 0.0,
-        seconds_per_second=run.cost if run and math.isfinite(run.cost) else None,
+        seconds_per_second=cost if math.isfinite(cost) else None,
         advised=advised,
         spent=processor_seconds() - begin,
+        measured=conditions_now(),
     )

@@ -9,6 +9,9 @@ from proofroll.core.validation import FloatOrInf
 from proofroll.studies.answer.setting_search import State
 from proofroll.studies.study_store import Measured
 
+# States that a longer search leaves as they are.
+_DECIDED = {State.HOLDS, State.DEARER, State.ELSEWHERE, State.REFUSED, State.CANNOT, State.SILENT}
+
 
 @dataclass(frozen=True)
 class AllowedError:
@@ -178,6 +181,27 @@ class SceneAnswer(AnsweredScene):
         return best if best is not None and best.holds else None
 
     @property
+    def confirmed(self) -> EngineAnswer | None:
+        """The cheapest with a confirmed step: what is advised; None: there is none."""
+        best = self.taken
+        return best if best is not None and best.state is State.HOLDS else None
+
+    @property
+    def perhaps_faster(self) -> EngineAnswer | None:
+        """The cheapest that holds without confirmation, if it is cheaper than the confirmed one; else None."""
+        rival = next((item for item in self.engines if item.state is State.UNCONFIRMED), None)
+        if rival is None or self.confirmed is None:
+            return None
+        cost, least = self.confirmed.seconds_per_second, rival.seconds_per_second
+        return rival if cost and least and least < cost else None
+
+    @property
+    def is_cut_short(self) -> bool:
+        """True if the search left something open that a longer one may decide."""
+        states = {state for item in self.engines for state in (item.state, *(each.state for each in item.settings))}
+        return not states <= _DECIDED
+
+    @property
     def untried(self) -> bool:
         """True if no engine could be tried: each refuses, cannot, or was not run."""
         tried = [item for item in self.engines if item.state not in {State.REFUSED, State.CANNOT, State.NOT_RUN}]
@@ -191,7 +215,7 @@ class StepAnswer(AnsweredScene):
     Attributes:
         spec: engine as it was given.
         resolution, step: ``dt`` or ``rtol``, and its value.
-        holds: True if the step holds the tolerance and may be advised, or could not be confirmed.
+        holds: True if the step holds the tolerance and may be advised.
         luck: clause on why a step within the tolerance must not be advised; empty: it may.
         bound, error: quantity with the largest error over what is allowed, and that error in its unit.
         status, message: of the run with this step.
@@ -199,6 +223,7 @@ class StepAnswer(AnsweredScene):
         seconds_per_second: processor time of it per simulated second.
         advised: answer of the engine with this setting at other steps.
         spent: processor time [s].
+        measured: time, machine and versions.
     """
 
     spec: str
@@ -215,6 +240,13 @@ class StepAnswer(AnsweredScene):
     seconds_per_second: float | None
     advised: EngineAnswer
     spent: float
+    measured: Measured
+
+    @property
+    def undecided(self) -> bool:
+        """True if nothing could be judged, or if the step holds the tolerance and is not confirmed."""
+        within = self.bound is not None and self.error is not None and self.error <= self.bound.allowed
+        return bool(self.open) or (within and not self.holds and not self.luck)
 
 
 def ranked(engines: Sequence[EngineAnswer]) -> list[EngineAnswer]:

@@ -184,12 +184,14 @@ class SearchesAbreast:
 
     Attributes:
         known: key of a case -> its run, also from earlier searches.
+        speeds: setting with its step -> seconds per simulated second, as far as they were measured alone.
     """
 
     references: Mapping[float, Reference]
     runner: Runner
     ran: Callable[[str], None] = lambda _: None
     known: dict[str, JudgedRun] = field(default_factory=dict)
+    speeds: dict[str, float] = field(default_factory=dict)
 
     def run(self, generators: Sequence[Asking], ended: Callable[[int], None] = lambda _: None) -> None:
         """Runs generators to their ends.

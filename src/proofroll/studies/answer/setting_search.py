@@ -52,6 +52,8 @@ _SOUND, _TIMES = 0.05, 30.0
 _ELSEWHERE = 1.05
 # Three halvings of the step that leave this part of the error come no nearer.
 _STAYS = 0.7
+# A run that confirms a step is made though nothing is left, if it takes at most this part of an engine's time.
+_CONFIRMS = 1 / 12
 # Errors at several relative tolerances are the same from this ratio on.
 _ALIKE = 0.99
 # Most halvings at once; most refusals and most runs without an end before a setting is given up.
@@ -290,14 +292,14 @@ class SettingSearch:
         return max(1.0, math.log2(size) / (self.order + 2 if rate is None else max(rate, self.order)))
 
     def _seconds(self, level: int) -> float:
-        """Predicted processor time of a run [s], from the finest one that was made."""
+        """Predicted processor time of a run [s], from the nearest coarser one that was made, or else a finer one."""
         ended = {n: run for n, run in self.levels.items() if math.isfinite(run.cost)}
         if not ended:
             return 0.0
-        finest = max(ended)
-        seconds = ended[finest].cost * self.until * self._growth ** max(0, level - finest)
+        nearest = max((n for n in ended if n <= level), default=min(ended))
+        seconds = ended[nearest].cost * self.until * self._growth ** max(0, level - nearest)
         # a scheme that fails may take longer than at a finer step
-        return seconds if ended[finest].status is Status.DONE else min(seconds, self.caps.run)
+        return seconds if ended[nearest].status is Status.DONE else min(seconds, self.caps.run)
 
     def _affordable(self, level: int, left: float, held: int | None = None) -> int | None:
         """Divisor of a level if its run is affordable; None: the setting is decided.
@@ -313,8 +315,16 @@ class SettingSearch:
                 self.decide(State.FINER, f"a run of more than {self.caps.run:g} s of processor time")
                 return None
         spent = self.levels[finest].status is Status.TIMEOUT
-        if seconds <= self.caps.run and left > 0 and not (spent and held is not None):
+        is_left = left > 0 or (held is not None and self._confirms(seconds))
+        if seconds <= self.caps.run and is_left and not (spent and held is not None):
             return self.divisor(level)
+        if held is not None:
+            check, fault = self._uneven_check(held)
+            if fault:
+                self.unsafe[held] = fault
+                return self.next_divisor(left)
+            if check is not None and left > 0 and self._seconds(held) * 1.5 <= self.caps.run:
+                return check
         reason = (
             f"the next step takes {seconds:.0f} s of processor time, and a run may take {self.caps.run:g}"
             if seconds > self.caps.run
@@ -324,6 +334,10 @@ class SettingSearch:
         self.decide(State.FINER if held is None else State.UNCONFIRMED, reason)
         return None
 
+    def _confirms(self, seconds: float) -> bool:
+        """True if a run is short enough to confirm a step beyond the engine's time."""
+        return seconds <= _CONFIRMS * self.caps.engine
+
     def _checked(self, good: int, left: float) -> int | None:
         """Divisor of a check of a step that holds, as its half does; None: the setting is decided.
 
@@ -332,7 +346,8 @@ class SettingSearch:
         """
         check, fault = self._next_check(good)
         if check is not None:
-            return check if left > 0 else self._affordable(good, left, held=good)
+            is_left = left > 0 or self._confirms(self._seconds(good))
+            return check if is_left else self._affordable(good, left, held=good)
         if fault:
             self.unsafe[good] = fault
             return self.next_divisor(left)
@@ -357,16 +372,30 @@ class SettingSearch:
         irregular = size < _REGULAR * half or bool(self.unsafe)
         if not irregular and (size <= 1 / _MARGIN or self.order > 1):
             return None, ""
-        uneven = 5 * divisor // 4 if good >= 2 else 3
-        if uneven not in self.runs:
-            return uneven, ""
-        between, fault = self.size(uneven), ""
-        lucky, off = number(self.step(divisor), 3), number(self.step(uneven), 3)
-        if between > 1:
-            fault = f"dt {lucky} s holds by luck: dt {off} s is off by {number(between)} times what is allowed"
-        elif irregular and max(size, half, between) > 1 / _MARGIN:
+        uneven, fault = self._uneven_check(good)
+        if uneven is not None or fault:
+            return uneven, fault
+        between = self.size(self._uneven(good))
+        if irregular and max(size, half, between) > 1 / _MARGIN:
+            lucky = number(self.step(divisor), 3)
             fault = f"from dt {lucky} s on errors do not fall in order, with less than a factor of {_MARGIN:g}"
         return None, fault
+
+    def _uneven(self, good: int) -> int:
+        """Divisor of a step between a level and the next one."""
+        return 5 * self.divisor(good) // 4 if good >= 2 else 3
+
+    def _uneven_check(self, good: int) -> tuple[int | None, str]:
+        """Check of a step that is no half of any other, or the fault that it shows; see :meth:`_next_check`."""
+        uneven = self._uneven(good)
+        if not self.fixed_step or self.given is not None:
+            return None, ""
+        if uneven not in self.runs:
+            return uneven, ""
+        if (between := self.size(uneven)) <= 1 or self.runs[uneven].status is Status.TIMEOUT:
+            return None, ""
+        lucky, off = number(self.step(self.divisor(good)), 3), number(self.step(uneven), 3)
+        return None, f"dt {lucky} s holds by luck: dt {off} s is off by {number(between)} times what is allowed"
 
     def _breakdown_check(self, good: int) -> tuple[int | None, str]:
         """Check of a third more than the step, where twice of it breaks down; see :meth:`_next_check`."""

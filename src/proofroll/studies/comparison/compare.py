@@ -146,7 +146,7 @@ def run_plan(
 
 
 def _without_ladder(planned: Plan, results: Mapping[str, Result]) -> dict[str, Result]:
-    """Results of the further steps of rows whose own step has no result: the same, for they judge nothing then."""
+    """Results of the further steps of rows whose own step has no result: not run, for they judge nothing then."""
     ladders = [(run.ladder.values(), results.get(run.ladder[1.0].key)) for run in planned.runs if run.ladder]
     lost, awaited = dict[str, Result](), {*results}
     for cases, result in ladders:
@@ -154,9 +154,8 @@ def _without_ladder(planned: Plan, results: Mapping[str, Result]) -> dict[str, R
         if result is None or result.status in {Status.DONE, Status.LEFT_OUT}:
             awaited |= {*keys}
         else:
-            lost |= dict.fromkeys(
-                keys, Result(result.status, f"not run, as the own step gave nothing: {result.message}")
-            )
+            why = f"the own step gave nothing ({result.status}: {result.message})"
+            lost |= dict.fromkeys(keys, Result(Status.NOT_RUN, why))
     return {key: result for key, result in lost.items() if key not in awaited}
 
 
@@ -229,13 +228,17 @@ def _without_result(run: Planned, point: ComparedPoint, result: Result) -> Run:
     return replace(failed, contradictions=[contradiction])
 
 
+# Clause on a truth that gave no answer; a refusal is its answer.
+_TRUTH_LOST = {Status.TIMEOUT: "the truth took too long: "}
+
+
 def _without_truth(run: Planned, point: ComparedPoint, result: Result) -> Run:
-    """Row at a point without a truth: not judged if the truth was refused, failed if its run was lost."""
+    """Row at a point without a truth, which is not judged: left out if the truth was, or with the reason."""
     truth = point.result
-    lasts = truth.status in LASTING
-    status = Status.NO_TRUTH if lasts else truth.status
-    result = replace(result, status=status, message=f"there is no truth here: {truth.message}")
-    return _run(run, result) if lasts else _without_result(run, point, result)
+    if truth.status is Status.LEFT_OUT:
+        return _run(run, replace(result, status=truth.status, message=truth.message))
+    clause = "" if truth.status in LASTING else _TRUTH_LOST.get(truth.status, "the truth ended in an error: ")
+    return _run(run, replace(result, status=Status.NO_TRUTH, message=f"{clause}{truth.message}"))
 
 
 def _of_another_scene(run: Planned, result: Result, sentence: str) -> Run:

@@ -174,7 +174,7 @@ class Outcome:
 
     @property
     def lost(self) -> list[Run]:
-        """Runs whose engine is missing, crashed or hung, unless the comparison claims that it fails.
+        """Runs whose engine is missing, crashed or hung, unless the comparison claims that it fails, or whose truth is.
 
         Where nothing is claimed also runs that failed in another way, or all of them if none was judged. A witness,
         which cross-checks the truth, counts there only if no engine was compared.
@@ -186,7 +186,9 @@ class Outcome:
             claims = verdicts != set(Verdict)
             if engines and not claims and run.facts is not None and run.facts.witness:
                 continue
-            if run.result.status in _BROKEN:
+            if (point := self.points.get(point_name(run.parameters))) is not None and point.result.status in _BROKEN:
+                lost.append(run)
+            elif run.result.status in _BROKEN:
                 lost += [run] * (Verdict.FAILED not in verdicts or not claims)
             elif not claims and run.verdict is Verdict.FAILED:
                 lost.append(run)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _USUAL = Tolerance(0.01, True)
 _LEAST = 0.01
 _MILLI = 1e3
-_NO_TOLERANCE = "no tolerance is given for it"
+_NO_TOLERANCE = "no tolerance is given"
 _UNDETERMINED = "the truth does not determine it"
 _CONTRADICTS = "that is against the state of the same trajectory"
 _MOST_TRUTHS = 64
@@ -72,7 +72,7 @@ class Compared:
         difference = f"{quantity} {verb} off by {error}{unit}{when}, allowed {allowed}{unit}"
         if not np.isfinite(judgement.error):
             counts = judgement.reason.removeprefix("the question is ill-posed here; ").partition(";")[0]
-            unlike = f"has {counts}" if " values, the truth has " in counts else f"{verb} not finite{self.lost}"
+            unlike = f"has {counts}" if ", the truth has " in counts else f"{verb} not finite{self.lost}"
             difference = f"{quantity} {unlike}{when}"
         bar = f"the truth is known to {number(judgement.truth_error_bar)}{unit}"
         if judgement.verdict is Verdict.NOT_JUDGED:

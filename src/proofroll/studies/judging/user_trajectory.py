@@ -259,11 +259,13 @@ def _dataset(run: RunInput, columns: Mapping[str, str]) -> xr.Dataset:
         run = {key: item for key, item in run.items() if key != name} | {new: renamed}
     arrays = {str(name): np.asarray(run[name]) for name in run}
     if "time" not in arrays:
-        raise InputError("run", ", ".join(arrays), "it has no time; add the times in s as time")
+        raise InputError("run", ", ".join(arrays) or "nothing", "it has no time; add the times in s as time")
     for column, values in arrays.items():
         if column == "time" or (values.dtype.kind in "mM" and np.datetime_data(values.dtype)[0] == "generic"):
             _require_numbers(column, values)  # of dates without a unit numpy cannot even make a text
     _check_lengths(arrays)
+    if arrays["time"].dtype == np.float16:
+        arrays["time"] = arrays["time"].astype(float)  # an index cannot hold them
     attrs = {str(name): dict(getattr(run[name], "attrs", {})) for name in run}
     dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in arrays.items()}
     variables = {name: (dims[name], values, attrs[name]) for name, values in arrays.items()}
@@ -288,7 +290,10 @@ def _from_file(path: Path, columns: Mapping[str, str]) -> RunInput:
 
 
 def _check_lengths(arrays: Mapping[str, Any]) -> None:
-    count = np.shape(arrays["time"])[0] if np.ndim(arrays["time"]) == 1 else 0
+    shape = np.shape(arrays["time"])
+    if len(shape) != 1:
+        raise InputError("run", "time", f"its shape is {shape}; give one number for each sample")
+    count = shape[0]
     for name, values in arrays.items():
         if np.ndim(values) == 0 or len(values) != count:
             raise InputError(

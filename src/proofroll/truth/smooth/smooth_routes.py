@@ -117,8 +117,8 @@ class SmoothBodies(ContactBodies):
                 raise
             taylor, start, y = series[-1]
             (last,) = taylor.inside(start, y, stopped.time, np.array([stopped.time]))
-            known = self._of_series(series, time, state, mode, stopped.time, last)
-            raise StoppedWithin(str(stopped), stopped.time, known) from None
+            path = self._of_series(series, time, state, mode, stopped.time, last)
+            raise StoppedWithin(str(stopped), stopped.time, path) from None
         return self._of_series(series, time, state, mode, until, last)
 
     def _of_series(
@@ -189,24 +189,24 @@ def _implicit_stretch(
         Diverged: no step is small enough, or one passes a singular pose.
     """
     system = System(rates, lambda y: _jacobian(rates, y), np.ones(len(start)))
-    state, now, steps = start, 0.0, list[DenseStep]()
+    state, time, steps = start, 0.0, list[DenseStep]()
     speed = float(np.abs(rates(state[None])).max())
     length, last = 1e-3 / max(1.0, speed), None
-    while now < until:
-        length = min(length, until - now)
-        if now + length == now:
-            raise Diverged(f"implicit collocation stopped at t = {now:.6g} s", now)
+    while time < until:
+        length = min(length, until - time)
+        if time + length == time:
+            raise Diverged(f"implicit collocation stopped at t = {time:.6g} s", time)
         scaled = replace(system, scale=np.maximum(1.0, np.abs(state)))
-        step = take(scaled, now, state, length, _guess(system, last, now, state, length))
+        step = take(scaled, time, state, length, _guess(system, last, time, state, length))
         error, alone = by_states(step, scaled.scale)
         next_step = next_length(replace(step, error=max(alone, error if error > tolerance else 0.0)), tolerance)
         if error > tolerance:
             length, last = min(next_step, 0.8 * length), last if np.isfinite(error) else None
             continue
-        reached = until if length == until - now else now + length
-        steps.append((now, reached, partial(_transposed, step)))
-        now, last, length = reached, step, next_step
-        state = corrected(np.append(step.last[:-1], now))
+        reached = until if length == until - time else time + length
+        steps.append((time, reached, partial(_transposed, step)))
+        time, last, length = reached, step, next_step
+        state = corrected(np.append(step.last[:-1], time))
     return Stretch(start=0.0, end=until, mode=(), first=start, last=state, guard=None, dense=steps, exact=bool(steps))
 
 

@@ -316,12 +316,12 @@ class _SmoothTruth:
         def inside(times: Array) -> Array:
             return np.column_stack([*motion(times), times]).T
 
-        first, last = inside(np.array([0.0, self._until])).T
+        begin, last = inside(np.array([0.0, self._until])).T
         stretch = Stretch[tuple[()]](
             start=0.0,
             end=self._until,
             mode=(),
-            first=first,
+            first=begin,
             last=last,
             guard=None,
             dense=[(start, end, inside) for start, end in spans],

@@ -431,10 +431,10 @@ class ContactWalks(ABC):
             return None
         first_duration = faint_time(touch, slows)
         half = state + first_duration / 2 * rate
-        first, across = slip / speed, cross(normal, slip / speed)
+        direction, across = slip / speed, cross(normal, slip / speed)
 
         def held(angle: float) -> tuple[ContactMode, Array]:
-            x, y, z = (np.cos(angle) * first + np.sin(angle) * across).tolist()
+            x, y, z = (np.cos(angle) * direction + np.sin(angle) * across).tolist()
             turned = (*mode[:k], mode[k]._replace(heading=(x, y, z), leads=True), *mode[k + 1 :])
             return turned, self._solved(half, turned).slide_rate[k]
 

@@ -18,6 +18,7 @@ from proofroll.report.answer.sentences import (
 )
 from proofroll.studies.answer.records import AllowedError, SettingTried, StepAnswer, StepTried
 from proofroll.studies.answer.setting_search import State
+from proofroll.studies.study_store import Measured
 
 METRES = AllowedError("positions", "m", 1e-3, 2.0, 1e-12, relative=False)
 OWN = StepAnswer(
@@ -25,6 +26,7 @@ OWN = StepAnswer(
     beyond="", open="",
     spec="alpha[dt=0.002]", resolution="dt", step=2e-3, holds=True, luck="", bound=METRES, error=1.2e-4, status="done",
     message="", reached=5.0, held_until=5.0, seconds_per_second=1 / 160, advised=replace(HELD, step=2e-3), spent=1.0,
+    measured=Measured("2026", {}, {}, ""),
 )  # fmt: skip
 
 
@@ -44,10 +46,12 @@ def test_settings_are_told_in_two_words() -> None:
     assert sentence(replace(HELD, settings=[tried]), 2.0).endswith("; as installed: rough, dt 5e-4 s: 25×.")
     off = replace(tried, steps=runs[:1])
     assert installed_words(replace(HELD, settings=[off])) == (
-        "as installed: dearer, 4 times too far off at rough, dt 2e-3 s"
+        "as installed: dearer (rough, dt 2e-3 s is off by 4 times what is allowed)"
     )
+    finer = installed_words(replace(HELD, settings=[replace(off, state=State.FINER)]))
+    assert finer == "as installed: rough, dt 2e-3 s is off by 4 times what is allowed"
     refused = replace(tried, state=State.REFUSED, why="it cannot", steps=[])
-    assert installed_words(replace(HELD, settings=[refused])) == "as installed: it cannot"
+    assert installed_words(replace(HELD, settings=[refused])) == "as installed: refused, it cannot"
     assert installed_words(replace(HELD, preset="default", settings=[tried])) == ""
     assert installed_words(replace(FINER, settings=[tried])) == ""
 
@@ -66,11 +70,25 @@ def test_an_answer_begins_with_what_to_take() -> None:
     assert lines[0].startswith("Take beta only, as installed, dt 1e-3 s (through proofroll's integrator): 100× real")
     assert lines[1].startswith("Without a part of proofroll: alpha fine, best, dt 1e-3 s: 50×")
     assert [line[0] for line in lines[2:]] == ["·", "N", "J"]
-    assert lines[3] == "Not good enough: twice the step is off by 4e-4."
+    assert lines[3] == "Not good enough: twice the step is off by 4 times what is allowed."
     assert lines[4] == "Judged: z, every 0.02 s over 2 s. Not judged: attitude."
+    pressed = replace(scene_answer(HELD), bounds=[replace(scene_answer(HELD).bounds[0], quantity="N", unit="N")])
+    assert list(answer_lines(pressed))[-1].startswith("Judged: N, every 0.02 s over 2 s, forces after the start.")
     assert taken_sentence(scene_answer(FINER)) == "No engine is shown to hold 1e-4 of the path over 2 s."
     blurred = replace(scene_answer(), open="the truth itself is known to 1e-3 m of z only")
     assert taken_sentence(blurred) == "Nothing can be advised for 1e-4: the truth itself is known to 1e-3 m of z only."
+
+
+def test_what_is_not_confirmed_is_not_advised() -> None:
+    """Nothing is to be taken where nothing is confirmed; what may be faster than the advised one is named."""
+    unsure = replace(THROUGH, state=State.UNCONFIRMED, why="the next step takes 9 s")
+    told = taken_sentence(scene_answer(unsure, FINER))
+    assert told.startswith("No engine is confirmed to hold 1e-4 of the path over 2 s; the fastest that may: beta only,")
+    assert told.endswith("; not confirmed: the next step takes 9 s.")
+    both = taken_sentence(scene_answer(HELD, unsure))
+    assert both == f"Take {sentence(HELD, 2.0)} beta only may be 2 times faster, not confirmed."
+    slower = replace(unsure, seconds_per_second=1.0)
+    assert taken_sentence(scene_answer(HELD, slower)) == f"Take {sentence(HELD, 2.0)}"
 
 
 def test_a_persons_step_is_good_enough_or_not() -> None:
@@ -80,10 +98,20 @@ def test_a_persons_step_is_good_enough_or_not() -> None:
     )
     coarser = replace(OWN, advised=replace(HELD, step=8e-3, seconds_per_second=1 / 640))
     assert step_sentence(coarser).endswith("; dt 8e-3 s would do, 4 times faster.")
+    no_faster = replace(OWN, advised=replace(HELD, step=8e-3, seconds_per_second=1 / 170))
+    assert step_sentence(no_faster).endswith("; dt 8e-3 s would do.")
     would = replace(HELD, bound=METRES, error=7.8e-4)
     no = replace(OWN, holds=False, error=1.7e-3, held_until=1.0, advised=would)
     assert step_sentence(no) == (
         "No: 1.7 mm of 1 mm over 5 s; it holds until 1 s; dt 1e-3 s would do (0.78 mm), 50× real time."
+    )
+    assert step_sentence(replace(no, held_until=0.0)).startswith("No: 1.7 mm of 1 mm over 5 s; dt 1e-3 s would do")
+    unsure = replace(OWN.advised, state=State.UNCONFIRMED, why="the next step takes 9 s")
+    perhaps = replace(OWN, holds=False, advised=unsure)
+    assert perhaps.undecided
+    assert not no.undecided
+    assert step_sentence(perhaps) == (
+        "Perhaps: 0.12 mm of 1 mm over 5 s (dt 2e-3 s, 160× real time); not confirmed: the next step takes 9 s."
     )
     lucky = replace(no, error=9e-4, luck="dt 1.6e-3 s is off by 2 times what is allowed")
     assert step_sentence(lucky).startswith("No: 0.9 mm of 1 mm over 5 s is luck: dt 1.6e-3 s is off by 2 times")

@@ -30,6 +30,7 @@ def test_a_step_is_good_enough_or_is_not(proofroll: Proofroll, tmp_path: Path) -
     assert content["holds"]
     assert content["sentence"].startswith("Yes: ")
     assert content["error"] <= 1e-3
+    assert json.loads(proofroll(*asked(tmp_path, engine.format(1e-3)), "--json")[1]) == content, "it is stored"
     code, out, _ = proofroll(*asked(tmp_path, engine.format(1e-3).replace("matched", "default"), "--tolerance", "1 nm"))
     assert code == 1
     assert out.startswith("No: ")

@@ -128,12 +128,35 @@ def test_no_verdict_from_a_run_that_was_not_made() -> None:
 
 
 def test_a_step_whose_half_is_not_affordable_is_not_confirmed() -> None:
-    """A step that holds is told as not confirmed, if half of it costs more than a run may, or nothing is left."""
+    """A step that holds is told as not confirmed, if half of it costs more than a run may, or nothing is left.
+
+    A short run confirms a step though nothing is left.
+    """
     assert searched(setting(5), lambda step: 0.02 * step, each=2e-3).state is State.UNCONFIRMED
+    for cost, state in ((0.2, State.UNCONFIRMED), (0.1, State.HOLDS)):  # of 10 s; the next step takes twice as long
+        item = setting(5)
+        item.runs[32] = run_of(item.step(32), lambda _: 5e-5, cost)
+        item.runs[16] = run_of(item.step(16), lambda _: 5e-3, cost)
+        assert searched(item, lambda step: 0.02 * step, left=0.0).state is state
+
+
+def test_luck_is_unmasked_where_half_the_step_is_not_affordable() -> None:
+    """Where half of a step costs too much, a step between them is run; if it fails, the first held by luck."""
+    law = {0.1: 5e-3, 0.05: 5e-3, 0.025: 5e-5, 0.02: 2e-4}
+    item = searched(setting(2), lambda step: law[step], each=0.012)
+    assert item.step(5) in {run.step for run in item.runs.values()}
+    assert item.state is State.FINER
+    assert "dt 0.025 s holds by luck: dt 0.02 s is off by 2 times" in "; ".join(item.unsafe.values())
+    sound = searched(setting(2), lambda step: (law | {0.02: 5e-5})[step], each=0.012)
+    assert (sound.state, sound.chosen and sound.chosen.step) == (State.UNCONFIRMED, 0.025)
+
+
+def test_a_coarser_run_tells_what_a_step_takes() -> None:
+    """The time of a step between two that were run is that of the coarser one by its ratio, not of the finer one."""
     item = setting(5)
-    item.runs[32] = run_of(item.step(32), lambda _: 5e-5, 1e-3)
-    item.runs[16] = run_of(item.step(16), lambda _: 5e-3, 1e-3)
-    assert searched(item, lambda step: 0.02 * step, left=0.0).state is State.UNCONFIRMED
+    for divisor, error, cost in ((2, 5e-3, 0.01), (4, 5e-5, 0.02), (32, 1e-9, 0.5)):
+        item.runs[divisor] = run_of(item.step(divisor), lambda _, error=error: error, cost)
+    assert item.next_divisor(0.0) == 8
 
 
 def test_one_refusal_may_be_that_of_a_step() -> None:

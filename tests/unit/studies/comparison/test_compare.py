@@ -500,12 +500,12 @@ def test_a_point_where_the_truth_refuses(tmp_path: Path) -> None:
     assert outcome.contradictions == []
     for run in there:
         assert (run.verdict, run.judgements, run.missing) == (Verdict.NOT_JUDGED, [], [])
-        assert run.result.message == "there is no truth here: the ball is back on the wall"
+        assert run.result.message == "the ball is back on the wall"
         assert run.result.trajectory is not None
     content = outcome_content(outcome)
     assert [row.verdict for row in content.rows] == ["agrees", "agrees"]
     assert [row.verdicts["not-judged"] for row in content.rows] == [1, 1]
-    assert content.runs[1].reason.startswith("no truth at speed=4: there is no truth here: the ball")
+    assert content.runs[1].reason.startswith("no truth at speed=4: the ball")
 
 
 def test_where_no_motion_is_unique_tolerances_of_motion_judge_nobody(tmp_path: Path) -> None:
@@ -522,22 +522,24 @@ def test_where_no_motion_is_unique_tolerances_of_motion_judge_nobody(tmp_path: P
     assert "no motion is unique here, and no law has a tolerance: " in outcome.runs[0].result.message
 
 
-@pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
-def test_a_point_where_the_truth_is_lost(tmp_path: Path, status: Status) -> None:
-    """Where the truth crashed or hung every row fails and says so; the other points are judged as ever."""
+@pytest.mark.parametrize(
+    ("status", "clause"), [(Status.CRASHED, "the truth ended in an error"), (Status.TIMEOUT, "the truth took too long")]
+)
+def test_a_point_where_the_truth_is_lost(tmp_path: Path, status: Status, clause: str) -> None:
+    """Where the truth crashed or hung no engine is judged or accused, the exit code is 3; other points are judged."""
     rows = [ROW, dataclasses.replace(ROW, engine="beta")]
     none = {4.0: Result(status, "the ball is back on the wall")}
     outcome = judged(tmp_path, claim(rows, [3.0, 4.0, 5.0]), the_truth, none)
     verdicts = {(run.row.engine, run.parameters["speed"]): run.verdict for run in outcome.runs}
     assert verdicts == {
-        (engine, speed): Verdict.FAILED if speed == 4.0 else Verdict.AGREES
+        (engine, speed): Verdict.NOT_JUDGED if speed == 4.0 else Verdict.AGREES
         for engine in ("alpha", "beta")
         for speed in (3.0, 4.0, 5.0)
     }
-    assert len(outcome.contradictions) == 2
-    for said in outcome.contradictions:
-        assert "at speed=4" in said
-        assert said.endswith("expected: agrees (there is no truth here: the ball is back on the wall)")
+    assert outcome.contradictions == []
+    assert {run.result.message for run in outcome.lost} == {f"{clause}: the ball is back on the wall"}
+    assert len(outcome.lost) == 2
+    assert exit_code([outcome]) == 3
 
 
 @pytest.mark.parametrize(("longest", "until"), [(1.0, 0.4), (0.1, 0.05), (0.001, 0.4)])
@@ -594,7 +596,7 @@ def test_the_other_steps_of_a_lost_row_are_not_run(status: Status) -> None:
     assert set(ran) & others == (others if status is Status.DONE else set())
     if status is not Status.DONE:
         assert all(results[key] is told[key] for key in others)
-        assert {results[key].status for key in others} == {status}
+        assert {results[key].status for key in others} == {Status.NOT_RUN}
 
 
 LEFT_OUT = Result(Status.LEFT_OUT, "the 60 s of processor time did not suffice")

@@ -13,7 +13,7 @@ import xarray as xr
 
 import proofroll
 from proofroll.core.errors import InputError
-from proofroll.files.trajectory_file import read_arrays
+from proofroll.files.trajectory_file import read_arrays, read_columns
 
 TIMES = np.linspace(0, 1, 11)
 
@@ -90,11 +90,31 @@ def test_rows_are_counted_before_anything_is_unpacked(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=words):
         proofroll.judge(run, "pendulum", columns={"t": "time", "angle": "q.pivot"})
     tracemalloc.start()
+    with pytest.raises(ValueError, match="no stored trajectory"):
+        read_columns(run)
     with pytest.raises(ValueError, match=words):
         read_arrays(run, "t")
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 8e6  # bytes: half of the array
+
+
+def test_more_samples_than_a_run_may_have_are_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file of more times than a run may have samples is refused by the header of its times."""
+    monkeypatch.setattr("proofroll.files.trajectory_file.MOST_SAMPLES", 10)
+    np.savez(tmp_path / "run.npz", time=TIMES, **{"q.pivot": TIMES})  # type: ignore[arg-type]  # its keywords are arrays
+    with pytest.raises(InputError, match="it has 11 times; thin them to at most 10"):
+        proofroll.judge(tmp_path / "run.npz", "pendulum")
+
+
+@pytest.mark.filterwarnings("error")
+def test_times_of_half_precision_and_columns_of_another_shape_are_told_apart() -> None:
+    """Times as float16 are read without a warning; a table of times, and a quantity of another shape, are named."""
+    angles = np.full(11, 2.8)
+    with pytest.raises(InputError, match=r"its shape is \(11, 1\); give one number for each sample"):
+        proofroll.judge({"time": TIMES[:, None], "q.pivot": angles}, "pendulum")
+    run = {"time": TIMES.astype(np.float16), "q.pivot": np.tile(angles[:, None], 5)}
+    assert "q.pivot has the shape (11, 5), the truth has (11,)" in str(proofroll.judge(run, "pendulum"))
 
 
 def test_judge_has_a_limit_of_time(command_line: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:

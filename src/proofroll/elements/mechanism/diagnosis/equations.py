@@ -311,7 +311,8 @@ def is_one_motion(run: Any, truth: Any, length: float, step: float = 0.0) -> boo
     """False if errors of places are none that errors of velocities make: the report is wrong then, and no law.
 
     Intervals in which a velocity jumps are left out. A scheme of first order moves places by velocities of up to a step
-    away. ``length``: size of the mechanism [m]; ``step``: of the engine [s].
+    away, and soft joints move origins that they hold by a small part of what the bodies are off. ``length``: size of
+    the mechanism [m]; ``step``: of the engine [s].
     """
     count = min(dataset.sizes["time"] for dataset in (run, truth))
     h = np.diff(truth["time"].to_numpy()[:count])[:, None]
@@ -323,10 +324,11 @@ def is_one_motion(run: Any, truth: Any, length: float, step: float = 0.0) -> boo
         changes = np.max(np.abs(np.diff(velocities, axis=0)), axis=1)
         smooth &= changes <= _JUMPS * np.median(changes)
     off, rate = p - true_p, v - true_v
+    turned, true_turned = (quaternions(dataset)[:count] for dataset in (run, truth))
+    chords = [np.linalg.norm(turned - sign * true_turned, axis=-1) for sign in (1.0, -1.0)]
+    farthest = max(float(np.max(np.abs(off))), 2 * length * float(np.max(np.minimum(*chords))))
     unexplained = np.cumsum((np.diff(off, axis=0) - h * (rate[1:] + rate[:-1]) / 2)[smooth], axis=0)
-    least = max(
-        _UNEXPLAINED * float(np.max(np.abs(off))), _LEAST_ERROR * length, step * float(np.max(np.ptp(v, axis=0)))
-    )
+    least = max(_UNEXPLAINED * farthest, _LEAST_ERROR * length, step * float(np.max(np.ptp(v, axis=0))))
     return float(np.max(np.abs(unexplained), initial=0.0)) <= least
 
 

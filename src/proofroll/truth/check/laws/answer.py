@@ -76,9 +76,11 @@ def _settling_time(scene: LawScene, changes: Sequence[PublishedEvent], item: Pub
 
     That is twice the time that rebounds take in their last ratio.
     """
-    if not any(other.settles and abs(other.time - item.time) <= _ROOM * (1 + item.time) for other in changes):
+    if not any(entry.settles and abs(entry.time - item.time) <= _ROOM * (1 + item.time) for entry in changes):
         return 0.0
-    hits = [other.time for other in changes if other.strikes and other.name == item.name and other.time < item.time]
+    hits = [
+        change.time for change in changes if change.strikes and change.name == item.name and change.time < item.time
+    ]
     spans, least = np.diff(hits[-3:]), _LAST_REBOUNDS / scene.rate
     if len(spans) < 2 or not 0 < spans[1] < spans[0]:
         return least
@@ -147,13 +149,13 @@ def held_efforts(
     control, natural = scene.mechanism.control, scene.force * scene.length
     if control is None or control.held != "effort" or control.policy is not None:
         return
-    first = np.searchsorted(tiles.stretch, tiles.stretch[places.tile])  # tile with which the stretch begins
+    first_tiles = np.searchsorted(tiles.stretch, tiles.stretch[places.tile])  # tile with which the stretch begins
     for k, data in enumerate(scene.mechanism.actuators):
         if data.name not in control.actuators:
             continue
         number = scene.mechanism.joint_index[data.joint]
-        begun, effort = turns[number, 0][first, :1], published.pieces.effort[..., k]
-        rates = scene.free(number, tiles)[0].rate[first, :1]
+        begun, effort = turns[number, 0][first_tiles, :1], published.pieces.effort[..., k]
+        rates = scene.free(number, tiles)[0].rate[first_tiles, :1]
         law = law_of(data, target_of(control, data, published.pieces.time), begun, rates)
         residuals.note("effort", data.name, effort - law, np.abs(effort) + natural, published.pieces.time)
 

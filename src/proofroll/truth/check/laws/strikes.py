@@ -34,12 +34,12 @@ def strikes_follow(
         return
     ends, times = tiles.time[borders, -1], np.array([item.time for _, item in events])
     near = np.abs(ends - times[:, None]) <= _BESIDE * (1 + times[:, None])
-    events = [event for event, found in zip(events, near.any(1), strict=True) if found]
+    events = [event for event, is_near in zip(events, near.any(1), strict=True) if is_near]
     near = near[near.any(1)]
-    before, after = borders[near.argmax(1)], borders[near.shape[1] - 1 - near[:, ::-1].argmax(1)] + 1
+    last_rows, first_rows = borders[near.argmax(1)], borders[near.shape[1] - 1 - near[:, ::-1].argmax(1)] + 1
     numbers = [number for number, _ in events]
     heights = values.get("event_height", np.full(len(changes), np.nan))[numbers]
-    for name, chosen, point in (("event_energy_before", before, -1), ("event_energy_after", after, 0)):
+    for name, chosen, point in (("event_energy_before", last_rows, -1), ("event_energy_after", first_rows, 0)):
         if name in values and chosen.size:
             arrays = {key: getattr(tiles, key)[chosen][:, [point]] for key in _ARRAYS}
             whole = np.zeros((len(chosen), 1, len(scene.mechanism.joints), 2))
@@ -51,9 +51,11 @@ def strikes_follow(
             residuals.note("strike", name, off, size + scene.mass.sum() * scene.speed**2, moving.time, bars[name])
     together = near.sum(0)
     for (_, item), row, sooner, later, height in zip(
-        events, near, before.tolist(), after.tolist(), heights, strict=True
+        events, near, last_rows.tolist(), first_rows.tolist(), heights, strict=True
     ):
-        settled = any(other.settles and abs(other.time - item.time) <= _BESIDE * (1 + item.time) for other in changes)
+        settled = any(
+            change.settles and abs(change.time - item.time) <= _BESIDE * (1 + item.time) for change in changes
+        )
         if together[row].max() == 1 and later == sooner + 1 and not settled:
             _restitution(scene, tiles, (sooner, later), item, residuals)
         if np.isfinite(height):
@@ -82,23 +84,23 @@ def _restitution(
     scene: LawScene, tiles: Tiles, sides: tuple[int, int], item: PublishedEvent, residuals: LawResiduals
 ) -> None:
     """The rate of the gap of what struck alone, by the gap in both tiles, or that of its joint turns with its e."""
-    two = tiles.ordered(np.array(sides))
+    beside = tiles.ordered(np.array(sides))
     contact = next((contact for contact in scene.contacts if contact.alone and contact.name == item.name), None)
-    half = np.ptp(two.time, axis=1) / 2
+    half = np.ptp(beside.time, axis=1) / 2
     if contact is not None:
-        distance, restitution = gap_of(contact, two), contact.pair.restitution
-        came, left = (distance[0] @ _ENDS / two.pace[0, -1], distance[1] @ _BEGINS / two.pace[1, 0])
-        far = scene.length + float(np.abs(two.p).max())
-        residuals.note("event", item.name, distance[:1, -1:] / far, 1.0, two.time[:1, -1:])
-        noise, fast = NOISE * far / half.min(), scene.speed + float(np.abs(two.v).max())
+        distance, restitution = gap_of(contact, beside), contact.pair.restitution
+        came, left = (distance[0] @ _ENDS / beside.pace[0, -1], distance[1] @ _BEGINS / beside.pace[1, 0])
+        far = scene.length + float(np.abs(beside.p).max())
+        residuals.note("event", item.name, distance[:1, -1:] / far, 1.0, beside.time[:1, -1:])
+        noise, fast = NOISE * far / half.min(), scene.speed + float(np.abs(beside.v).max())
     elif item.name in scene.mechanism.joint_index:
         number = scene.mechanism.joint_index[item.name]
-        axis, restitution = scene.free(number, two)[0], scene.mechanism.joints[number].restitution
+        axis, restitution = scene.free(number, beside)[0], scene.mechanism.joints[number].restitution
         came, left, noise = axis.rate[0, -1], axis.rate[1, 0], 0.0
         fast = scene.rate * (1.0 if axis.turns else scene.length)
     else:
         return
-    residuals.note("rebound", item.name, np.array([[left + restitution * came]]), fast, two.time[:1, -1:], noise)
+    residuals.note("rebound", item.name, np.array([[left + restitution * came]]), fast, beside.time[:1, -1:], noise)
 
 
 def _height(

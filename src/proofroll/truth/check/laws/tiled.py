@@ -69,8 +69,8 @@ def start_of(scene: LawScene, moving: BodyPoses, residuals: LawResiduals, struck
         if joint.motion is not None:
             q0 = np.array([motion_of(joint.motion, np.zeros((1, 1)))[0, 0]])
         if joint.nq in {4, 7}:
-            wanted = of_quaternion(q0[-4:] / np.linalg.norm(q0[-4:]))
-            off = np.abs(R - wanted).max(keepdims=True)
+            R_start = of_quaternion(q0[-4:] / np.linalg.norm(q0[-4:]))
+            off = np.abs(R - R_start).max(keepdims=True)
             if joint.nq == 7:
                 off = np.maximum(off, np.abs(apart_by - q0[:3]).max() / (scene.length + np.abs(q0[:3]).max()))
         else:

@@ -64,7 +64,7 @@ class Tiles(BodyPoses):
         begins = self.time[:, 0]
         tile = np.clip(np.searchsorted(begins, times * (1 + _LATER), side="right") - 1, 0, len(begins) - 1)
         room = _LATER * (1 + np.abs(times))
-        held = self.resolved[tile] & (times >= begins[tile] - room) & (times <= self.time[tile, -1] + room)
+        inside = self.resolved[tile] & (times >= begins[tile] - room) & (times <= self.time[tile, -1] + room)
         series = self.time[tile] @ TO_SERIES.T
         span = self.time[tile, -1] - begins[tile]
         place = np.divide(2 * (times - begins[tile]), span, out=np.zeros_like(times), where=span > 0) - 1
@@ -74,7 +74,7 @@ class Tiles(BodyPoses):
             place = np.clip(place - np.divide(off, rate, out=np.zeros_like(off), where=rate != 0), -_OUTSIDE, _OUTSIDE)
         values, slopes = (_vandermonde(place) @ TO_SERIES, _vandermonde(place) @ _DERIVATIVE @ TO_SERIES)
         pace = _each(values, self.pace[tile])
-        return Places(tile=tile, held=held, values=values, slopes=slopes, pace=pace, half=span / 2)
+        return Places(tile=tile, held=inside, values=values, slopes=slopes, pace=pace, half=span / 2)
 
 
 class Places(NamedTuple):

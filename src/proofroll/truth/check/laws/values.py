@@ -195,12 +195,12 @@ def _on_wall(scene: LawScene, published: PublishedValues, residuals: LawResidual
     force, normal = pieces.force[:, 0, 0], pieces.normal[:, 0, 0]
     pressed, least = dot(force, normal), float(np.nanmax(np.abs(force), initial=0.0))
     rub = norm(force - pressed[:, None] * normal)
-    for name, value, other in (
+    for name, value, expected in (
         ("N", values["N"], pressed),
         ("F2, F3", np.hypot(values["F2"], values["F3"]), rub),
         ("needed_friction", values["needed_friction"] * values["N"], rub),
     ):
-        _same(name, (value, other), published, residuals, least)
+        _same(name, (value, expected), published, residuals, least)
 
 
 def _same(

@@ -40,6 +40,20 @@ def _causes(
 
 
 @pytest.mark.drill
+@pytest.mark.parametrize("drift", [0.0, 2e-5])
+def test_damping_is_named_although_the_pivot_creeps(drift: float) -> None:
+    """Damping of a pendulum is named where its frame, at the pivot, creeps by what a soft joint leaves, or not."""
+    scene, times = load_scene("pendulum"), np.arange(0.0, 1.0, 0.02)
+    (element,) = scene.elements
+    (joint,) = element.mechanism.joints
+    damped = replace(element, mechanism=replace(element.mechanism, joints=(replace(joint, damping=0.02),)))
+    run = truth(replace(scene, elements=(damped,)), times).copy(deep=True)
+    run["p_WB"][:, 0, 0] += drift * (1 - np.cos(5 * times))
+    (cause,) = _causes(scene, run, truth(scene, times), step=1e-4)
+    assert cause.says.startswith("the joint pivot has damping of 0.02")
+
+
+@pytest.mark.drill
 def test_one_step_early_is_told_of_few_samples() -> None:
     """Eleven samples of a loop that ends a step early tell the step, and no limit of a speed."""
     scene, times = load_scene("four_bar"), np.arange(11) * 0.03
