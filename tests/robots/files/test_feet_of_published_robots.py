@@ -33,7 +33,7 @@ REFUSED = {
 # Package -> its MJCFs that stand on something: gymnasium 1.4.0, metaworld 3.1.1, dm_control 1.0.50, robosuite 1.5.2,
 # playground; folders of others than gymnasium by the variable.
 PACKAGES = "PROOFROLL_ROBOT_PACKAGES"
-EXPRESSIBLE = {"gymnasium": 7, "metaworld": 25, "dm_control": 9, "robosuite": 1, "mujoco_playground": 12}
+EXPRESSIBLE = {"gymnasium": 7, "metaworld": 47, "dm_control": 9, "robosuite": 1, "mujoco_playground": 12}
 # What is said of the others: of shapes that touch or come near, that none does, or that the file is no robot.
 SAID = (
     r"a scene has no contact of .+ and .+ \(.+\)( and \d+ other pairs?)?; give \[ground\] feet",

@@ -47,7 +47,7 @@ _RULED = {frozenset(("plane", kind)) for kind in ("sphere", "capsule", "box", "c
     frozenset(("capsule", "box")),
     *(frozenset((kind,)) for kind in ("sphere", "capsule", "box")),
 }
-# Shapes without a rule on a box that have one on its face, as on a plane.
+# Shapes without a rule on a box that have one on its face, as on a plane; a box that overlaps it is lifted over this.
 _ON_FACES = ("cylinder", "ellipsoid", "mesh")
 _ROUND = ("sphere", "capsule", "mesh")  # a margin around these, or around the corners of a mesh, is a larger radius
 _MOST_CORNERS = 64  # of the convex hull of a mesh; each is a contact
@@ -212,7 +212,8 @@ class _NearPair:
 
     def __post_init__(self) -> None:
         moving, partner = sorted(self.shapes, key=lambda shape: shape.body == WORLD)
-        if self.face and self.touches and partner.kind == "box" and moving.kind in _ON_FACES:
+        of_face = moving.kind in _ON_FACES or (moving.kind == "box" and self.margin - self.start > _OVERLAP)
+        if self.face and self.touches and partner.kind == "box" and of_face:
             partner = partner.face(*self.face)
         object.__setattr__(self, "shapes", (moving, partner))
 
@@ -265,7 +266,8 @@ class _NearPair:
             yield f"a margin of {self.margin:g} m around {kinds[0]}"
         if self.softness[0] > 0 and self.softness[1] < _REBOUNDS:
             yield "a contact that rebounds by its softness"
-        if self.margin - self.start > _OVERLAP and not (lifted and self.shapes[1].body == WORLD):
+        faces_down = self.on_plane and self.shapes[1].R[2, 2] <= 0
+        if self.margin - self.start > _OVERLAP and not (lifted and self.shapes[1].body == WORLD and not faces_down):
             by = f"they overlap by {1e3 * (self.margin - self.start):.3g} mm at the start"
             yield f"{by}: begin elsewhere by [start], or exclude the pair in the file"
 

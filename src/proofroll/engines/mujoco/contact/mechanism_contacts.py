@@ -183,8 +183,7 @@ def _moving(mechanism: Mechanism) -> frozenset[str]:
 class ContactsRead(NamedTuple):
     """Contacts as MuJoCo finds them.
 
-    Gaps [m], normals from b to a, places [m], coefficients of sliding and of rolling in its cone [m], of restitution,
-    and the Delassus matrix [1/kg].
+    Gaps [m], normals from b to a, places [m], coefficients, of rolling in its cone [m], and the Delassus matrix [1/kg].
     """
 
     gap: Array
