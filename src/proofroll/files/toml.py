@@ -89,10 +89,12 @@ def study_content(path: Path, study: str) -> dict[str, Any]:
 def named_file(name: str) -> Path | None:
     """Path of the file of a study or comparison, from a path or from its name with or without ``.toml``; or None.
 
-    A path never means a shipped file.
+    A path never means a shipped file; a name with its folder, as ``mechanisms/stop``, does unless there is such a path.
     """
-    folders = study_folders() if name == Path(name).name else ()
-    paths = [Path(name), *(folder / file for folder in folders for file in (f"{name}.toml", name))]
+    path = Path(name)
+    is_plain = name == path.as_posix() and not path.is_absolute() and ".." not in path.parts
+    folders = study_folders() if name == path.name or (is_plain and not path.exists()) else ()
+    paths = [path, *(folder / file for folder in folders for file in (f"{name}.toml", name))]
     return next((path for path in paths if path.is_file() and path.name != "scene.toml"), None)
 
 

@@ -6,9 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from proofroll.cli import options
+from proofroll.cli.checking import checked_file
 from proofroll.core.errors import InputError
-from proofroll.files.data_folders import data_folder
-from proofroll.files.scene_file import load_scene, scene_folder
+from proofroll.files import comparison_file, scene_file, toml
+from proofroll.files.data_folders import data_folder, study_folders
+from proofroll.files.scene_file import load_scene, scene_folder, scene_names
+from proofroll.files.toml import named_file
+from proofroll.running.idle_workers import Workers
+from proofroll.studies.cases import single_case
+from proofroll.studies.comparison.by_name import comparison_named
 
 CommandLine = Callable[..., tuple[int, str, str]]
 
@@ -59,6 +66,77 @@ def test_a_path_of_a_command_never_means_what_is_shipped(own: Path, command_line
     code, _, err = command_line("check", "n" * 5000)
     assert (code, err.count("\n")) == (2, 1)
     assert len(err) < 500
+
+
+class _ReadError(Exception):
+    """Ends a door's work at the first file that it reads."""
+
+
+def _first_file(door: Callable[[str], object], name: str) -> Path | str:
+    """The file that a door reads for a name, or the sentence with which it refuses it."""
+    try:
+        door(options.own_first(name))
+    except _ReadError as found:
+        return Path(str(found))
+    except InputError as error:
+        return str(error)
+    return "nothing is read"
+
+
+@pytest.fixture
+def doors(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Callable[[str], object]]:
+    """The doors at which a person names a scene or a comparison, in an empty folder; each stops at its first file."""
+
+    def read(path: Path) -> None:
+        raise _ReadError(path)
+
+    monkeypatch.chdir(tmp_path)
+    study_folders()  # which are looked up once
+    for module in (toml, scene_file, comparison_file):
+        monkeypatch.setattr(module, "read_toml", read)
+    for names in ("comparison_names", "further_comparison_names"):  # which a refusal's advice lists, reading all files
+        monkeypatch.setattr(comparison_file, names, list)
+    return {
+        "load_scene": load_scene,
+        "run": lambda name: single_case(name, {}, "truth", until=0.1, every=None, time_limit=1.0),
+        "check": lambda name: checked_file(name, {}),
+        "compare": lambda name: comparison_named(name, {}, Workers(), None),
+    }
+
+
+def _shipped_studies() -> dict[str, Path]:
+    """Name, with its folder in a folder of studies -> file of each shipped comparison or other study."""
+    files = {path: folder for folder in study_folders() for path in folder.rglob("*.toml")}
+    return {path.relative_to(folder).with_suffix("").as_posix(): path for path, folder in files.items()}
+
+
+def test_every_shipped_name_is_found_at_every_door(doors: dict[str, Callable[[str], object]]) -> None:
+    """A scene's name at all doors, a study's name, with its folder, too, at those for studies; as a path neither."""
+    scenes = {name: data_folder("models") / name / "scene.toml" for name in scene_names()}
+    studies = _shipped_studies()
+    assert {"mechanisms/andrews_squeezer", "stick_slip"} <= studies.keys()
+    for door, enter in doors.items():
+        found = {"check": studies | scenes, "compare": scenes | studies}.get(door, scenes)
+        assert {name: _first_file(enter, name) for name in found} == found, door
+        for name in {*scenes, *studies} - found.keys():
+            assert "no such scene" in str(_first_file(enter, name)), (door, name)
+    for form in ("./{}", "../{}", "/{}", "~/{}", "{}/", "a/../{}", "{}/."):
+        paths = [form.format(name) for name in {*scenes, *studies}]
+        assert not [path for path in paths if named_file(path)], form
+        for name in ("pendulum", "stick_slip", "mechanisms/stop"):
+            read = {door: _first_file(enter, form.format(name)) for door, enter in doors.items()}
+            assert not [door for door, file in read.items() if isinstance(file, Path)], (form, name)
+
+
+def test_a_path_that_exists_is_no_shipped_name(doors: dict[str, Callable[[str], object]], tmp_path: Path) -> None:
+    """A folder here that is called as a shipped comparison with its folder is read, or refused without a scene."""
+    own = tmp_path / "mechanisms" / "stop"
+    own.mkdir(parents=True)
+    for door, enter in doors.items():
+        assert "no scene.toml" in str(_first_file(enter, "mechanisms/stop")), door
+    (own / "scene.toml").touch()
+    for door, enter in doors.items():
+        assert _first_file(enter, "mechanisms/stop") == Path("mechanisms/stop/scene.toml"), door
 
 
 def test_a_shipped_scene_in_its_own_folder(monkeypatch: pytest.MonkeyPatch, command_line: CommandLine) -> None:
