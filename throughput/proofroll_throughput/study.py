@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -18,7 +19,7 @@ from proofroll.core.limits import RUN_TIME_LIMIT
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names, parse_engine, require_engine
 from proofroll.core.scene import Scene
-from proofroll.core.time_grid import time_grid
+from proofroll.core.time_grid import require_whole_steps, time_grid
 from proofroll.core.whole_turns import samples_between
 from proofroll.report.labels import engine_words, setting_words, step
 from proofroll.running.case import Case, EngineFacts, Status
@@ -128,7 +129,7 @@ class Question:
         engines: as a person writes them; empty: all that are installed.
         steps: fixed steps [s]; empty: the step of each engine's own settings.
         until: length of the runs [s]; None: that of the scene.
-        every: sampling interval [s]; None: a part of the length.
+        every: sampling interval [s]; None: a part of the length, at whole steps of every engine.
         quantity: observable of the errors; None: the one that decides the scene.
         time_limit: wall time of a row [s].
     """
@@ -161,13 +162,16 @@ def make_throughput(
     """
     until = length_of(asked.scene, asked.until)
     require_length(until)
-    every = until / SAMPLES if asked.every is None else asked.every
-    times = time_grid(until, every)
     values = asked.variation.values
     scenes = [_scene(asked, value) for value in values]
     quantity = _quantity(scenes[0], asked.quantity)
     names = [*asked.settings, asked.variation.parameter]
     settings = _settings(asked, scenes[0], runner)
+    steps = {facts.step for _, facts in settings if facts is not None and facts.step is not None}
+    every = _whole_interval(until, steps) if asked.every is None else asked.every
+    times = time_grid(until, every)
+    for size in steps.intersection(asked.steps):
+        require_whole_steps(times, size)
 
     def case(scene: Scene, facts: EngineFacts, **others: Any) -> Case:
         return case_of(asked.scene, scene, names, facts, until, every, time_limit=asked.time_limit, **others)
@@ -203,6 +207,29 @@ def make_throughput(
         date=date.today().isoformat(),
         machine=machine(),
     )
+
+
+def _whole_interval(until: float, steps: Collection[float]) -> float:
+    """Sampling interval [s] that each step divides, nearest to a part of the length.
+
+    Args:
+        until: length [s].
+        steps: of all engines [s]; those of which no whole number is the length are left out.
+    """
+    counts = [round(until / size) for size in steps if _ends_at(until, size)]
+    if not counts:
+        return until / SAMPLES
+    common = math.gcd(*counts)  # of the length: every step divides each of these equal parts
+    return max(1, round(common / SAMPLES)) * until / common
+
+
+def _ends_at(until: float, step: float) -> bool:
+    """True if a whole number of steps is the length."""
+    try:
+        require_whole_steps(time_grid(until, until), step)
+    except InputError:
+        return False
+    return True
 
 
 def _scene(asked: Question, value: float) -> Scene:
@@ -300,6 +327,7 @@ class _Measuring:
                 "folder": folder,
             }
             try:
+                require_whole_steps(self.times, step_size)
                 with workers.lend(engine) as worker:
                     answer = worker.request(
                         {"do": "call", "function": _MEASURED, "arguments": arguments}, self.time_limit

@@ -11,6 +11,9 @@ from typing import Any
 import pytest
 from batched import BATCHES
 
+from proofroll.core.time_grid import require_whole_steps, time_grid
+from proofroll_throughput.study import SAMPLES, _whole_interval
+
 _RANGE = ("throughput", "pendulum", "--vary", "angle=0.5:1.5:3", "--until", "0.1", "--step", "1e-3")
 Proofroll = Callable[..., tuple[int, str, str]]
 
@@ -29,6 +32,27 @@ def rows(
         return list(json.loads(out)["rows"])
 
     return run
+
+
+@pytest.mark.parametrize("until", [0.05, 0.5, 1.0, 0.053, 0.7])
+@pytest.mark.parametrize("steps", [(), (1e-3,), (1e-3, 5e-4), (1e-3, 1 / 3000), (2.5e-4,), (1e-3, 3e-1)])
+def test_samples_lie_at_whole_steps_of_every_engine(until: float, steps: tuple[float, ...]) -> None:
+    """Each step that ends with the run divides the usual sampling, which is near a twentieth of the length."""
+    times = time_grid(until, _whole_interval(until, steps))
+    for step in steps:
+        if abs(until / step - round(until / step)) < 1e-9 * until / step:
+            require_whole_steps(times, step)
+    assert SAMPLES - 4 <= len(times) - 1 <= SAMPLES + 6
+    assert times[-1] == until
+
+
+@pytest.mark.drill
+def test_a_step_that_does_not_divide_the_asked_sampling_is_refused(command_line: Proofroll) -> None:
+    """A person's own step and interval that do not fit are one line before any run, with a step that does."""
+    code, _, err = command_line(*_RANGE, "--engine", "mujoco", "--every", "0.0025")
+    assert (code, err.count("\n")) == (2, 1)
+    (advised,) = re.findall(r"divides the interval, as (\S+) s", err)
+    assert 0.0025 / float(advised) == pytest.approx(3)
 
 
 @pytest.mark.drill
