@@ -210,11 +210,11 @@ def make_throughput(
 
 
 def _whole_interval(until: float, steps: Collection[float]) -> float:
-    """Sampling interval [s] that each step divides, nearest to a part of the length.
+    """Usual sampling interval [s]: whole steps of every engine, about a twentieth of the length.
 
     Args:
         until: length [s].
-        steps: of all engines [s]; those of which no whole number is the length are left out.
+        steps: of all engines [s]; one that does not divide the length is left out.
     """
     counts = [round(until / size) for size in steps if _ends_at(until, size)]
     if not counts:

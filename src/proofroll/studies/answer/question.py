@@ -79,7 +79,7 @@ class AnswerQuestion:
 
     @classmethod
     def of(cls, scene: str, parameters: dict[str, float], until: float | None = None) -> AnswerQuestion:
-        """Question about a scene.
+        """Question about a scene, whose runs end with a whole interval between samples, so that any part divides it.
 
         Args:
             scene: name of the scene.
@@ -93,7 +93,11 @@ class AnswerQuestion:
         time_grid(until, until or 1.0)
         if until <= 0:
             raise InputError("until", until, "give a positive, finite time in s")
-        return cls(scene, parameters, until, sampling_of(scene, until))
+        every = sampling_of(scene, until)
+        count = math.floor(until / every * (1 + 1e-12) + 1e-9)
+        if count and until - count * every > 1e-6 * every:
+            until = float(f"{count * every:.12g}")
+        return cls(scene, parameters, until, every)
 
     def sampled_for(self, step: float | None) -> AnswerQuestion:
         """The same with samples at whole steps of a given one, of its double and of four times it.

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.core.time_grid import require_whole_steps, time_grid
 from proofroll.files.json_data import plain, record
+from proofroll.files.scene_file import read_scene_file
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.engine_questions import resolve_with_truth
 from proofroll.running.idle_workers import Workers
@@ -18,6 +21,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.running.timing import Timing
 from proofroll.studies.answer import answers
+from proofroll.studies.answer import question as question_module
 from proofroll.studies.answer.answers import answer, answer_path, engine_answer, kept, stored
 from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion, sampling_of
@@ -120,6 +124,27 @@ def test_an_engine_answers_by_its_search_alone() -> None:
 def test_samples_divide_the_duration(until: float, every: float) -> None:
     """A run has 80 to 400 sampling intervals that a person can write down, or a hundred."""
     assert sampling_of("double_pendulum", until) == every
+
+
+@pytest.mark.parametrize("base", [None, 2e-3, 1 / 240, 0.01])
+@pytest.mark.parametrize("until", [0.7, 0.053, 1.0, 3.3, 1 / 3, 1e-3])
+@pytest.mark.parametrize("asked", [None, 1e-3, 3e-3, 1 / 240])
+def test_every_candidate_divides_the_sampling(
+    until: float, asked: float | None, base: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Halvings and their checks, a third and a fifth of them, are whole parts of all intervals, the last one, too."""
+    file = replace(read_scene_file("double_pendulum"), every=base)
+    monkeypatch.setattr(question_module, "read_scene_file", lambda _: file)
+    question = AnswerQuestion.of("double_pendulum", {}, until)
+    if asked is not None and 4 * asked <= question.until:
+        question = question.sampled_for(asked)
+        candidates = [4 * asked / divisor for divisor in (1, 2, 3, 4, 5, 6, 10, 32)]
+    else:
+        candidates = [question.every / divisor for divisor in (1, 2, 3, 4, 5, 6, 10, 32)]
+    times = time_grid(question.until, min(question.every, question.until))
+    for step in candidates if question.every <= question.until else ():
+        require_whole_steps(times, float(f"{step:.12g}"))
+    assert until - question.every - 4 * (asked or 0) <= question.until <= until
 
 
 def test_a_step_that_is_asked_about_has_samples_at_its_double() -> None:
