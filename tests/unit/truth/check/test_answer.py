@@ -252,3 +252,37 @@ def test_a_motion_is_cut_with_its_events_and_bars() -> None:
     assert not left.events
     assert {len(bar) for bar in left.bars.values()} == {len(left.record.time)}
     assert (left.end, left.ended) == (0.3, "so")
+
+
+# Shares of samples, bounds of what is known, and heights behind the last impact: what no law of the motion tells.
+UNTOLD = {"unpressed", "event_high", "event_low", "event_height"}
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize(
+    "scene", ["slide_to_roll", "stop", "double_pendulum", "engine_on_mounts", "servo", "gear_pair"]
+)
+def test_each_variable_that_is_published_is_held(scene: str) -> None:
+    """Each number that a truth publishes, but a named few, breaks a law if it is shifted by a thousandth."""
+    element, motion, dataset = answer(scene)
+    assert motion.tiles is not None
+    silent = set[str]()
+    for name, item in dataset.data_vars.items():
+        if item.dtype.kind == "f" and np.isfinite(item).any():
+            step = 1e-3 * max(float(np.nanmax(np.abs(item))), 1e-2)
+            check = held_answer(element, dataset.assign({name: item + step}), motion.tiles, TIMES)
+            silent |= {str(name)} if max(part for part, _, _ in check.residuals.largest.values()) <= 1 else set()
+    assert silent <= UNTOLD
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["gap", "down", "across_rate", "omega1", "omega3", "cone_excess", "natural_map", "drift", "forces", "positions"],
+)
+def test_names_and_residuals_of_a_ball_are_held(name: str) -> None:
+    """What is published of a ball in the frame of its wall, tables and residuals of laws are held to the motion."""
+    element, motion, dataset = answer("slide_to_roll")
+    assert motion.tiles is not None
+    changed = dataset.assign({name: dataset[name] + 1e-6})
+    check = held_answer(element, changed, motion.tiles, TIMES)
+    assert max(part for part, _, _ in check.residuals.largest.values()) > 10

@@ -65,7 +65,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
             np.maximum(ends - item.high, item.low - _settling_time(scene, published.changes, item) - begins), 0.0
         )
         apart = np.append(apart, abs(item.time) if item.time <= 0 else np.inf)
-        off = min(float(apart.min()), 1 + item.time)
+        off = max(min(float(apart.min()), 1 + item.time), item.low - item.time, item.time - item.high)
         residuals.note("change", item.name, np.array([[off]]), 1 + abs(item.time), np.array([[item.time]]))
         if item.strikes and item.name in contacts and item not in hits:
             residuals.note("change", item.name, np.ones((1, 1)), 1.0, np.array([[item.time]]))
@@ -78,9 +78,7 @@ def _settling_time(scene: LawScene, changes: Sequence[PublishedEvent], item: Pub
     """
     if not any(entry.settles and abs(entry.time - item.time) <= _ROOM * (1 + item.time) for entry in changes):
         return 0.0
-    hits = [
-        change.time for change in changes if change.strikes and change.name == item.name and change.time < item.time
-    ]
+    hits = [entry.time for entry in changes if entry.strikes and entry.name == item.name and entry.time < item.time]
     spans, least = np.diff(hits[-3:]), _LAST_REBOUNDS / scene.rate
     if len(spans) < 2 or not 0 < spans[1] < spans[0]:
         return least

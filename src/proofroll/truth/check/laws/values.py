@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +16,13 @@ from proofroll.truth.check.laws.residuals import LawResiduals
 from proofroll.truth.check.laws.scene import LawScene
 
 _PART = 1e-3  # part of a natural size that counts in the size of a value
+# Published residuals of laws, each with the natural sizes of the scene whose product is its size.
+_RESIDUALS: Mapping[str, tuple[str, ...]] = {
+    "penetration": ("length",), "drift": ("length",), "hop_speed": ("speed",), "friction_direction": (),
+    "contact_pull": ("force",), "cone_excess": ("force",), "natural_map": ("force",),
+    "energy_gain": ("force", "length"), "momentum_error": ("force", "time"),
+    "angular_momentum_error": ("force", "length", "time"),
+}  # fmt: skip
 
 
 def values_follow(
@@ -27,7 +35,9 @@ def values_follow(
     _links(scene, published, residuals)
     _contacts(scene, published, residuals)
     _names(scene, published, residuals)
+    _gathered(scene, published, residuals)
     _on_wall(scene, published, residuals)
+    _nothing_left(scene, published, residuals)
 
 
 def _vector(published: PublishedValues, name: str) -> Array:
@@ -107,6 +117,9 @@ def _points(scene: LawScene, published: PublishedValues, residuals: LawResiduals
         size = scene.length + norm(place)
         for values in (_vector(published, point.name), published.values["positions"][:, k]):
             residuals.note("value", point.name, norm(values[:, None] - place), size, pieces.time)
+    if not scene.mechanism.points:
+        centres = scene.centres(pieces)[0][:, 0, :-1]
+        _same("positions", (published.values["positions"], centres), published, residuals, scene.length)
 
 
 def _links(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
@@ -182,25 +195,69 @@ def _names(scene: LawScene, published: PublishedValues, residuals: LawResiduals)
         _same(name, (first, second), published, residuals)
 
 
+def _gathered(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
+    """Tables of forces and moments have those that are named, in order."""
+    values, bushings = published.values, [item.name for item in scene.mechanism.bushings]
+    for kind in ("force", "torque"):
+        columns = [values[f"{kind}.{item.name}.{axis}"] for item in scene.connections for axis in "xyz"]
+        determinate = [column for column in columns if not np.isnan(column).all()]
+        if len(determinate) == values.get(f"{kind}s", np.zeros((0, 0))).shape[1] > 0:
+            _same(f"{kind}s", (values[f"{kind}s"], np.stack(determinate, -1)), published, residuals)
+        net = [name[:-2] for name in values if name.startswith(f"net_{kind}.") and name.endswith(".x")]
+        for group, names in ((f"net_{kind}s", net), (f"bushing_{kind}s", [f"{kind}.{name}" for name in bushings])):
+            if group in values:
+                vectors = np.stack([_vector(published, name) for name in names], 1)
+                _same(group, (values[group].reshape(vectors.shape), vectors), published, residuals)
+
+
+def _nothing_left(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
+    """Published residuals of laws are round-off."""
+    largest = max(scene.force, float(np.nanmax(np.abs(published.pieces.force), initial=0.0)))
+    sizes = {"length": scene.length, "speed": scene.speed, "force": largest, "time": 1 / scene.rate}
+    for name, factors in _RESIDUALS.items():
+        if name in published.values:
+            rest = published.values[name].reshape(len(published.values[name]), -1)
+            size = math.prod(sizes[factor] for factor in factors)
+            residuals.note("nothing left", name, rest, size, published.pieces.time)
+
+
 def _on_wall(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
-    """Forces and slips of a ball in the local frame of its wall are those of its contact."""
+    """Forces, slips, spins and coordinates of a ball in the local frame of its wall are those of its contact."""
     values, pieces = published.values, published.pieces
     if len(scene.contacts) != 1 or "slip2" not in values:
         return
-    slips = np.hypot(values["slip2"], values["slip3"]), values[f"slip.{scene.contacts[0].name}"]
-    _same("slip2, slip3", slips, published, residuals, scene.speed)
-    _same("slip", (values["slip"], slips[1]), published, residuals, scene.speed)
-    if "N" not in values:
-        return
-    force, normal = pieces.force[:, 0, 0], pieces.normal[:, 0, 0]
-    pressed, least = dot(force, normal), float(np.nanmax(np.abs(force), initial=0.0))
-    rub = norm(force - pressed[:, None] * normal)
-    for name, value, expected in (
-        ("N", values["N"], pressed),
-        ("F2, F3", np.hypot(values["F2"], values["F3"]), rub),
-        ("needed_friction", values["needed_friction"] * values["N"], rub),
-    ):
-        _same(name, (value, expected), published, residuals, least)
+    contact, normal = scene.contacts[0], pieces.normal[:, 0, 0]
+    ball, wall, shape = contact.a, contact.b, contact.shape_b
+    if contact.shape_a.kind != "sphere":
+        ball, wall, shape = contact.b, contact.a, contact.shape_a
+    p, v, w = (item[:, 0, ball] for item in (pieces.p, pieces.v, pieces.w))
+    omega, about, slip = (values[f"omega{k}"] for k in (1, 2, 3)), dot(w, normal), values[f"slip.{contact.name}"]
+    spin, *turning = omega
+    rows: list[tuple[str, Array, Array, float]] = [
+        ("slip2, slip3", np.hypot(values["slip2"], values["slip3"]), slip, scene.speed),
+        ("slip", values["slip"], slip, scene.speed),
+        ("gap", values["gap"], values[f"gap.{contact.name}"], scene.length),
+        ("attitude", of_quaternion(values["attitude"]), pieces.R[:, 0, ball], 1.0),
+        ("omega1", np.abs(spin), np.abs(about), scene.rate),
+        ("omega2, omega3", np.hypot(*turning), norm(w - about[:, None] * normal), scene.rate),
+    ]
+    if wall == scene.index["world"] and np.array_equal(shape.axis, (0, 0, 1)) and not shape.centre.any():
+        (x, y, z), (vx, vy, vz) = p.T, v.T
+        across, told = np.hypot(x, y), dict[str, Array]()
+        if shape.kind == "plane":
+            told = {"down": x, "across": -y, "down_rate": vx, "across_rate": -vy}
+        elif shape.kind in {"bore", "shaft"}:
+            told = {"z": z, "z_rate": vz, "gamma_rate": (x * vy - y * vx) / across**2}
+            rows.append(("gamma", np.exp(1j * values["gamma"]), (x + 1j * y) / across, 1.0))
+        rows += [(name, values[name], value, scene.length * (scene.rate + 1)) for name, value in told.items()]
+    if "N" in values:
+        force = pieces.force[:, 0, 0]
+        pressed, least = dot(force, normal), float(np.nanmax(np.abs(force), initial=0.0))
+        rub = norm(force - pressed[:, None] * normal)
+        rows += [("N", values["N"], pressed, least), ("F2, F3", np.hypot(values["F2"], values["F3"]), rub, least)]
+        rows.append(("needed_friction", values["needed_friction"] * values["N"], rub, least))
+    for name, value, expected, size in rows:
+        _same(name, (value, expected), published, residuals, size)
 
 
 def _same(
