@@ -99,14 +99,13 @@ def require_tolerances(texts: Sequence[str], comparisons: Sequence[Comparison]) 
 
 def _question(outcome: Outcome) -> AnswerQuestion | None:
     """Question about the first point of a comparison, over the scene's own duration; None: there is no truth."""
-    from proofroll.files.scene_file import read_scene_file
-    from proofroll.studies.answer.question import AnswerQuestion
+    from proofroll.studies.answer.question import AnswerQuestion, duration_of
 
     comparison = outcome.comparison
     point = next((item for item in outcome.points.values() if item.reference is not None), None)
     if point is None:
         return None
-    until = read_scene_file(comparison.scene).duration or comparison.until
+    until = duration_of(comparison.scene, comparison.until)
     return AnswerQuestion.of(comparison.scene, dict(point.case.parameters), until)
 
 

@@ -108,16 +108,14 @@ def _change(made: StepAnswer) -> list[str]:
 
 def stored_sentences(comparison: Comparison, tolerances: Sequence[str], engines: Sequence[str], out: Path) -> list[str]:
     """First sentence of the stored answer of engines for the first point of a comparison and tolerances; else none."""
-    from proofroll.files.scene_file import read_scene_file
     from proofroll.report.answer.sentences import parameter_words, taken_sentence, tolerance_words
     from proofroll.studies.answer.answers import longest_stored
-    from proofroll.studies.answer.question import AnswerQuestion
+    from proofroll.studies.answer.question import AnswerQuestion, duration_of
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
 
     point = next(iter(comparison.combinations()), {})
     values = {name: value for name, value in point.items() if isinstance(value, float)}
-    until = read_scene_file(comparison.scene).duration or comparison.until
-    question = AnswerQuestion.of(comparison.scene, values, until)
+    question = AnswerQuestion.of(comparison.scene, values, duration_of(comparison.scene, comparison.until))
     answer = longest_stored(out, question, AskedTolerance.of(tolerances or [DEFAULT], question.loaded), engines)
     if answer is None:
         return []

@@ -18,7 +18,7 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.runner import Runner
-from proofroll.studies.cases import case_of
+from proofroll.studies.cases import case_of, require_length
 from proofroll.studies.comparison.planning import with_edges
 from proofroll.studies.judging.reference import Reference
 
@@ -36,9 +36,9 @@ _SHORTER = 3
 _HALVINGS = 12
 
 
-def duration_of(scene: str) -> float:
-    """Length of the runs of a scene [s]: its file's duration, or :data:`USUAL`."""
-    return read_scene_file(scene).duration or USUAL
+def duration_of(scene: str, usual: float = USUAL) -> float:
+    """Length of the runs of a scene [s]: its file's duration, or the usual one."""
+    return read_scene_file(scene).duration or usual
 
 
 def sampling_of(scene: str, until: float) -> float:
@@ -91,12 +91,10 @@ class AnswerQuestion:
         """
         until = duration_of(scene) if until is None else until
         time_grid(until, until or 1.0)
-        if until <= 0:
-            raise InputError("until", until, "give a positive, finite time in s")
+        require_length(until)
         every = sampling_of(scene, until)
-        count = math.floor(until / every * (1 + 1e-12) + 1e-9)
-        if count and until - count * every > 1e-6 * every:
-            until = float(f"{count * every:.12g}")
+        end = float(f"{every * math.floor(until / every * (1 + 1e-12) + 1e-9):.12g}")
+        until = end if 0 < end < until - 1e-6 * every else until
         return cls(scene, parameters, until, every)
 
     def sampled_for(self, step: float | None) -> AnswerQuestion:
@@ -199,7 +197,7 @@ def question_named(name: str, parameters: Mapping[str, object], until: float | N
         comparison = with_edges(load_comparison(name).briefly())
         scene = comparison.scene
         point = {**next(iter(comparison.combinations())), **point}
-        until = until or read_scene_file(scene).duration or comparison.until
+        until = until or duration_of(scene, comparison.until)
     loaded = load_scene(scene, **point)  # type: ignore[arg-type]  # text is checked and converted there
     return AnswerQuestion.of(scene, {key: loaded.parameters[key] for key in point}, until)
 
