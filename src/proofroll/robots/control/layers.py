@@ -325,7 +325,7 @@ def _explained(
         left = _norm(evidence, name, offset.changed(evidence.law, 1.0))
         cause = MistakeExplanation(offset, 1.0, left).cause
         ranked += [(2 * left, cause)] if left <= _HELPS * distance else []  # its numbers are many: fewer go before
-    if all(item.after > rounding for item in several):
+    if all(cause.after > rounding for _, cause in ranked):
         fits = _fitted_causes(name, compared, evidence, most)
         ranked += [((1 + numbers) * cause.after, cause) for numbers, cause in fits]
     by_words: dict[str, LayerCause] = {}
