@@ -116,9 +116,9 @@ def _pair(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, t
 def changed_columns(
     candidates: Sequence[Mistake], law: ControlLaw, left: Callable[[ControlLaw], Array], right: Array
 ) -> dict[str, Flags]:
-    """Words of each mistake -> True at columns of which it changes a row at a size from which its fit begins.
+    """Columns in which a mistake changes a row at a size from which its fit begins, by the words of each mistake.
 
-    A column that two leave as it is, they do not close. ``left``: under a law; ``right``: without a mistake, by rows.
+    A column in which two change nothing stays wrong. ``left``: under a law; ``right``: without a mistake, by rows.
     """
     changed = {item.words: np.zeros(right.shape[1], bool) for item in candidates}
     for item in candidates:
