@@ -52,6 +52,7 @@ QUICK = {
     ("pinocchio", "single", "low pass"),
     ("mujoco", "3", "damping"),
     ("pinocchio", "3", "dry friction"),
+    ("mujoco", "single", "relative coordinates"),
 }
 _DRILL = (pytest.mark.drill, pytest.mark.slow)
 CLOSED = ("damping", "dry friction", "payload")  # named with what they close, too, by a test of their own
@@ -163,7 +164,9 @@ def test_a_right_record_of_another_program_holds(program: str, digits: str, judg
     "pinocchio--half kd",
     "mujoco--rates at 0.05",
 )
-@pytest.mark.drill_of("mujoco-single-gravity 9.80", "pinocchio--two instants late")
+@pytest.mark.drill_of(
+    "mujoco-single-gravity 9.80", "pinocchio--two instants late", "mujoco-single-relative coordinates"
+)
 @pytest.mark.parametrize(("program", "digits", "name"), ALL)
 def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: str, judged: Judged) -> None:
     """A mistake in a loop around another program stops at its layer and is named; a limit is that of the URDF."""

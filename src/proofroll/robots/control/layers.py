@@ -34,7 +34,7 @@ from proofroll.robots.control.bookkeeping.search import (
     explanations,
     largest,
 )
-from proofroll.robots.control.bookkeeping.together import LayerTrials, may_close, mistakes_together
+from proofroll.robots.control.bookkeeping.together import LayerTrials, changed_columns, may_close, mistakes_together
 from proofroll.robots.control.columns import action_mistakes
 from proofroll.robots.control.differences import (
     DIFFERENCES,
@@ -154,6 +154,7 @@ class _Evidence:
     law: ControlLaw
     mechanism: Mechanism
     in_air: InAir
+    right: LayerDifferences | None = None
 
     def difference(
         self, name: str, law: ControlLaw | None = None, record: ControlRecord | None = None
@@ -162,9 +163,12 @@ class _Evidence:
         return DIFFERENCES[name](record or self.record, law or self.law)
 
     def left(self, name: str, law: ControlLaw) -> Array:
-        """Differences of a layer under a law in parts of the sizes of their columns; NaN where there are none."""
+        """Differences under a law in parts of the sizes of their columns, or of those of ``right``; NaN: none are."""
         compared = self.difference(name, law)
-        return np.array(np.nan) if isinstance(compared, str) else (compared.difference / compared.sizes).ravel()
+        if isinstance(compared, str):
+            return np.array(np.nan)
+        sized = self.right if self.right and self.right.columns == compared.columns else compared
+        return np.ravel(compared.difference / sized.sizes)
 
 
 def _layer(name: str, evidence: _Evidence, skipped: Collection[str], time: SearchTime) -> Layer:
@@ -300,24 +304,19 @@ def _explained(
     """
     order = list(LAYERS)
     shown = [*(item for item in order[: order.index(name)] if item in skipped), name]
-    distance = _norm(evidence, name, evidence.law)
-    rounding = float((bars / compared.sizes).max())
+    evidence, right = dataclasses.replace(evidence, right=compared), compared.difference / compared.sizes
+    distance, rounding = largest(right), float((bars / compared.sizes).max())
     most = max(_HELPS * distance, min(rounding, 0.5 * distance))
-
-    right = evidence.left(name, evidence.law)
+    wrong, under = np.abs(right).max(axis=0) > most, partial(evidence.left, name)
 
     def explanation(mistake: Mistake) -> MistakeExplanation | None:
-        begun = (evidence.left(name, mistake.changed(evidence.law, size)) for size in mistake.starts)
-        if mistake.sized and all(left.shape == right.shape and largest(right[left == right]) > most for left in begun):
-            return None  # it does not change what is off
-        left, size = best_size(mistake, evidence.law, partial(evidence.left, name))
+        if mistake.sized and not changed_columns([mistake], evidence.law, under, right)[mistake.words][wrong].all():
+            return None
+        left, size = best_size(mistake, evidence.law, under)
         if left > most:
             return None
-
-        def left_by(size: float) -> float:
-            return _norm(evidence, name, mistake.changed(evidence.law, size))
-
-        return bounded(MistakeExplanation(mistake, size, left), left_by, max(2 * left, rounding))
+        item, bound = MistakeExplanation(mistake, size, left), max(2 * left, rounding)
+        return bounded(item, lambda size: largest(under(mistake.changed(evidence.law, size))), bound)
 
     candidates = [item for item in mistakes(evidence.law) if _shows(item, shown)]
     several, tried = explanations(candidates, explanation, time)
@@ -326,10 +325,9 @@ def _explained(
         left = _norm(evidence, name, offset.changed(evidence.law, 1.0))
         cause = MistakeExplanation(offset, 1.0, left).cause
         ranked += [(2 * left, cause)] if left <= _HELPS * distance else []  # its numbers are many: fewer go before
-    if all(item.after > rounding for item in several):
-        ranked += [
-            ((1 + numbers) * cause.after, cause) for numbers, cause in _fitted_causes(name, compared, evidence, most)
-        ]
+    if all(cause.after > rounding for _, cause in ranked):
+        fits = _fitted_causes(name, compared, evidence, most)
+        ranked += [((1 + numbers) * cause.after, cause) for numbers, cause in fits]
     by_words: dict[str, LayerCause] = {}
     for _, cause in sorted(ranked, key=lambda item: item[0]):
         by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too

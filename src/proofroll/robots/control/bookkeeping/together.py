@@ -25,7 +25,7 @@ class LayerTrials:
 
     Attributes:
         parts: largest difference of each column in parts of its bar, under a law; NaN: it cannot be computed.
-        left: all differences in parts of the sizes of their columns, under a law.
+        left: all differences in parts of the sizes of their columns, row by row, under a law.
         fitting: further mistakes under a law, whose numbers fit what it leaves.
     """
 
@@ -76,7 +76,7 @@ def _one_by_one(
     several: list[_Told] = []
     while (wrong := trials.parts(law) > 1).any() and len(several) < _MOST and not time.over:
         rest = [item for item in candidates if item.id not in {before.mistake.id for before in several}]
-        changed = _changed(rest, law, trials)
+        changed = changed_columns(rest, law, trials.left, trials.left(law).reshape(-1, len(wrong)))
         near = [item for item in rest if np.any(changed[item.words] & wrong)]
         steps = [(closed, item) for item in _sized(near, law, trials) if (closed := _closed(item, trials, wrong))]
         more = [max(steps, key=lambda step: (step[0], -step[1].numbers))[1]] if steps else []
@@ -97,7 +97,8 @@ def _closed(item: _Told, trials: LayerTrials, wrong: Flags) -> int:
 def _pair(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, time: SearchTime) -> list[_Told]:
     """Two mistakes that close every column, with the fewest fitted numbers; empty where none are found."""
     best: list[_Told] = []
-    wrong, changed = trials.parts(law) > 1, _changed(candidates, law, trials)
+    wrong = trials.parts(law) > 1
+    changed = changed_columns(candidates, law, trials.left, trials.left(law).reshape(-1, len(wrong)))
     candidates = [item for item in candidates if np.any(changed[item.words] & wrong)]
     for first in _known(candidates, law):
         if not np.all(trials.parts(first.law)[~wrong] <= 1):
@@ -112,14 +113,20 @@ def _pair(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, t
     return best
 
 
-def _changed(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials) -> dict[str, Flags]:
-    """Words of each mistake -> True at columns that it changes: a column that two leave as it is, they do not close."""
-    right = trials.parts(law)
-    sizes = ((item, item.starts if item.sized else (1.0,)) for item in candidates)
-    return {
-        item.words: np.any([trials.parts(item.changed(law, size)) != right for size in starts], axis=0)
-        for item, starts in sizes
-    }
+def changed_columns(
+    candidates: Sequence[Mistake], law: ControlLaw, left: Callable[[ControlLaw], Array], right: Array
+) -> dict[str, Flags]:
+    """Columns in which a mistake changes a row at a size from which its fit begins, by the words of each mistake.
+
+    A column in which two change nothing stays wrong. ``left``: under a law; ``right``: without a mistake, by rows.
+    """
+    changed = {item.words: np.zeros(right.shape[1], bool) for item in candidates}
+    for item in candidates:
+        for size in item.starts if item.sized else (1.0,):
+            trial = left(item.changed(law, size))
+            same = trial.size == right.size
+            changed[item.words] |= np.any(trial.reshape(right.shape) != right, axis=0) if same else True
+    return changed
 
 
 def _known(candidates: Sequence[Mistake], law: ControlLaw) -> Iterator[_Told]:
