@@ -44,8 +44,7 @@ def time_grid(until: float, every: float) -> FloatArray:
     if not np.isfinite(every) or every <= 0:
         raise InputError("every", every, "give a positive, finite interval in s")
     if until / every > MOST_SAMPLES:
-        advice = f"that is more than {MOST_SAMPLES} samples until {until:g} s; sample less often"
-        raise InputError("every", every, advice)
+        raise InputError("every", every, f"more than {MOST_SAMPLES} samples until {until:g} s; sample less often")
     count = int(np.floor(until / every * (1 + 1e-12) + 1e-9))
     times = np.arange(count + 1, dtype=np.float64) * every
     if until - times[-1] > 1e-9 * max(every, until):

@@ -302,8 +302,7 @@ def _explained(
 
     Mistakes of the layers before it count where the record does not show these; ``skipped``: their names.
     """
-    order = list(LAYERS)
-    shown = [*(item for item in order[: order.index(name)] if item in skipped), name]
+    shown = [*(item for item in list(LAYERS)[: list(LAYERS).index(name)] if item in skipped), name]
     evidence, right = dataclasses.replace(evidence, right=compared), compared.difference / compared.sizes
     distance, rounding = largest(right), float((bars / compared.sizes).max())
     most = max(_HELPS * distance, min(rounding, 0.5 * distance))
@@ -405,9 +404,8 @@ def _fitted_causes(
         if targets is None or actions is None:
             return
         yield from _ramped(evidence, most)
-        source = sources(part, law)
+        source, places = sources(part, law), part.stacked("q", law.joints)
         later = np.flatnonzero(source >= 0)
-        places = part.stacked("q", law.joints)
         seen = None if places is None else places[later]
         yield from target_causes(targets[later], actions[source[later]], seen, law, most)
 

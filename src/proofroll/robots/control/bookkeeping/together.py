@@ -124,8 +124,7 @@ def changed_columns(
     for item in candidates:
         for size in item.starts if item.sized else (1.0,):
             trial = left(item.changed(law, size))
-            same = trial.size == right.size
-            changed[item.words] |= np.any(trial.reshape(right.shape) != right, axis=0) if same else True
+            changed[item.words] |= trial.size != right.size or np.any(trial.reshape(right.shape) != right, axis=0)
     return changed
 
 

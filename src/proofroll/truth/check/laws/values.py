@@ -118,8 +118,8 @@ def _points(scene: LawScene, published: PublishedValues, residuals: LawResiduals
         for values in (_vector(published, point.name), published.values["positions"][:, k]):
             residuals.note("value", point.name, norm(values[:, None] - place), size, pieces.time)
     if not scene.mechanism.points:
-        centres = scene.centres(pieces)[0][:, 0, :-1]
-        _same("positions", (published.values["positions"], centres), published, residuals, scene.length)
+        both = published.values["positions"], scene.centres(pieces)[0][:, 0, :-1]
+        _same("positions", both, published, residuals, scene.length)
 
 
 def _links(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
@@ -214,11 +214,10 @@ def _nothing_left(scene: LawScene, published: PublishedValues, residuals: LawRes
     """Published residuals of laws are round-off."""
     largest = max(scene.force, float(np.nanmax(np.abs(published.pieces.force), initial=0.0)))
     sizes = {"length": scene.length, "speed": scene.speed, "force": largest, "time": 1 / scene.rate}
-    for name, factors in _RESIDUALS.items():
-        if name in published.values:
-            rest = published.values[name].reshape(len(published.values[name]), -1)
-            size = math.prod(sizes[factor] for factor in factors)
-            residuals.note("nothing left", name, rest, size, published.pieces.time)
+    for name in _RESIDUALS.keys() & published.values.keys():
+        rest = published.values[name].reshape(len(published.values[name]), -1)
+        size = math.prod(sizes[factor] for factor in _RESIDUALS[name])
+        residuals.note("nothing left", name, rest, size, published.pieces.time)
 
 
 def _on_wall(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:
@@ -255,7 +254,7 @@ def _on_wall(scene: LawScene, published: PublishedValues, residuals: LawResidual
         pressed, least = dot(force, normal), float(np.nanmax(np.abs(force), initial=0.0))
         rub = norm(force - pressed[:, None] * normal)
         rows += [("N", values["N"], pressed, least), ("F2, F3", np.hypot(values["F2"], values["F3"]), rub, least)]
-        rows.append(("needed_friction", values["needed_friction"] * values["N"], rub, least))
+        rows += [("needed_friction", values["needed_friction"] * values["N"], rub, least)]
     for name, value, expected, size in rows:
         _same(name, (value, expected), published, residuals, size)
 
