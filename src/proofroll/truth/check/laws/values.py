@@ -214,7 +214,7 @@ def _nothing_left(scene: LawScene, published: PublishedValues, residuals: LawRes
     """Published residuals of laws are round-off."""
     largest = max(scene.force, float(np.nanmax(np.abs(published.pieces.force), initial=0.0)))
     sizes = {"length": scene.length, "speed": scene.speed, "force": largest, "time": 1 / scene.rate}
-    for name in _RESIDUALS.keys() & published.values.keys():
+    for name in sorted(_RESIDUALS.keys() & published.values.keys()):
         rest = published.values[name].reshape(len(published.values[name]), -1)
         size = math.prod(sizes[factor] for factor in _RESIDUALS[name])
         residuals.note("nothing left", name, rest, size, published.pieces.time)
