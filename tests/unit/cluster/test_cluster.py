@@ -28,6 +28,7 @@ from proofroll.files.scene_file import load_scene, scene_folder
 from proofroll.files.trajectory_file import read
 from proofroll.papers.blajer_2006.slip.regimes import regime_map
 from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.engine_questions import resolve
 from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
@@ -45,7 +46,15 @@ PLUGINS = Path(__file__).parents[2] / "plugins"
 def case(engine: str, speed: float = 4.0, scene: str = "sphere_in_cylinder") -> Case:
     """A short case with the engine's own facts."""
     found = single_case(scene, {"speed": speed}, engine, until=0.1, every=0.05, time_limit=60.0, workers=ASKED)
-    return dataclasses.replace(found, timed=True)
+    return dataclasses.replace(with_code(found), timed=True)
+
+
+def with_code(found: Case) -> Case:
+    """The case with the hash of its engine's code, as of a run that is stored."""
+    formulation = {key: value for key, value in found.engine.settings.items() if key == "formulation"}
+    (facts,) = resolve([(found.engine.name, formulation)], ASKED)
+    assert isinstance(facts, EngineFacts)
+    return dataclasses.replace(found, engine=dataclasses.replace(found.engine, code=facts.code))
 
 
 def at_home(store: Store) -> Runner:
@@ -181,7 +190,8 @@ def test_results_are_those_of_home(dask: DaskCluster, shared: Cluster, tmp_path:
     robot = tmp_path / "arm.urdf"
     robot.write_text(urdf(kinds=("revolute", "fixed", "fixed")), encoding="utf-8")
     some = [case("oracle"), case("exits"), case("oracle", 1.5, own)]
-    some += [single_case(str(robot), {}, "projection", until=0.02, every=0.01, time_limit=60.0, workers=ASKED)]
+    of_robot = single_case(str(robot), {}, "projection", until=0.02, every=0.01, time_limit=60.0, workers=ASKED)
+    some += [with_code(of_robot)]
     waiting = [case("waiting", speed) for speed in (3.0, 3.5)]
     home, away = Store(tmp_path / "home"), Store(tmp_path / "away")
 

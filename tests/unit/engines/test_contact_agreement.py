@@ -161,7 +161,7 @@ ONE_COEFFICIENT = "this formulation gives a contact one coefficient"
         (falling(static_friction=0.9), "exudyn[formulation=spheres]", ONE_COEFFICIENT),
         (falling(tangential_restitution=0.5), "mujoco[formulation=geoms]", "sets restitution along the normal alone"),
         (falling(tangential_restitution=0.5), "exudyn[formulation=spheres]", "this formulation has no rebounds"),
-        (falling(spinning_friction=1e-3), "mujoco[formulation=geoms]", "friction = inf is the same in both"),
+        (falling(spinning_friction=1e-3), "mujoco[formulation=geoms]", "give cone = .shared., or friction = inf"),
     ],
 )
 def test_who_lacks_a_shape_or_a_law_says_so(mechanism: Mechanism, engine: str, why: str) -> None:

@@ -42,6 +42,7 @@ WITHOUT_FEATURE: Mapping[str, str] = {
     MechanismCapability.DISCS: "not drawn: a cylinder has two rims",
     MechanismCapability.CONES: "not drawn: tables and bowls are their limits",
     MechanismCapability.TORI: "not drawn: a shaft is the limit",
+    MechanismCapability.SHARED_CONE: "not drawn: the truth does not follow it",
     MechanismCapability.DECLARED_WALLS: "not drawn: code of a package, no table",
     **{name: f"drawn as the feature {shape}" for shape, name in SHAPES.items()},
 }
@@ -58,6 +59,7 @@ NOT_DRAWN: Mapping[str, str] = {
     "geometries.ring_radius": "tori are not drawn",
     "loops.at_most": "cables are not drawn",
     "loops.restitution": "cables are not drawn",
+    "pairs.cone": "the truth does not follow a shared one",
     "pairs.static_friction": "friction as a table says it",
     "points.name": "points are only reported",
     "points.body": "points are only reported",
