@@ -55,7 +55,7 @@ LAWS: dict[str, tuple[float, str]] = {
     "power": (5e-11, "rate of the energy = power of the published forces"),
     "value": (1e-13, "a published value follows from places and velocities"),
     "spelling": (1e-13, "two variables of one quantity are equal"),
-    "nothing left": (1e-9, "published residuals of the laws are round-off"),
+    "nothing left": (1e-11, "published residuals of the laws are round-off"),
     "strike": (1e-12, "what is told of an impact follows from the motion beside it"),
     "rebound": (1e-11, "the rate of a gap or coordinate turns at an impact with the restitution"),
     "work": (1e-11, "work = integral of force times rate"),

@@ -230,11 +230,11 @@ def _on_wall(scene: LawScene, published: PublishedValues, residuals: LawResidual
     if contact.shape_a.kind != "sphere":
         ball, wall, shape = contact.b, contact.a, contact.shape_a
     p, v, w = (item[:, 0, ball] for item in (pieces.p, pieces.v, pieces.w))
-    omega, about, slip = (values[f"omega{k}"] for k in (1, 2, 3)), dot(w, normal), values[f"slip.{contact.name}"]
-    spin, *turning = omega
+    spin, *turning = (values[f"omega{k}"] for k in (1, 2, 3))
+    about, slip, fast = dot(w, normal), values[f"slip.{contact.name}"], scene.speed + float(norm(v).max())
     rows: list[tuple[str, Array, Array, float]] = [
-        ("slip2, slip3", np.hypot(values["slip2"], values["slip3"]), slip, scene.speed),
-        ("slip", values["slip"], slip, scene.speed),
+        ("slip2, slip3", np.hypot(values["slip2"], values["slip3"]), slip, fast),
+        ("slip", values["slip"], slip, fast),
         ("gap", values["gap"], values[f"gap.{contact.name}"], scene.length),
         ("attitude", of_quaternion(values["attitude"]), pieces.R[:, 0, ball], 1.0),
         ("omega1", np.abs(spin), np.abs(about), scene.rate),
