@@ -243,12 +243,12 @@ def test_rates_whose_rows_are_told_are_not_left_open(judged: Judged) -> None:
 @pytest.mark.nightly
 def test_a_layer_that_stays_open_tells_no_column(judged: Judged, monkeypatch: pytest.MonkeyPatch) -> None:
     """A base at its centre of mass, which layers alone tell, is not claimed where an observation stays open."""
-    monkeypatch.setattr("proofroll.robots.control.judge.SEARCH_TIME", 1.0)  # else all pairs of mistakes are tried
     record = dict(Loop().record(PROGRAMS["mujoco"]))
     offset = Rotation.from_quat(record["q_WB"], scalar_first=True).apply(CENTRE)
     record["p_WB"] = record["p_WB"] + offset
     record["v_WB"] = record["v_WB"] + np.cross(record["w_WB"], offset)
     assert [cause.id for cause in judged(columns_of(record)).layers[0].causes] == ["base_frame"]
+    monkeypatch.setattr("proofroll.robots.control.judge.SEARCH_TIME", 1.0)  # else all pairs of mistakes are tried
     noise = np.random.default_rng(0).normal(size=record["q"].shape)
     judgement = judged(columns_of({**record, "observed.q": record["observed.q"] + noise}))
     assert not any("the layers behind it tell so" in line for line in judgement.lines())
