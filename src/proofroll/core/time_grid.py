@@ -30,6 +30,11 @@ def sampling_interval(step: float | None) -> float:
     return max(1, round(EVERY / step)) * step
 
 
+def whole_intervals(until: float, every: float) -> int:
+    """Number of whole intervals in a length [s], but for round-off."""
+    return int(np.floor(until / every * (1 + 1e-12) + 1e-9))
+
+
 def time_grid(until: float, every: float) -> FloatArray:
     """Sample times 0, every, 2 every, … and ``until`` [s].
 
@@ -45,8 +50,7 @@ def time_grid(until: float, every: float) -> FloatArray:
         raise InputError("every", every, "give a positive, finite interval in s")
     if until / every > MOST_SAMPLES:
         raise InputError("every", every, f"more than {MOST_SAMPLES} samples until {until:g} s; sample less often")
-    count = int(np.floor(until / every * (1 + 1e-12) + 1e-9))
-    times = np.arange(count + 1, dtype=np.float64) * every
+    times = np.arange(whole_intervals(until, every) + 1, dtype=np.float64) * every
     if until - times[-1] > 1e-9 * max(every, until):
         times = np.append(times, until)
     else:

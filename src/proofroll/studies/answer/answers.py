@@ -183,17 +183,17 @@ def speeds_alone(
     It is the least wall time, or the processor time of the search where that is less: others may have the processor.
     What was measured for another tolerance is not measured again.
     """
-    known, runner, tasks = abreast.speeds, abreast.runner, {}
+    speeds, runner, tasks = abreast.speeds, abreast.runner, {}
     with Stopwatch(runner.workers) as stopwatch, runner.profile.phase(TIMING):
         for spec, (item, run) in runs.items():
-            if spec in known:
+            if spec in speeds:
                 continue
             facts = at_step(item.facts, run.step)
             case = question.case(facts, question.every, item.caps.run, item.allowed)
             tasks[spec] = partial(stopwatch, case, _SECONDS)
         timings = time_in_rounds(tasks, _ROUNDS, once_above=_ONCE) if tasks else {}
-    known |= {spec: min(*timing.values, runs[spec][1].cost) for spec, timing in timings.items()}
-    return {spec: known[spec] for spec in runs if spec in known}
+    speeds |= {spec: min(*timing.values, runs[spec][1].cost) for spec, timing in timings.items()}
+    return {spec: speeds[spec] for spec in runs if spec in speeds}
 
 
 def spec_of(item: SettingSearch, run: JudgedRun | None = None) -> str:

@@ -13,7 +13,7 @@ from proofroll.core.dataset import BETWEEN
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
-from proofroll.core.time_grid import off_grids, time_grid
+from proofroll.core.time_grid import off_grids, time_grid, whole_intervals
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.running.case import Case, EngineFacts, Status
@@ -93,7 +93,7 @@ class AnswerQuestion:
         time_grid(until, until or 1.0)
         require_length(until)
         every = sampling_of(scene, until)
-        end = float(f"{every * math.floor(until / every * (1 + 1e-12) + 1e-9):.12g}")
+        end = float(f"{every * whole_intervals(until, every):.12g}")
         until = end if 0 < end < until - 1e-6 * every else until
         return cls(scene, parameters, until, every)
 
@@ -113,9 +113,10 @@ class AnswerQuestion:
         longest = 4 * step
         if not 0 < longest <= self.until:
             raise InputError("dt", step, f"give a positive step of at most a quarter of the {self.until:g} s")
-        count = math.floor(self.until / longest * (1 + 1e-12) + 1e-9)
         every = float(f"{longest * max(1, round(self.until / 100 / longest)):.12g}")
-        return replace(self, until=float(f"{longest * count:.12g}"), every=every, whole=step)
+        return replace(
+            self, until=float(f"{longest * whole_intervals(self.until, longest):.12g}"), every=every, whole=step
+        )
 
     @cached_property
     def loaded(self) -> Scene:

@@ -138,8 +138,8 @@ class TwoRuns:
     @property
     def lines(self) -> Iterator[str]:
         """Differences of what was asked for, of events and of quantities, a line each."""
-        for name, (old, new) in self.about.items():
-            yield f"{name}: {'–' if old is None else old} → {'–' if new is None else new}"
+        for name, (value, new_value) in self.about.items():
+            yield f"{name}: {'–' if value is None else value} → {'–' if new_value is None else new_value}"
         if self.event_time is None:
             yield f"!! events: {self.events[0]} → {self.events[1]}, or of other kinds"
         elif self.event_time:
@@ -183,15 +183,13 @@ def two_runs(old: Path, new: Path) -> TwoRuns:
     )
 
 
-def _read(path: Path, argument: str) -> xr.Dataset:
+def _read(path: Path, side: str) -> xr.Dataset:
     try:
         data = read(path)
     except (OSError, ValueError) as problem:
-        raise InputError(argument, path, f"cannot be read as a run: {problem}") from None
+        raise InputError(side, path, f"cannot be read as a run: {problem}") from None
     if "scene" not in data.attrs:
-        raise InputError(
-            argument, path, "does not name its scene; proofroll run SCENE --out FILE.nc writes one that does"
-        )
+        raise InputError(side, path, "does not name its scene; proofroll run SCENE --out FILE.nc writes one that does")
     return data
 
 
@@ -214,20 +212,18 @@ def _about(data: xr.Dataset, new_data: xr.Dataset) -> dict[str, tuple[Any, Any]]
         for run in (data, new_data)
     ]
     pairs = [(name, values[0].get(name), values[1].get(name)) for name in dict.fromkeys([*values[0], *values[1]])]
-    return {name: (old, new) for name, old, new in pairs if old != new}
+    return {name: (value, new_value) for name, value, new_value in pairs if value != new_value}
 
 
-def _at_shared_instants(data: xr.Dataset, new_data: xr.Dataset, new: Path) -> tuple[xr.Dataset, xr.Dataset]:
+def _at_shared_instants(data: xr.Dataset, new_data: xr.Dataset, path: Path) -> tuple[xr.Dataset, xr.Dataset]:
     """Both runs at the instants that both have."""
     times, new_times = (item["time"].to_numpy() for item in (data, new_data))
     if not (len(times) and len(new_times)):
-        raise InputError("new", new, "one of the runs has no samples")
-    following = np.clip(np.searchsorted(new_times, times), 0, len(new_times) - 1)
-    preceding = np.maximum(following - 1, 0)
-    nearest = np.where(
-        np.abs(new_times[preceding] - times) < np.abs(new_times[following] - times), preceding, following
-    )
+        raise InputError("new", path, "one of the runs has no samples")
+    right = np.clip(np.searchsorted(new_times, times), 0, len(new_times) - 1)
+    left = np.maximum(right - 1, 0)
+    nearest = np.where(np.abs(new_times[left] - times) < np.abs(new_times[right] - times), left, right)
     shared = np.abs(new_times[nearest] - times) <= _ONE_INSTANT * max(times[-1], new_times[-1])
     if np.count_nonzero(shared) < 2:
-        raise InputError("new", new, "has no samples at the times of the other run; run both with one --every")
+        raise InputError("new", path, "has no samples at the times of the other run; run both with one --every")
     return data.isel(time=np.flatnonzero(shared)), new_data.isel(time=nearest[shared])

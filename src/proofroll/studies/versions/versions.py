@@ -73,5 +73,5 @@ def outcomes_of_versions(
     plans = [[plan(item, [side], runner.workers) for item in comparisons] for side in sides]
     cases = {case.key: case for of_side in plans for item in of_side for case in item.cases}
     results = runner.run(cases.values(), lambda case, _: progress(case.engine.name))
-    old, new = ([evaluate(item, results, runner) for item in of_side] for of_side in plans)
-    return old, new
+    outcomes, new_outcomes = ([evaluate(item, results, runner) for item in of_side] for of_side in plans)
+    return outcomes, new_outcomes

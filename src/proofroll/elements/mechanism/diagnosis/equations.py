@@ -324,8 +324,7 @@ def is_one_motion(run: Any, truth: Any, length: float, step: float = 0.0) -> boo
         changes = np.max(np.abs(np.diff(velocities, axis=0)), axis=1)
         smooth &= changes <= _JUMPS * np.median(changes)
     off, rate = p - true_p, v - true_v
-    turned, true_turned = (quaternions(dataset)[:count] for dataset in (run, truth))
-    chords = [np.linalg.norm(turned - sign * true_turned, axis=-1) for sign in (1.0, -1.0)]
+    chords = [np.linalg.norm(quaternions(run)[:count] - sign * quaternions(truth)[:count], axis=-1) for sign in (1, -1)]
     farthest = max(float(np.max(np.abs(off))), 2 * length * float(np.max(np.minimum(*chords))))
     unexplained = np.cumsum((np.diff(off, axis=0) - h * (rate[1:] + rate[:-1]) / 2)[smooth], axis=0)
     least = max(_UNEXPLAINED * farthest, _LEAST_ERROR * length, step * float(np.max(np.ptp(v, axis=0))))
