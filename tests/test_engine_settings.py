@@ -52,6 +52,7 @@ def arguments(tmp_path: Path) -> Callable[[str], list[str]]:
     return of
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("balance under control")
 @pytest.mark.parametrize("path", PATHS)
 def test_a_wrong_setting_is_told_alike(

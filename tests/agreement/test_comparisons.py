@@ -100,6 +100,7 @@ def outcomes(store: Store) -> Callable[[Comparison, Row], Outcome]:
     return outcome
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of("paper")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", comparison_names())

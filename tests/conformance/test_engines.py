@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from proofroll.conformance import Check, checks
-from proofroll.conformance.subject import scenes, truth_scenes
+from proofroll.conformance.subject import contrasts, scenes, truth_scenes
 from proofroll.core.errors import Missing
 from proofroll.core.plugins import engine_names, load_engine
 
@@ -44,9 +44,11 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
 # What a formulation builds hangs on no preset: it is asked of one.
 OF_BUILDING = ("builds_or_refuses", "builds_only_what_is_required")
 # Of what hangs on a formulation's model or adapter, not on its step, and of what is held against truths, one preset is
-# asked on every scene in every run of the tests; in the drills each scene is asked of one other preset, in turns: of
-# how it moves, or of its certificate and its first steps; an eighth of them before a change lands, another eighth by
-# each check, and that a law acts in other presets at night alone. What is known to fail is asked wherever it is.
+# asked on every scene: of its certificate in every run of the tests, of its first steps, of how it moves and whether a
+# law acts on a third of them, in turns, and at night on all. In the drills each scene is asked of one other preset, in
+# turns, too: of how it moves, or of its certificate and its first steps; a twenty-fourth of them before a change lands,
+# another by each check; of the checks without scenes a third; and that a law acts in other presets at night alone. What
+# is known to fail is asked wherever it is.
 OF_MODELS = (
     "certificate_holds",
     "first_steps_fit_the_scene",
@@ -61,8 +63,11 @@ OF_MODELS = (
     "sampling_changes_nothing",
     "velocities_are_the_rates",
 )
-# Each preset's order and the effect of its tolerance: of one in every run, of all others in the drills.
+# Each preset's order and the effect of its tolerance: of one in every run, of all others at night.
 OF_PRESETS = ("order_is_as_declared", "tolerance_has_an_effect")
+# Those of a formulation's model that run for long, so that each is asked of a third of the scenes before a change lands.
+OF_RUNS = ("first_steps_fit_the_scene", "moves_as_the_truth", "law_acts")
+_SHARE = 3
 
 
 TURNS = [*scenes(), *truth_scenes()]
@@ -76,18 +81,23 @@ def marks(engine: Any, check: Check) -> tuple[pytest.MarkDecorator, ...] | None:
     formulation, preset, *scene = about.split("-", 2)
     first, *others = sorted(engine.presets[formulation], key=lambda preset: preset != "matched")
     if preset == first:
-        return ()
+        if name not in OF_RUNS or check.known:
+            return ()
+        places = [*TURNS, *contrasts()].index(scene[0]), sorted(engine.presets).index(formulation), OF_RUNS.index(name)
+        return (pytest.mark.nightly,) if sum(places) % _SHARE else ()
     if name in OF_BUILDING and not check.known:
         return None
-    if check.known or name in OF_PRESETS:
+    if check.known:
         return (pytest.mark.drill,)
+    if name in OF_PRESETS:
+        return (pytest.mark.nightly,)
     number = turn = OF_MODELS.index(name)
-    mark = pytest.mark.drill
+    mark = pytest.mark.nightly if (number + sorted(engine.presets).index(formulation)) % _SHARE else pytest.mark.drill
     if scene and scene[0] in TURNS:
         turn, odd = divmod(TURNS.index(scene[0]), 2)
         if odd == (name == "moves_as_the_truth"):
             return None
-        mark = pytest.mark.nightly if (turn + number) % 8 else mark
+        mark = pytest.mark.nightly if (turn + number) % (8 * _SHARE) else pytest.mark.drill
     elif name == "law_acts":
         mark = pytest.mark.nightly
     return (mark,) if preset == others[turn % len(others)] else None

@@ -31,6 +31,7 @@ def test_a_number_that_is_read_back_is_the_cause(name: str) -> None:
     assert ";" not in found.said
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("LoopAboutCentre")
 @pytest.mark.drill_of("LoopReaction")
 @pytest.mark.parametrize("name", REACTIONS)
@@ -47,6 +48,7 @@ def test_what_the_first_steps_or_the_end_of_a_run_tell_is_named(name: str) -> No
     assert found.named, found.said
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "name",
     [

@@ -37,6 +37,7 @@ def starts(mechanism: Mechanism) -> list[Record]:
     return [record_of(np.zeros(1), [first.sample(*mechanism.start())]), MaximalCoordinates(mechanism).at_start()]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("seed", STARTS)
 def test_both_routes_start_where_the_joints_definition_says(seed: int) -> None:
     """Poses, velocities, energy and determinate reactions at t = 0, all frames turned, by formulas of its own."""
@@ -115,6 +116,7 @@ def test_a_ball_starts_where_the_coordinates_of_its_wall_say(seed: int) -> None:
     assert abs(referee.run(np.zeros(1, np.longdouble)).seen[0]["gap"]) < 1e-17
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("7017", "17", "7092")
 # A bowl on which the ball slips until it sticks, a torus with resistance, a plane on which it bounces, two tori on
 # which it slips at first (it was taken to leave them), a plane whose gap has the round-off of the place, two bowls on

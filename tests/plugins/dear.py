@@ -20,6 +20,8 @@ VARIABLE = "PROOFROLL_NO_DEAR"
 # Processor time [s] above which a test is a drill (CONTRIBUTING.md), on a processor that takes LOOP [s] for the loop.
 LIMIT = 1.0
 LOOP = 0.008
+# Golden ratio, without its whole part.
+_GOLDEN = (5**0.5 - 1) / 2
 # Largest number of tests named in the line.
 _MOST = 10
 _BEGAN = pytest.StashKey[float]()
@@ -68,8 +70,9 @@ def _slowness() -> float:
 def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Marks as drills what runs at night alone, and the cases of a test that its mark ``drill_of`` names.
 
-    Cases that the mark ``nightly_of`` names run at night alone, and those that the mark ``daily`` does not name.
-    Drills of some folders get a mark besides. Where a single case is asked for, names are not compared with cases.
+    Cases that the mark ``nightly_of`` names run at night alone, those that the mark ``daily`` does not name, and all but
+    the share that the mark ``one_in`` leaves to the day. Drills of some folders get a mark besides. Where a single case
+    is asked for, names are not compared with cases.
 
     Raises:
         pytest.UsageError: a mark names a case that its test has not.
@@ -79,11 +82,13 @@ def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
     for item in items:
         case = item.name.partition("[")[2].removesuffix("]")
         function = item.nodeid.partition("[")[0]
+        place = len(cases[function])
         cases[function].add(case)
         drills, nightly, daily = (_names(item, mark) for mark in ("drill_of", "nightly_of", "daily"))
         if names := drills | nightly | daily:
             named[function] = names
-        if case in nightly or (daily and case not in daily):
+        share = item.get_closest_marker("one_in")
+        if case in nightly or (daily and case not in daily) or (share and not is_of_the_day(place, *share.args)):
             item.add_marker("nightly")
         if case in drills or item.get_closest_marker("nightly"):
             item.add_marker("drill")
@@ -93,6 +98,14 @@ def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
     for function, names in named.items() if whole else ():
         if unknown := names - cases[function]:
             raise pytest.UsageError(f"{function}: a mark names {', '.join(sorted(unknown))}, which it has not")
+
+
+def is_of_the_day(place: int, count: int) -> bool:
+    """True for one case in ``count``, by its place among the cases of its test; for the first one always.
+
+    Multiples of the golden ratio are spread evenly, and fall in step with no parameter that returns every few cases.
+    """
+    return place * _GOLDEN % 1 < 1 / count
 
 
 def _names(item: pytest.Item, mark: str) -> set[str]:

@@ -42,6 +42,7 @@ def drift(engine: str, oscillations: int) -> tuple[float, float]:
     return max(changes), max(slips)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("projection[formulation=euler,preset=tuned]-100")
 @pytest.mark.parametrize(
     ("engine", "oscillations"),

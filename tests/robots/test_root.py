@@ -32,6 +32,7 @@ def arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "robot/arm.xml"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("run", "recommend", "ladder", "report")
 @pytest.mark.drill_of("compare", "check")
 @pytest.mark.parametrize(

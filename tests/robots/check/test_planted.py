@@ -291,6 +291,7 @@ CASES = [
 ]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("text", "engine", "expected", "base"), CASES)
 def test_real_engines(
     text: str, engine: str, expected: set[str], base: str, robot_workers: Workers, tmp_path: Path

@@ -26,6 +26,7 @@ ROBOT = legged()
 LAW = law_of(ROBOT)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("-rk4", "single-rk4")
 @pytest.mark.parametrize("scheme", ["explicit", "implicit", "rk4"])
 @pytest.mark.parametrize("digits", ["", "single", "3"])

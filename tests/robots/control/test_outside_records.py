@@ -140,6 +140,7 @@ def require_first(judgement: RecordJudgement, layer: str, cause: str) -> None:
     assert (wrong.name, wrong.causes[0].id) == (layer, cause)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("digits", ["", "single", "3"])
 def test_a_right_record_of_another_program_holds(program: str, digits: str, judged: Judged) -> None:
@@ -151,6 +152,7 @@ def test_a_right_record_of_another_program_holds(program: str, digits: str, judg
         assert all(layer.residual is not None and layer.residual < 1e-9 for layer in layers)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "pinocchio-3-dry friction",
     "pinocchio-single-xyzw",
@@ -174,6 +176,7 @@ def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: 
     require_first(judged(recorded(name, program), digits), layer, cause)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("first for last-pinocchio", "kd of hips-pinocchio")
 @pytest.mark.parametrize(
     ("name", "program"),
@@ -199,6 +202,7 @@ def test_numbers_of_single_joints_are_named(name: str, program: str, judged: Jud
     assert words in "\n".join(judgement.lines())
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of("milliseconds", "inverse")
 @pytest.mark.parametrize(
     "name",

@@ -45,6 +45,7 @@ def centres(
     return adapter.sample().p_WB, bare.run(times), bare.tolerance
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize(("engine", "formulation"), FORMULATIONS)
 def test_the_bare_loop_ends_where_the_adapter_does(engine: str, formulation: str, variant: str) -> None:
@@ -71,6 +72,7 @@ def test_another_start_is_refused(engine: str, formulation: str) -> None:
         load_bare_loop(engine)(scene_with(scene, start=start), settings)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("scene", MECHANISMS)
 @pytest.mark.parametrize(
     ("engine", "formulation", "preset"),

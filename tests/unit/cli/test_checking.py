@@ -33,6 +33,7 @@ def nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "run_one", run)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", scene_names())
 def test_every_scene_is_sound(proofroll: Proofroll, name: str) -> None:
     """Each scene of the package passes with a line that counts its parameters, and a few that say how it starts."""
@@ -165,6 +166,7 @@ friction = 0.3
     assert lines[0] - lines[1] >= 12
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("accuracy")
 @pytest.mark.parametrize("path", sorted(COMPARISONS.glob("*.toml")), ids=lambda path: path.stem)
 def test_every_study_is_sound(proofroll: Proofroll, path: Path) -> None:
@@ -194,6 +196,7 @@ def broken(tmp_path: Path, name: str, old: str, new: str) -> str:
     return str(tmp_path / name)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "old", "new", "words"),
     [

@@ -43,6 +43,7 @@ def cached(kind: type) -> set[str]:
     return {name for base in kind.__mro__ for name, value in vars(base).items() if hasattr(value, "attrname")}
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", SCENES)
 def test_arrays_of_scenes_are_read_only(name: str) -> None:
     """No array of a scene can be written, be it given or computed once; an engine's copy is no exception."""

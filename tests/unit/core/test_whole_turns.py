@@ -30,6 +30,7 @@ def fine() -> dict[str, float]:
     return {"q.pivot": float(ends["pendulum"]["q.pivot"][-1]), "gamma": float(ends["tilted_cylinder"]["gamma"][-1])}
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of("tilted_cylinder-gamma-projection")
 @pytest.mark.drill_of("pendulum-q.pivot-truth")
 @pytest.mark.parametrize(

@@ -64,6 +64,7 @@ def test_each_engine_has_both_laws(engine: str, law: str, true_spins: dict[str, 
     assert float(np.abs(run - true_spins[other]).max()) > 3.0
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("projection[formulation=dependent,rtol=1e-8]-True-4")
 @drill
 @pytest.mark.parametrize(

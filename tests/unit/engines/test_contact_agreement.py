@@ -117,6 +117,7 @@ def scene_of(name: str, mechanism: Mechanism) -> Scene:
     return Scene(name, "", (MechanismElement(mechanism),))
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "rod-mujoco[formulation=geoms,preset=tuned,dt=2e-4]-0.08-0.001",
     "block-mujoco[formulation=geoms,preset=tuned,dt=2e-4]-0.08-0.001",

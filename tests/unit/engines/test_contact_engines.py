@@ -28,6 +28,7 @@ def built(setting: str, scene: str) -> Any:
     return plugin.build(load_scene(scene), plugin.presets[formulation][preset])
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", [*CONTACTS, *LAWS])
 @pytest.mark.parametrize(
     "setting", ["projection dependent default", "pinocchio impulses matched", "pinocchio impulses tuned"]

@@ -118,6 +118,7 @@ def test_reactions_at_the_start(formulation):
     assert np.abs(found - expected)[said].max() < tolerance * np.abs(expected).max()
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("formulation", WITH_REACTIONS)
 @pytest.mark.parametrize("kind", held_bodies.LOOPS)
 def test_a_loop_holds_as_the_joint_does(formulation, kind):
@@ -164,6 +165,7 @@ BOUNDS = [
 ]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("formulation", "name", "until", "options", "position", "reaction"), BOUNDS)
 def test_errors_stay_below_what_is_declared(formulation, name, until, options, position, reaction):
     """Positions and determinate reactions of the scenes are as near to the truth as the engine is known to come."""

@@ -22,6 +22,7 @@ def motion_of(scene: str, parameters: dict[str, Any], time: float) -> ContactMot
     return motion
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("scene", "parameters", "time"),
     [

@@ -204,6 +204,7 @@ def test_a_comparison_tells_precision_and_floor(
     assert ", f32, dt 1e-3 s reached 0.01 s" in out
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     "check",
     [

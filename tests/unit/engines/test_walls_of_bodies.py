@@ -45,6 +45,7 @@ def leaning_wheel(friction: float) -> Mechanism:
     return Mechanism((Body("wheel", 2.0, inertia=(0.12, 0.06, 0.12)),), (joint,), geometries=shapes, pairs=pairs)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("friction", [math.inf, 100.0, 5.0])
 @pytest.mark.parametrize(
     ("preset", "order", "errors"),

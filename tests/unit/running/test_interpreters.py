@@ -134,6 +134,7 @@ def writes(text: str) -> Callable[[Path], Path]:
     return lambda folder: script(folder / "program", text)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("too-old")
 @pytest.mark.parametrize(
     ("make", "error", "says"),

@@ -119,6 +119,7 @@ COMPARISONS = sorted((Path(__file__).parents[3] / "comparisons").rglob("*.toml")
 JUDGES_PLACES = [path for path in COMPARISONS if '\npositions = "' in path.read_text(encoding="utf-8")]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("path", JUDGES_PLACES, ids=lambda path: path.stem)
 def test_every_claim_about_places_is_one_about_the_state(path: Path) -> None:
     """Whoever says in a comparison of this project how far places may be off says it of velocities and spins too.

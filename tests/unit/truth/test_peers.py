@@ -23,6 +23,7 @@ BARS = 1e-10  # s, and units of values: 1e-12 is seen
 ROOTS = np.array([-14.0783896927982, -0.3228664296, -0.7753418818 - 4.4648677130j, -0.7753418818 + 4.4648677130j])
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("bricard", "babyboot", "pushed_box", "andrews_squeezer")
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=MARKS[name in NIGHTLY]) for name in tables()]
@@ -38,6 +39,7 @@ MOTIONS = {entry["scene"] + str(entry.get("parameters", "")): entry for entry in
 LONG = {"sled", "sled_on_slope", "eccentric_sphere", "tilted_disc", "rattleback"}
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of("rattleback")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.drill) if name in LONG else name for name in MOTIONS]

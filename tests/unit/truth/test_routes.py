@@ -69,6 +69,7 @@ SHORT = {
 }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("bricard", "chain")
 @pytest.mark.parametrize("name", SHORT)
 def test_both_routes_agree(scene, name):
@@ -108,6 +109,7 @@ def test_routes_agree_on_every_kind_of_joint():
     assert np.abs(one.v - two.v).max() < 1e-11
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "cylindrical", "universal", "spherical", "planar", "fixed"])
 def test_routes_agree_on_every_kind_of_loop(kind):
     """A loop of each kind between two branches in space, reactions included; the root is free, so nothing hides."""

@@ -299,6 +299,7 @@ def test_a_joint_that_rubs_bounces_off_its_stop_beside_contacts() -> None:
     assert np.isinf(bounces.end)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("rail0", "rail2")
 @pytest.mark.parametrize(
     "rail",

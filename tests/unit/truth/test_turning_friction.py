@@ -184,6 +184,7 @@ def test_the_projection_solver_follows_friction_against_turning(
     assert max(item.error for item in moved) < 1e-11  # 1e-13 is seen
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "laws1-velocity1-0.2-exudyn[formulation=spheres]-errors2",
     "laws0-velocity0-0.0-exudyn[formulation=spheres]-errors2",

@@ -81,6 +81,7 @@ def test_a_symmetrical_top_on_a_spring_spins_on(tmp_path: Path) -> None:
     assert np.abs(energy - energy[0]).max() < 1e-12
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "engine",
     [

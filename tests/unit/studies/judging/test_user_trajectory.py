@@ -174,6 +174,7 @@ def test_arrays_are_renamed_and_converted(pendulum: tuple[np.ndarray, np.ndarray
         proofroll.judge(arrays, "pendulum", columns={"phi": "q.pivot"})
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("own", [True, False], ids=["of a run", "of a file"])
 @pytest.mark.parametrize("column", ["q.pivot", "v.pivot", "tip.x", "positions"])
 def test_a_column_that_contradicts_the_state_is_named(column: str, *, own: bool) -> None:

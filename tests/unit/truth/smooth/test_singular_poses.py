@@ -171,6 +171,7 @@ def test_a_tree_has_none(scene):
     assert singular_poses(scene("chain"), 1.0, 5e-3) == []
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
     "part",

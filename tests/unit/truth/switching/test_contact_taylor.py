@@ -46,6 +46,7 @@ def routes_of(si: Mechanism) -> list[ContactStretches]:
     ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("scene", SCENES)
 def test_compiled_equations_are_those_of_the_route(scene: str) -> None:
     """Shortly after the start, rates and guards of each route's compiled mode are those that it solves for."""

@@ -63,6 +63,7 @@ def test_a_balanced_wheel_rests_on_its_stop(sled: bool) -> None:
     np.testing.assert_allclose(found.record.q[:, 0], np.minimum(2 * TIMES, 0.5), atol=1e-13)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("speed", [(0.3, 0.0, 0.0), (0.2, -0.1, 2.0), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)], ids=str)
 @pytest.mark.parametrize(

@@ -286,6 +286,7 @@ def _pulse(length: float, torque: float = 3.0) -> Table:
     return Table((0.0, length, length + 1e-3), (torque, torque, 0.0))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("run", "gravity"),
     [

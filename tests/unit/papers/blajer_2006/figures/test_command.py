@@ -74,6 +74,7 @@ def test_a_wrong_number_is_a_contradiction(proofroll: Proofroll, tmp_path: Path)
     assert not stderr
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of('runs = ["free"]-runs = ["free"]\\ntitle = "$z_{$"-arguments4-2-its text cannot be drawn')
 @pytest.mark.drill_of('label = "free"-label = "free"-arguments5-3-no wheel, no ball')
 @pytest.mark.parametrize(

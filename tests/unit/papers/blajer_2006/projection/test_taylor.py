@@ -44,6 +44,7 @@ def state(scene: Scene, formulation: str, t: float, **settings: Any) -> tuple[An
     return engine._motion.x, engine.sample()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("cylinder-resisting-euler", "tilted-euler")
 @needs_heyoka
 @pytest.mark.parametrize("formulation", ["euler", "rotating_frame"])
