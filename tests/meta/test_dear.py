@@ -8,7 +8,7 @@ _CASES = 120
 
 
 def test_a_share_of_cases_is_spread_over_all() -> None:
-    """One case in n has its day, within one case, and some of each value of a parameter that returns every few cases."""
+    """One case in n runs by day, within one case, among them some of each value of a parameter that returns."""
     for count in (2, 3, 4):
         taken = [place for place in range(_CASES) if is_of_the_day(place, count)]
         assert taken[0] == 0

@@ -70,9 +70,9 @@ def _slowness() -> float:
 def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Marks as drills what runs at night alone, and the cases of a test that its mark ``drill_of`` names.
 
-    Cases that the mark ``nightly_of`` names run at night alone, those that the mark ``daily`` does not name, and all but
-    the share that the mark ``one_in`` leaves to the day. Drills of some folders get a mark besides. Where a single case
-    is asked for, names are not compared with cases.
+    At night alone run cases that the mark ``nightly_of`` names, those that the mark ``daily`` does not name, and all
+    but the share that the mark ``one_in`` leaves to the day. Drills of some folders get a mark besides. Where a single
+    case is asked for, names are not compared with cases.
 
     Raises:
         pytest.UsageError: a mark names a case that its test has not.
