@@ -131,6 +131,7 @@ def state_of(scene: str, **change: Any) -> dict[str, Any]:
     return state | {name: how(state[name]) for name, how in change.items()}
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("v_WB-sphere_in_cylinder")
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "pendulum"])
 @pytest.mark.parametrize("name", ["v_WB", "w_WB"])
@@ -182,6 +183,7 @@ def test_a_file_that_run_wrote_knows_its_scene(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["judge", str(other)]).exit_code != 0
 
 
+@pytest.mark.nightly_of("sphere_in_cylinder")
 @pytest.mark.drill_of("sphere_in_cylinder")
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "pendulum"])
 def test_a_run_of_which_variables_were_left_out(scene: str, tmp_path: Path) -> None:

@@ -363,7 +363,7 @@ def test_compare_on_a_full_disk(tmp_path: Path) -> None:
     assert not done.stdout
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_compare_keeps_reuses_and_mends_results(proofroll: Proofroll, tmp_path: Path) -> None:
     """A second comparison runs nothing and says the same; changed results are made again, and a line says so."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
@@ -390,7 +390,7 @@ def test_compare_restricted_to_an_engine(proofroll: Proofroll, tmp_path: Path) -
     assert "there is no such engine; choose one of" in err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_engine_that_is_asked_for_has_a_row(proofroll: Proofroll, tmp_path: Path) -> None:
     """An engine without a row in the file, also one with settings, has a verdict or a reason; nothing is dropped."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
@@ -467,7 +467,7 @@ EARLY = ["paper", "onset", "sphere_in_cylinder", "--set", "mu_static=0.12", "--u
 LOCATING = "pinocchio[formulation=impulses,preset=tuned]"  # in steps of 1e-3 s
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_run_lists_events(proofroll: Proofroll) -> None:
     """With bounded friction ``run --json`` lists each slip and stick with its time and its bracket."""
     code, out, err = proofroll(

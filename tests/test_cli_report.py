@@ -250,7 +250,7 @@ def test_a_page_after_the_first_comparison(
     assert "left out: 1 (balls 1). proofroll report --budget 3600 runs all" in " ".join(said.split())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_budget_is_spent_briefly_first_and_grows(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -308,7 +308,7 @@ def test_a_used_budget_begins_no_further_study(
     assert "the budget is used" in whole((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_second_report_into_one_folder(tmp_path: Path) -> None:
     """While a report is being made in a folder, another one says so and waits."""
     asked = [sys.executable, "-m", "proofroll", "report", "inclined_plane", "--out", str(tmp_path)]

@@ -66,6 +66,7 @@ def test_a_wrong_setting_is_told_alike(
             assert word in err
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "balance under control",
     "comparison of a file",

@@ -121,6 +121,7 @@ main()
 """
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("proofroll.files.scene_file-2")
 @pytest.mark.parametrize(
     ("module", "number"),

@@ -198,7 +198,7 @@ def test_other_kinds_keep_their_units(command_line: Proofroll, monkeypatch: pyte
     assert code == 0, err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_replay_and_judge(command_line: Proofroll, springs: Path) -> None:
     """A run of a scene that is no scene of the package is held against its truth; who draws no such scene says so."""
     assert command_line("run", str(springs), "--engine", "sprung", "--until", "1", "--out", "run.nc")[0] == 0

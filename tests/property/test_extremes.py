@@ -112,7 +112,7 @@ def test_rolling(motion: dict[str, float], size: float, mass: float) -> None:
             assert np.max(np.abs(level - level[0])) < 1e-10 * np.max(np.abs(level - mass * G * dataset["z"].to_numpy()))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=3)
 @given(motion=CYLINDERS, size=SIZES)
 def test_rolling_in_euler_angles(motion: dict[str, float], size: float) -> None:

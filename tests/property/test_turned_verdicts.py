@@ -94,6 +94,7 @@ def test_a_scene_is_told_alike_elsewhere(name: str) -> None:
     assert_told_alike(load_scene(name), (QUICK | NIGHT)[name], sum(map(ord, name)))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", _cases([30], range(60)))
 def test_a_random_mechanism_is_told_alike_elsewhere(seed: int) -> None:
     """The same of random trees and loops of all kinds of joints."""
@@ -108,6 +109,7 @@ def test_a_random_contact_is_told_alike_elsewhere(seed: int) -> None:
     assert_told_alike(Scene("random", "", (MechanismElement(mechanism),)), until, seed)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("ending", "text"),
     [pytest.param("urdf", urdf(), marks=pytest.mark.drill), pytest.param("xml", mjcf(), marks=NIGHTLY)],

@@ -52,7 +52,7 @@ def test_a_command_reads_below_the_root(proofroll: Proofroll, arm: str, words: l
     assert ROOT not in os.environ
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_runs_that_are_kept_are_read_below_the_root(proofroll: Proofroll, arm: str) -> None:
     """A stored run is shown and judged with the root, and the command that is proposed has it."""
     code, out, err = proofroll("run", arm, *SHORT, "--out", "run.nc", "--root", ".")

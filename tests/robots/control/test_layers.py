@@ -260,7 +260,7 @@ def test_the_fewest_causes_tell_the_importer() -> None:
     assert [cause.id for cause in layer.causes] == ["right"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_assumed_steps_decide_nothing() -> None:
     """What steps between the rows may explain is not decided where rows are steps only by the usual step."""
     record = recorded(ROBOT, LAW, LAW, scheme="rk4", step=1e-3, count=100)

@@ -121,7 +121,7 @@ def test_sizes_come_back_to_their_errors(tmp_path: Path) -> None:
         assert "at b" in layer.causes[0].sentence
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_nothing_explains_is_not_called_rounding(tmp_path: Path) -> None:
     """A torque that beats is no number of the robot: the layer differs without a cause, or is not decided."""
     (layer,) = loop(tmp_path, "EULER", "float64", beat=0.05).layers

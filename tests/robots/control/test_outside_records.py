@@ -236,7 +236,7 @@ def test_a_lag_that_no_digit_shows_is_left_open(judged: Judged) -> None:
     assert "the digits of the record do not tell whether" in judgement.remarks[0]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_rates_whose_rows_are_told_are_not_left_open(judged: Judged) -> None:
     """Rates that are called a row early are not called untold beside that."""
     judgement = judged(columns_of(miswritten(Loop().record(PROGRAMS["pinocchio"]), "early velocities")), "2")
@@ -259,6 +259,7 @@ def test_a_layer_that_stays_open_tells_no_column(judged: Judged, monkeypatch: py
     assert not any("none of 0 " in line for line in judgement.lines())
 
 
+@pytest.mark.nightly_of("late-are one instant")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("columns_of_actions", "words"),
@@ -291,6 +292,7 @@ def test_digits_that_show_no_force_decide_nothing(judged: Judged) -> None:
     assert (layer.residual, layer.reason) == (None, "the rounding of the record is larger than the forces")
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("begin", [3.0, pytest.param(3.007, marks=pytest.mark.drill)])
 def test_a_clock_that_begins_at_any_time(begin: float, program: str, judged: Judged) -> None:
@@ -358,6 +360,7 @@ def test_a_quaternion_of_few_digits_is_no_mistake(judged: Judged) -> None:
     assert judgement.agrees, "\n".join(judgement.lines())
 
 
+@pytest.mark.nightly_of("-every layer that was looked at holds")
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("name", "said"),

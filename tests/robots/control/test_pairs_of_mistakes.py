@@ -45,6 +45,7 @@ def judged(tmp_path: Path) -> Judged:
     return judgement
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of("pair3-pinocchio")
 @pytest.mark.drill
 @pytest.mark.parametrize(

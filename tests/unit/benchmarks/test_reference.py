@@ -55,7 +55,7 @@ def test_the_numeric_model_holds_its_bound() -> None:
     assert numeric(FREE, "rotating_frame", TIMES, TRUE_P, 1e-20) is None
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_search_takes_what_holds(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Every configuration found holds the bound on z and none is compiled; a bound that nothing holds finds nothing."""
     monkeypatch.setattr(searching, "engine_names", lambda: ["projection"])

@@ -47,6 +47,7 @@ def test_a_sled_turns_about_a_foot_and_rests() -> None:
     np.testing.assert_allclose(run.sample().contact_force[:, 2], N, rtol=1e-6)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("name", "kind", "contact"),
     [

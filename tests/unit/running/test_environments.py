@@ -45,7 +45,7 @@ def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: Callable[..., Any]) -> None:
     """By pip, with this proofroll; its label runs the version that was asked for, and nothing is left of it at last."""

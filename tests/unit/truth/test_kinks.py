@@ -61,6 +61,7 @@ def test_a_start_at_a_kink_takes_the_side_of_its_motion(at, v0):
     assert found.record.q[-1, 0] == pytest.approx(true, abs=1e-12)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.daily("force-max(0, sin(3*t))", "torque-abs(cos(3*t))", "target-sign(sin(3*t))", "force-min(t, 1 - t)")
 @pytest.mark.parametrize("text", ["max(0, sin(3*t))", "abs(cos(3*t))", "sign(sin(3*t))", "min(t, 1 - t)"])
 @pytest.mark.drill

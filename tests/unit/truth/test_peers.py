@@ -111,7 +111,7 @@ def ring_rates(_: float, state: Any) -> list[float]:
     return [p * speed, q * speed, -(slopes[1] + slopes[0] * speed**2 / 2) / inertia]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_ring_of_six_rods_follows_one_coordinate() -> None:
     """Problem A04 to 10 s: published places of the ring are those of its closed form in one coordinate."""
     (entry,) = tables()["bricard"]

@@ -44,7 +44,7 @@ def test_forces_of_joints_and_drives_that_hang_on_a_split_are_not_given() -> Non
     assert max(float(found.bars[name][-1]) for name in ("wrench", "named", "work", "p_WB", "v_WB")) < 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_light_body_on_a_heavy_one_slides_until_both_move_alike() -> None:
     """A box of 2 kg on a belt of 1e6 kg sticks where momentum says, as on a light belt."""
     belt, box, speed, mu, g = 1e6, 2.0, 0.8, 0.3, 9.81

@@ -94,6 +94,7 @@ def top(kind: Any) -> Geometry:
     return Geometry("solid", "world", kind, position=turned((0, 0, -0.5)), **TOP[kind])  # type: ignore[arg-type]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("0.0-cylinder", "inf-box")
 @pytest.mark.parametrize("kind", TOP)
 @pytest.mark.parametrize("friction", [0.0, np.inf])
@@ -278,7 +279,7 @@ def test_a_box_that_slides_over_a_rim_tips_when_its_centre_passes_it() -> None:
     assert (attitude.inv() * measured).magnitude().max() < 1e-11
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_rod_that_slides_over_a_rim_tips_on_it_and_leaves_by_its_end() -> None:
     """Its side crosses the edge where its middle passes; an independent solver moves it so until its end passes."""
     start, since = -0.02, np.array([0.0, 0.05, 0.1, 0.15])
@@ -322,7 +323,7 @@ def test_a_box_that_meets_a_side_rebounds_from_it() -> None:
     assert np.abs(found.record.w_WB[-1]).max() < 1e-12
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_tips_by_more_than_half_a_right_angle_ends_the_truth_with_the_reason() -> None:
     """A box that does not slip on the rim turns on until other faces meet, and the line says so."""
     found = truth_of(on_box((0.02, 0, HALF), friction=np.inf), np.array([0.0, 0.5]))
@@ -362,7 +363,7 @@ TUMBLE_FIRST = {("box", 1), ("capsule", 0)}
 
 
 @pytest.mark.nightly_of("box-1-False")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("other", "seed", "swapped"),
     [

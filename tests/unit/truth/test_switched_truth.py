@@ -703,6 +703,7 @@ def dropped_box(
     return replace(mechanism, **changed)
 
 
+@pytest.mark.nightly_of("2.0", "0.0")
 @pytest.mark.parametrize("slip", [0.0, 0.3, pytest.param(2.0, marks=pytest.mark.drill)])
 def test_a_box_that_lands_flat_has_a_truth_to_its_rest(slip: float) -> None:
     """Its face lands as one: it stops at once if friction can do that, or slides on by Coulomb's law."""

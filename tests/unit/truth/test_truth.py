@@ -475,6 +475,7 @@ def test_a_failure_of_the_rates_ends_the_truth_at_its_time(monkeypatch, route, c
         assert found.ended.startswith("the bushing mount turns by more than 3 rad")
 
 
+@pytest.mark.nightly
 @pytest.mark.nightly_of("50.0-0.00655755831")
 @pytest.mark.parametrize(
     ("until", "place"),

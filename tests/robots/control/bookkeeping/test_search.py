@@ -51,6 +51,7 @@ def test_a_right_loop_is_accused_of_nothing(program: str, step: float) -> None:
     assert found.before < 1e-9
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.drill
 @pytest.mark.nightly_of(
     "mujoco-0.002-velocity in the base",

@@ -253,7 +253,7 @@ def test_a_quick_map_leaves_out_the_longest_runs() -> None:
     assert Effort().values_of(horizon) == horizon.values
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_of_each_formulation_the_matched_settings(tmp_path: Path) -> None:
     """Where only matched settings are mapped, others of the same formulation are not, but where it has no matched."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})

@@ -115,6 +115,7 @@ def run(**numbers: float) -> Any:
     return simulate(arm(**numbers), "projection", until=0.06, every=0.004)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("friction -1")
 @pytest.mark.parametrize(
     ("numbers", "words", "named"),

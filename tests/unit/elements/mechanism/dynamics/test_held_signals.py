@@ -113,6 +113,7 @@ def test_a_held_table_belongs_to_its_own_time() -> None:
         read_signal("target", {**table, "hold": "yes"}, none, "rad")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("table-mujoco-3.5-1e-08")
 @pytest.mark.parametrize(
     ("name", "engine", "order", "most"),

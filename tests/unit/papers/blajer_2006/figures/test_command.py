@@ -61,7 +61,7 @@ def test_figures_and_numbers(proofroll: Proofroll, tmp_path: Path) -> None:
     assert (out / "height.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_wrong_number_is_a_contradiction(proofroll: Proofroll, tmp_path: Path) -> None:
     """Exit 1, and the table shows what was stated and found, within 100 columns."""
     path = written(tmp_path, TEXT.replace('"-160"', '"-150"'))

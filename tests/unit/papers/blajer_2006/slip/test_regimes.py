@@ -97,7 +97,7 @@ def test_map_follows_the_analytic_boundaries() -> None:
     assert np.array_equal(np.isnan(result.first_slip), result.regime == Regime.NEVER_SLIPS)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @slow
 def test_processes_change_nothing() -> None:
     """Two processes give the map that one gives."""
