@@ -202,6 +202,7 @@ def test_a_run_of_which_variables_were_left_out(scene: str, tmp_path: Path) -> N
         }
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "double_pendulum"])
 def test_a_table_of_numbers(command_line: Proofroll, scene: str, tmp_path: Path) -> None:
     """What run writes as CSV has every number over time under its name and unit, and is judged as the run is."""
@@ -324,6 +325,7 @@ def test_a_file_that_was_cut_off(tmp_path: Path) -> None:
             proofroll.judge(str(part), "pendulum")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("run", "words"),
     [
@@ -481,6 +483,7 @@ def test_the_orientation_of_a_ball_that_nobody_asked_for() -> None:
     assert [item.judgement.observable for item in frozen.compared if not item.agrees] == ["q_WB"]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["stop", "pendulum_friction"])
 def test_a_mechanism_that_switches_is_judged(name: str) -> None:
     """A run of a mechanism whose truth has events is judged, though no run of a mechanism tells any."""

@@ -136,6 +136,7 @@ BAD = {
 }  # fmt: skip
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of("dt of zero", "unknown setting")
 @pytest.mark.parametrize(("arguments", "code", "words"), BAD.values(), ids=BAD.keys())
 def test_bad_input(proofroll: Proofroll, arguments: list[str], code: int, words: list[str]) -> None:
@@ -250,6 +251,7 @@ def test_scenes(proofroll: Proofroll) -> None:
     assert found["sphere_in_cylinder"]["parameters"]["speed"]["unit"] == "m/s"
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("proofroll compare pap-2-paper")
 @pytest.mark.drill_of("proofroll run bric-2-bricard")
 @pytest.mark.parametrize(
@@ -269,7 +271,7 @@ def test_completion(words: str, index: int, found: str) -> None:
     assert done.stdout.split() == [found]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_scene_says_which_step_suits_it(proofroll: Proofroll) -> None:
     """A run that fails with a longer step than the scene asks for names the engine with that step, which works."""
     code, _, err = proofroll("run", "andrews_squeezer", "--engine", "exudyn", "--json")
@@ -512,6 +514,7 @@ def test_onset(proofroll: Proofroll, tmp_path: Path, engine: str, code: int, ver
         assert abs(row["difference"]) < 1e-3
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("soon", "reached"), [(None, "reached 0.17 s"), (0.05, "reached 0.2 s")])
 def test_onset_ends_soon_after_the_slip(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, soon: float | None, reached: str
@@ -704,7 +707,7 @@ def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "projection solver rotating frame, default" in text
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_reader_that_stops_reading() -> None:
     """Output into a pipe that is closed early, as by head, is no error, while a command writes or at its end."""
     for words in ("scenes --json", "scenes", "--version"):

@@ -98,7 +98,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("out")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
     """Stages on standard error, tables and the place on standard output, and both files with what they name."""
     names = files(tmp_path, claim=COMPARISON, figures=FIGURES.replace("STATED", "-160"))
@@ -360,7 +360,7 @@ def test_only_some_groups_of_scenes_are_run(proofroll: Proofroll, tmp_path: Path
     assert _of_groups([claim, other], "ball rolling") == [claim]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_each_scene_is_searched_for_the_first_screen(proofroll: Proofroll, tmp_path: Path) -> None:
     """Page, terminal and JSON have one sentence from one record, which recommend and compare find and print, too."""
     given = ["double_pendulum", "--engine", "mujoco", "--out", str(tmp_path)]

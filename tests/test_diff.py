@@ -52,7 +52,7 @@ def test_another_step_is_named_with_its_numbers(proofroll: Proofroll, run: Calla
     assert "- settings.dt: 0.02 → 0.01\n" in comment.read_text(encoding="utf-8")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_events_of_two_engines_are_compared(proofroll: Proofroll, run: Callable[..., Path]) -> None:
     """Of runs of a scene with contact the number and the times of events are told."""
     truth = run("truth.nc", "--engine", "truth", scene="bouncing_ball")
@@ -63,6 +63,7 @@ def test_events_of_two_engines_are_compared(proofroll: Proofroll, run: Callable[
     assert not any(name.startswith("settings") for name in told["about"]), "settings of two engines have no meaning"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

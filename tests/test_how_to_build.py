@@ -70,7 +70,7 @@ def test_a_parcel_slides_on_a_conveyor(tmp_path: Path) -> None:
     assert float(dataset["middle.x"][-1]) == pytest.approx(0.3 * _G * 0.05**2 / 2, rel=1e-9)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_sleeve_without_mass_swings_and_turns(tmp_path: Path) -> None:
     """The rotor swings along the axis as on the spring alone, about the place where it holds the weight."""
     found = run(SCENES["sleeve"], tmp_path)

@@ -72,7 +72,7 @@ def test_while_an_engine_is_asked(
     assert err.count("\n") == 1
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_while_the_map_is_drawn(tmp_path: Path) -> None:
     """Processes that compute for the truth end with Ctrl-C as well, and none of them says anything."""
     code, out, err = interrupted(

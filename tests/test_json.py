@@ -104,6 +104,7 @@ def fields(title: str) -> set[str]:
     return set(re.findall(r"^\| `(\w+)` \|", section(title), flags=re.MULTILINE))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("check-study", "ladder", "engines")
 @pytest.mark.drill_of("compare")
 @pytest.mark.parametrize(

@@ -162,7 +162,7 @@ def test_ladder(command_line: Proofroll, springs: Path) -> None:
     assert [rung["engine"] for rung in json.loads(out)["rungs"] if rung["engine"]] == ["sprung"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.usefixtures("springs")
 def test_report(command_line: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     """Report writes a page about it, of results that are stored."""

@@ -41,6 +41,7 @@ def test_reactions_that_are_told_wrongly_at_time_0_are_named(name: str) -> None:
     assert found.named, found.said
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", ["TiltedAxis", "CentreVelocity", "Unnormalised"])
 def test_what_the_first_steps_or_the_end_of_a_run_tell_is_named(name: str) -> None:
     """An axis that the first turning shows, velocities of the centres of mass, and quaternions that grow are named."""

@@ -138,7 +138,7 @@ def test_random_balls_have_every_wall_and_every_law() -> None:
     assert len(styles) == len(WALLS) * len(STYLES_OF_BALLS)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """An inertia that is a millionth too large shows in the motion."""
     element = random_ball(17)[1]

@@ -77,6 +77,7 @@ def test_an_engine_without_a_force_at_time_0_conforms() -> None:
         assert failure(Late, family) == ""
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("Damped-first_steps_fit_the_scene")
 @pytest.mark.parametrize(("engine", "family"), FAILS.items(), ids=lambda value: getattr(value, "__name__", value))
 def test_each_broken_promise_is_noticed(engine: type[Tiny], family: str) -> None:
@@ -134,7 +135,7 @@ def test_every_check_is_known_to_be_able_to_fail() -> None:
     assert {check.name.partition("[")[0] for check in checks(Tiny)} == set(FAILS.values())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_reproducer_runs() -> None:
     """The printed command, pasted into a shell, fails for the same reason."""
     check = next(check for check in checks(Forgetful) if check.name.startswith("advance_in_two_parts"))
@@ -306,6 +307,7 @@ class Exploding(Tiny):
             self.x = np.full(5, np.nan)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("engine", [Bounded, Refusing, Exploding])
 def test_the_order_of_an_engine_that_takes_no_coarse_steps(engine: type[Tiny]) -> None:
     """Where there are no steps coarser than the preset's the order is seen with finer ones, and a wrong one too."""

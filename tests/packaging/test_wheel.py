@@ -105,7 +105,7 @@ def test_it_is_the_wheel_that_is_used(installed: Path, tmp_path: Path) -> None:
     assert {path.stem for path in (REPOSITORY / "comparisons").glob("*.toml")} >= set(names.split()) >= {"paper"}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_scenes(installed: Path, tmp_path: Path) -> None:
     """The command line finds the scenes without the repository."""
     done = python(installed, tmp_path, "-m", "proofroll", "scenes", "--json")

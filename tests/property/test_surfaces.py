@@ -64,6 +64,7 @@ def test_steady_circles_in_a_bowl(radius: float, slope: float, k: float, spin: f
     held_circle(element(Bowl("wall", radius), k, u, speed * (frame[:, 1:].T @ forward), spin), W)
 
 
+@pytest.mark.nightly
 @settings(max_examples=30, deadline=None)
 @given(way=st.floats(0.06, 3.0), slope=st.floats(0.05, 1.4), k=ratios, spin=spins, around=st.floats(-3, 3))
 def test_steady_circles_in_a_cone(way: float, slope: float, k: float, spin: float, around: float) -> None:
@@ -82,6 +83,7 @@ def test_steady_circles_on_a_ring(ring: float, wire: float, slope: float, k: flo
     held_circle(element(Torus("wall", ring, wire), k, (0.3, -slope), (W * rho, 0.0), spin), W)
 
 
+@pytest.mark.nightly
 @settings(max_examples=30, deadline=None)
 @given(W=st.floats(0.1, 20.0), k=ratios, x=st.floats(-2, 2), vx=st.floats(-2, 2), vy=st.floats(-2, 2), spin=spins)
 def test_circles_on_a_turntable(W: float, k: float, x: float, vx: float, vy: float, spin: float) -> None:
@@ -110,7 +112,7 @@ def test_a_ball_on_the_rim_leaves_it_in_both_routes() -> None:
     assert float(found["gap"][-1]) > 0.1
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_truth_ends_at_the_tip_of_a_cone() -> None:
     """A ball that rolls straight into it has values up to there, with a constant acceleration, and the true reason."""
     scene = load_scene("cone", speed=0.0, normal_spin=0.0)

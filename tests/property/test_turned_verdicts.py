@@ -87,6 +87,7 @@ def _cases(quick: Iterable[Any], night: Iterable[Any]) -> list[Any]:
     return [*(pytest.param(case, marks=pytest.mark.drill) for case in quick), *tonight]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("stop", "friction_hold")
 @pytest.mark.parametrize("name", _cases(QUICK, NIGHT))
 def test_a_scene_is_told_alike_elsewhere(name: str) -> None:

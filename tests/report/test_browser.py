@@ -71,7 +71,7 @@ def test_figures_are_drawn_when_they_come_into_view(report_page: Path, drawn_pag
     seen.page.evaluate("document.querySelector('main').lastElementChild.remove()")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -> None:
     """Every link within the page ends at something one can see, however it was folded; a dead one is found."""
     with visit(report_page, before=UNDRAWN) as seen:

@@ -59,7 +59,7 @@ def test_file_is_a_picture_of_its_own(maps: list[xr.Dataset], tmp_path: Path) ->
     assert "V0²" not in text
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_report_shows_the_maps(made: tuple[Outcome, Store], maps: Any, tmp_path: Path, parse: Any) -> None:
     """Twice on the page of further studies, no id is used twice."""
     whole = begun([made[0]], "proofroll report")

@@ -58,6 +58,7 @@ def robot(tmp_path: Path):
     return written
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", FILES)
 def test_a_robot_moves_as_its_file_says(robot, name):
     """Accelerations of the scene at its start are those of the file's robot by world Jacobians, damping included."""
@@ -85,6 +86,7 @@ def test_a_robot_moves_as_its_file_says(robot, name):
         assert found[at] == pytest.approx(want, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("arm.urdf")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", FILES)
@@ -258,7 +260,7 @@ def test_what_a_file_has_beyond_the_answer_is_said(robot):
     assert load_scene(arm, limits=1).omitted == (drives, "springStiffness of 1 joint", "contacts")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_commands_say_what_is_not_in_the_answer(robot):
     """Run and compare print a line on what the file has and the answer leaves out."""
     arm = robot("arm.urdf", urdf())
@@ -301,6 +303,7 @@ def test_controls_of_a_keyframe(tmp_path: Path) -> None:
         load_scene(str(path), actuators=1, keyframe=2)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("key", ['qpos="{}" qvel="{}"', 'qpos="{}"', ""], ids=["whole", "at rest", "home"])
 def test_a_keyframe_is_a_start(tmp_path: Path, key: str) -> None:
     """A robot that starts in a keyframe has poses and velocities of MuJoCo's bodies there, whatever its joints are."""

@@ -57,7 +57,7 @@ def test_no_such_cause(proofroll: Proofroll, damped: Path) -> None:
     assert "write a list of causes" in " ".join(said.split())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_an_engine_is_fed_without(proofroll: Proofroll, tmp_path: Path) -> None:
     """An engine without an importer does not make the command exit 1 by what it leaves out."""
     path = tmp_path / "arm.xml"

@@ -130,7 +130,7 @@ BAD_READERS = {
 }
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_bad_readers(proofroll: Proofroll, install_readers: Install, arm: Path) -> None:
     """An importer that crashes, raises or is mistaken is a row beside the others."""
     install_readers({name.lower(): name for name in BAD_READERS})

@@ -62,7 +62,7 @@ def test_orders_of_a_robot_of_a_package() -> None:
         assert words in first.causes[0].sentence
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_sizes_are_fitted() -> None:
     """Sizes of gains, limits, scale and armature come back to three digits and more."""
     for attribute, factor in (("kp", 0.37), ("kd", 1.73), ("scale", 0.61), ("limit", 0.7), ("armature", 0.33)):

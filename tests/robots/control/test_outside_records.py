@@ -220,6 +220,7 @@ def test_a_mistake_of_columns_accuses_nothing_else(name: str, judged: Judged) ->
     assert wrong[0].causes[0].sentence.startswith(words)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("kind", ["v_WB", "v", "w_WB"])
 def test_a_row_of_lag_shows_in_three_decimals(kind: str, judged: Judged) -> None:
     """Rates that are a row late are named in a file with three decimals, and accuse no observation or frame."""
@@ -260,7 +261,7 @@ def test_a_layer_that_stays_open_tells_no_column(judged: Judged, monkeypatch: py
 
 
 @pytest.mark.nightly_of("late-are one instant")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("columns_of_actions", "words"),
     [("scaled", "have the scale of the controller already"), ("late", "are one instant")],
@@ -321,7 +322,7 @@ def test_a_mistake_of_an_observation_shows_in_actions(name: str, judged: Judged)
     require_first(judged(columns), "action", MISTAKES[name][0])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.nightly_of("dry friction", "payload")
 @pytest.mark.parametrize("name", CLOSED)
 def test_what_no_file_has_is_named_with_what_it_explains(name: str, judged: Judged) -> None:
@@ -391,6 +392,7 @@ def test_a_search_that_ran_out_of_time_decides_nothing(
     assert (code, "give --robot, too" in " ".join(err.split())) == (2, True)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("begin", "name", "said"),
     [
@@ -472,6 +474,7 @@ def _in_base(quaternion: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).inv().apply(vectors))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("layout", ["playground", "isaaclab", "legged_gym"])
 def test_arrays_of_a_training_framework(layout: str, legs: list[str], tmp_path: Path) -> None:
     """Arrays are read with the quaternion, frames, point and order of joints of their program, in single precision."""

@@ -57,6 +57,7 @@ def held_apart(path: Path, mechanism: Any, q: np.ndarray) -> float:
     return float(np.abs(data.efc_pos[: data.ne]).max())
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "text",
     [

@@ -111,6 +111,7 @@ def test_half_a_margin_is_a_larger_radius_and_half_a_higher_floor(
     assert {shape.position[2] for shape in shapes if shape.kind == "plane"} == {0.0025}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("shape", ['type="sphere" size=".02"', BLOCK, 'type="capsule" size=".02 .02"'])
 def test_turning_friction_of_feet_is_taken(stood: Callable[..., Scene], shape: str) -> None:
     """Condim 4 adds friction against spin and 6 against rolling, with the file's lengths, in the cone of sliding."""
@@ -196,6 +197,7 @@ def test_a_mesh_stands_on_the_corners_of_its_hull(stood: Callable[..., Scene]) -
     assert {shape.radius for shape in mechanism.geometries if shape.kind == "sphere"} == {0.0}
 
 
+@pytest.mark.nightly
 def test_a_mesh_in_a_file_stands_as_one_in_the_text(stood: Callable[..., Scene], tmp_path: Path) -> None:
     """Its file is read from the folder that the compiler names, where it collides."""
     (tmp_path / "parts").mkdir()
@@ -279,6 +281,7 @@ def table(kind: str, place: str = ".1 .2", turn: str = "0.9659258 0.258819 0.1 0
 BARE = "rate = 50\n[ground]\n"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("kind", [kind for kind in SHAPES if kind != "box"])
 def test_solids_on_a_box_are_as_far_from_its_face_as_from_the_box(stood: Callable[..., Scene], kind: str) -> None:
     """In any attitude above the face the least gap is the distance of both convex bodies, with the face's normal."""
@@ -367,6 +370,7 @@ FLOORED = robot(HOOF, after=hoof())
 TURNING = 'condim="4" friction=".3 .004"'
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("text", "control", "bound"),
     [

@@ -36,7 +36,7 @@ def test_a_scene(proofroll: Proofroll) -> None:
 
 
 @pytest.mark.nightly_of("./rod")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "./rod"])
 def test_a_comparison(
     command_line: Proofroll, install_engines: Callable[[Mapping[str, str]], None], scene: str

@@ -19,7 +19,7 @@ RUN = ["--until", "0.1", "--every", "0.05"]
 
 
 @pytest.mark.nightly_of("pendulum-truth-names1-.png-\\x89PNG")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("scene", "engine", "names", "ending", "begins"),
     [
@@ -65,7 +65,7 @@ def test_a_page_has_the_curves_that_are_furthest_off(proofroll: Proofroll, tmp_p
     assert page.stat().st_size < 1.5e6
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_json_says_what_was_written(proofroll: Proofroll, tmp_path: Path) -> None:
     """With --json the paths of the files stand in the document."""
     run, picture = tmp_path / "run.nc", tmp_path / "run.html"
@@ -105,6 +105,7 @@ def test_no_other_file_is_written_over(proofroll: Proofroll, tmp_path: Path) -> 
     assert "end the name of the file in .nc, .csv or .npz" in err
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("words", "shown"),
     [(["sphere_in_cylinder", "--set", "speed=3", "--engine", "oracle"], ["truth", "oracle"]),

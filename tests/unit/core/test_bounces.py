@@ -80,7 +80,7 @@ def test_the_truth_of_a_ball_tells_its_bounces() -> None:
     _within_bars(found, [0.64, 0.4096], [lost, 0.64 * lost])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_last_rebound_before_a_rest_has_its_height() -> None:
     """Each height is e² of the one before, up to the last impact, whose next rebounds are summed."""
     bounces = bounces_of(truth(load_scene("bouncing_ball"), np.linspace(0.0, 4.1, 3)))

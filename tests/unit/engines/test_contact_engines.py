@@ -98,6 +98,7 @@ def test_a_joint_holds_without_creep_and_tells_its_friction(setting: str) -> Non
         assert sample.joint_force is None or sample.joint_force[0, 2] == pytest.approx(force, abs=1e-6)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("projection dependent matched-1e-10-1e-09-0.5")
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize(

@@ -72,6 +72,7 @@ def test_friction_of_a_joint_and_of_a_contact_stop_a_foot(follow: Follow) -> Non
     happened(path, "rest sole", "stick rail", at=1 / slowed)
 
 
+@pytest.mark.one_in(2)
 @BOTH
 def test_a_foot_that_slides_rebounds_from_a_stop(follow: Follow) -> None:
     """A stop returns half of the speed, and friction at the foot turns with it."""
@@ -82,6 +83,7 @@ def test_a_foot_that_slides_rebounds_from_a_stop(follow: Follow) -> None:
     happened(path, "impact rail", "turn sole", at=hit)
 
 
+@pytest.mark.one_in(2)
 @BOTH
 def test_a_smooth_foot_is_pressed_against_a_stop(follow: Follow) -> None:
     """A stop that returns nothing bears what pulls the foot on."""

@@ -189,6 +189,7 @@ def test_a_spring_winds_up_more_than_a_turn(formulation):
     assert error < {"joints": 1e-8, "redundant": 1e-3}.get(formulation, 1e-11)  # RK4 and order 2 at 1e-3 s
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("formulation", ["joints", "redundant", "null_space", "dependent"])
 @pytest.mark.parametrize("name", ["slider_crank", "four_bar", "bricard"])
 def test_mobility_is_that_of_the_geometry(formulation, name):

@@ -68,6 +68,7 @@ def test_order_hangs_on_the_scene(model: tuple[str, str], scene: Scene, order: i
 
 
 # z's range is 0.12 m. Each bound is about 1.5 times what MuJoCo 4.0 gives, so that a change of the method is seen.
+@pytest.mark.nightly
 @pytest.mark.drill_of("formulation=geoms,preset=tuned,dt=5e-4")
 @pytest.mark.parametrize("engine", ["formulation=chart,dt=5e-4", "formulation=geoms,preset=tuned,dt=5e-4"])
 def test_reactions_are_the_truths(engine: str) -> None:
@@ -79,6 +80,7 @@ def test_reactions_are_the_truths(engine: str) -> None:
     assert error(CYLINDER, engine, "F3", **ROLLING) < 0.01
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of(
     "formulation=geoms,preset=tuned-parameters1-0.0002", "formulation=geoms,preset=tuned-parameters2-0.0002"
 )

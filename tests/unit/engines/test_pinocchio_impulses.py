@@ -23,6 +23,7 @@ PINOCCHIO = load_engine("pinocchio")
 PRESETS = PINOCCHIO.presets["impulses"]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("units", [Units(1.0, 2.0**20, 1.0), Units(2.0**-10, 1.0, 1.0), Units(1.0, 1.0, 2.0**7)])
 @pytest.mark.parametrize("preset", ["default", "matched", "tuned"])
 def test_an_error_of_the_solver_does_not_hang_on_units(preset: str, units: Units) -> None:
@@ -85,6 +86,7 @@ def _on_a_guide(**law: Any) -> Mechanism:
     return Mechanism((Body("mass", 1.0, inertia=(0.1, 0.1, 0.1)),), (joint,))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("dt", "error"), [(1e-2, 4.5e-2), (1e-3, 4.4e-3)])
 def test_dry_friction_is_of_first_order(dt: float, error: float) -> None:
     """A mass on a spring that rubs is off by as much as an impulse a step leaves, and samples change nothing."""

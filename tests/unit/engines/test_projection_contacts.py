@@ -127,7 +127,7 @@ def bounces(until: float) -> tuple[float, list[float]]:
     return y[0], changes
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_rod_on_a_rubbing_hinge_bounces_as_an_own_solver_says() -> None:
     """Both routes of the truth, and projection at steps of 2e-3 s, have the angle and events of one own equation."""
     angle, changes = bounces(0.45)
@@ -145,6 +145,7 @@ def test_a_rod_on_a_rubbing_hinge_bounces_as_an_own_solver_says() -> None:
         assert [event.time for event in events] == pytest.approx(times, abs=bound)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("engine", "formulation", "preset", "bound"),
     [
@@ -201,6 +202,7 @@ def test_a_graze_within_a_step_is_an_impact() -> None:
     assert impact.time == pytest.approx(0.124832443080, abs=1e-9)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("dt", [0.01, 0.003])
 def test_an_impact_takes_an_effort_off_its_limit(dt: float) -> None:
     """A foot that falls with a servo at its limit hits the floor once, and then stands with its whole weight."""
@@ -229,7 +231,7 @@ def test_feet_that_hold_together_share_their_friction() -> None:
     assert np.abs(run.sample().v_WB).max() < 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_foot_that_turns_within_a_step_goes_on() -> None:
     """At the end of a slide a foot may slip backwards after one coarse step: it has not stopped, and all rest soon."""
     run = PROJECTION.build(load_scene("sled_on_slope"), replace(DEFAULT, dt=4e-3))

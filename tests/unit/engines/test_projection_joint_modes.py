@@ -27,7 +27,7 @@ def place(run):
     return float(run.sample().p_WB[0, 2])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("options", "tolerance"),
     [({}, 1e-10), pytest.param({"integrator": "rk4", "dt": 1e-3}, 1e-7, marks=pytest.mark.nightly)],
@@ -122,6 +122,7 @@ def test_a_loop_with_friction_turns_when_it_should():
     assert (turn.kind, turn.name) == ("turn", "shaft")
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("options", "tolerance"), [({}, 1e-12), ({"integrator": "rk4", "dt": 4e-3}, 1e-7)])
 def test_an_effort_meets_its_limit_when_it_should(options, tolerance):
     """The clamp of a servo is a switch: its times are exact to the order of the method, and so is what follows."""
@@ -137,6 +138,7 @@ def test_an_effort_meets_its_limit_when_it_should(options, tolerance):
     assert run.sample().v_WB[0, 0] == pytest.approx(speed, abs=20 * tolerance)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("target", [Formula("2*sin(9*t)"), Table((0.0, 0.15, 0.3), (0.0, 2.0, -2.0))])
 def test_friction_a_stop_a_limit_and_a_target_in_time_switch_together(target):

@@ -69,6 +69,7 @@ def test_another_precision_is_one_line() -> None:
         precision_of(SimpleNamespace(precision="half"))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of("double_pendulum")
 @pytest.mark.parametrize("name", SCENES)
 def test_errors_stay_errors(name: str) -> None:

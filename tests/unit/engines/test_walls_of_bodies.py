@@ -114,6 +114,7 @@ def test_a_hollow_sphere_in_exudyn_stands_for_a_bore(dt: float) -> None:
     assert float(np.linalg.norm(run.sample().p_WB[0] - place_in_bore(0.2))) < 100 * dt**2 + 5e-6
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("kind", list(WALLS))
 @pytest.mark.parametrize("setting", ["mujoco geoms matched", "mujoco geoms tuned", "exudyn spheres matched"])
 @pytest.mark.parametrize("swapped", [False, True])
@@ -157,6 +158,7 @@ def test_a_ball_at_the_centre_of_a_bowl_falls(setting: str) -> None:
     assert run.sample().p_WB[0] == pytest.approx([0, 0, -GRAVITY * 0.1**2 / 2], abs=GRAVITY * 0.1 * 1e-3)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("bowl-0.001-4e-06")
 @pytest.mark.parametrize(
     ("name", "resistance", "error"),

@@ -88,6 +88,7 @@ def test_a_ball_on_a_driven_wall_moves_as_the_truth_says(engine: str, name: str,
     assert max(drive, errors["contact_forces"]) < push
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of("projection")
 @pytest.mark.parametrize("engine", [ENGINES[0], "pinocchio[formulation=impulses,dt=2e-3]", "projection"])
 def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
@@ -108,6 +109,7 @@ def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
     np.testing.assert_allclose(run["drive.run"].to_numpy()[1:], pull[1:], atol=1e-5)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("preset", ["matched", "tuned"])
 def test_pinocchio_tells_the_friction_of_a_driven_table_at_the_start(preset: str) -> None:
     """Forces at the start belong to the motion's place at the start, also where steps take all at their middle."""

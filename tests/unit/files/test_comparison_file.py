@@ -160,6 +160,7 @@ def test_tolerances_of_another_form(text: object) -> None:
     assert caught.value.field == "claim: z"
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -59,6 +59,7 @@ def test_a_sound_truth_keeps_each_relation(name: str, tmp_path: Path) -> None:
     assert (tmp_path / "scene" / name.replace(" ", "_") / "scene.toml").is_file()
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("name", ["turned", "reversed"])
 def test_another_motion_is_a_breach(name: str, tmp_path: Path) -> None:
@@ -82,6 +83,7 @@ def test_a_refused_relative_is_a_breach(tmp_path: Path) -> None:
     assert "mass" in surprise.message
 
 
+@pytest.mark.nightly
 def test_losses_are_not_reversed(tmp_path: Path) -> None:
     """A scene with friction has no reversed one."""
     tables = deepcopy(_TABLES)

@@ -84,6 +84,7 @@ def test_a_version_that_is_too_old_is_not_installed(
         make_environment.add("grown", ["numpy==1.26.4", "grown==2.5"])
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("requirements", "options", "says"),
     [

@@ -23,7 +23,7 @@ def process(worker: Worker) -> int:
     return int(worker._process.pid)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_worker_is_kept_for_its_engine() -> None:
     """The same process answers for the same engine again, and never for another."""
     workers = Workers()
@@ -38,7 +38,7 @@ def test_a_worker_is_kept_for_its_engine() -> None:
     workers.close()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_prepared_worker_serves_the_engine_and_a_wrong_name_is_left_to_who_asks_next() -> None:
     """An engine's process is kept once it has imported what a run needs; of nonsense nothing is kept or raised."""
     workers = Workers()

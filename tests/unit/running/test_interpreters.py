@@ -46,7 +46,7 @@ def case_in(python: Path, workers: Workers | None = None) -> Case:
     return single_case("sphere_in_cylinder", {}, f"aged@{python}", workers=workers, **SHORT)  # type: ignore[arg-type]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_engine_runs_where_its_name_says(
     old: Path, new: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

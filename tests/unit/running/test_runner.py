@@ -189,7 +189,7 @@ print(json.dumps([said, *kept]))
 """
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_disk_that_is_really_full(tmp_path: Path, make_case: MakeCase) -> None:
     """A full disk ends the run with one line; what fits is stored, and running all again loses nothing."""
     cases = [dataclasses.asdict(make_case("oracle", parameters={"speed": speed})) for speed in (3.0, 4.0, 5.0)]

@@ -178,7 +178,7 @@ def test_cases_beyond_the_budget_are_left_out(
     assert {result.status for result in runner.run([quick], budget=TimeBudget(60.0)).values()} == {Status.DONE}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_asking_the_engines_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Processor time in which workers said what engines are is part of a budget, before any case has begun."""
     clock = iter(range(1000))

@@ -67,6 +67,7 @@ BETWEEN: list[tuple[str, str, Change]] = [
 ]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("scene", HONEST)
 def test_an_honest_run_agrees(scene: str) -> None:
     """An honest engine is right between its samples, too."""
@@ -75,6 +76,7 @@ def test_an_honest_run_agrees(scene: str) -> None:
     assert found.agrees, found
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("scene", "name", "change"), BETWEEN, ids=[f"{scene}-{name}" for scene, name, _ in BETWEEN])
 def test_what_is_wrong_between_the_samples_differs(scene: str, name: str, change: Change) -> None:
     """A place or a force that is right at every sample, and wrong between them, is no agreement."""
@@ -92,6 +94,7 @@ STATES: dict[str, Change] = {
 }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", STATES)
 def test_states_of_mechanisms_are_judged(name: str) -> None:
     """7 m, 7 m/s or 7 rad/s too much in every sample but the first is no agreement, at right tracked points or not."""

@@ -72,6 +72,7 @@ def test_an_axis_to_infinity_comes_back(tmp_path: Path) -> None:
     assert valid_study(tmp_path / "study.json", StabilityStudy) == (study, [])
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("values", "words"),
     [

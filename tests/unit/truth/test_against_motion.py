@@ -81,6 +81,7 @@ def test_the_moment_reverses_with_the_centre() -> None:
     assert [event.kind for event in events_of(true)] == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("first", [True, False])
 def test_the_order_of_the_pair_does_not_matter(first: bool) -> None:
     """A ball that slips askew moves alike whichever body the pair names first, and not as against its turning."""
@@ -117,6 +118,7 @@ def test_a_centre_that_nothing_moves_has_no_moment() -> None:
     assert last(true) == pytest.approx((0.0, 30.0), abs=1e-12)
 
 
+@pytest.mark.nightly
 def test_a_resistance_longer_than_the_arm_of_friction_turns_a_sliding_ball_back() -> None:
     """From rest on a slope with f > μ a the ball slides, and the moment exceeds that of friction."""
     slope, f, time = 0.3, 6e-3, 0.5

@@ -126,7 +126,7 @@ def test_one_impact(e: float, e_t: float, k: float, mu: float, speed: float, rim
     assert float(found["omega3"][1]) * A == pytest.approx(rim + change / k, abs=1e-10)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_superball_loses_nothing() -> None:
     """With e = e_t = 1 no impact changes the energy, and thrown under a table the ball comes back (Garwin 1969)."""
     scene = load_scene("bouncing_ball", speed=2, back_spin=90, restitution=1, tangential_restitution=1)
@@ -136,6 +136,7 @@ def test_superball_loses_nothing() -> None:
     assert len(rates) == 2  # the spin and the speed come back at every second impact
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("e", [0.0, 0.6])
 def test_landing_in_a_lying_cylinder(e: float, tmp_path: Path) -> None:
@@ -159,7 +160,7 @@ def test_coefficients_have_bounds() -> None:
             load_scene("bouncing_ball", **{name: 1.1})
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_start_in_the_air_beside_a_curved_wall(tmp_path: Path) -> None:
     """A ball in the air with a spin of its own does not leave the wall: its bounces are told, by both routes alike."""
     air = {

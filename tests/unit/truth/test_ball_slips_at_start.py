@@ -22,7 +22,7 @@ G, A = 9.81, 0.025
 SPEEDS = st.floats(-3, 3)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=12, deadline=None)
 @given(v=st.tuples(SPEEDS, SPEEDS), rims=st.tuples(SPEEDS, SPEEDS), k=st.floats(0.1, 1), mu=st.floats(0.05, 1))
 def test_closed_form(v: tuple[float, float], rims: tuple[float, float], k: float, mu: float) -> None:

@@ -87,7 +87,7 @@ def test_what_a_motion_moves_rubs_against_its_rate(
     assert [event.time for event in found.events] == pytest.approx(turns, abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_driven_foot_rubs_on_the_floor_in_both_senses() -> None:
     """A motion alone moves the foot along the floor, and friction of its weight acts against it."""
     bodies = (Body("cart", 1.0, inertia=(0.1, 0.1, 0.1)), Body("block", 2.0, inertia=(0.1, 0.1, 0.1)))

@@ -214,6 +214,7 @@ def test_loops_and_shapes_have_lengths_too() -> None:
     assert own.joints[1].limits is None
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("turn", np.linspace(0.0, 0.4, 9))
 def test_a_small_mechanism_far_from_the_origin_closes(turn: float) -> None:
     """Loops of 0.1 mm that close 10 m from the world's origin are accepted: round-off of such places is larger."""
@@ -251,6 +252,7 @@ def test_a_mechanism_at_one_place_has_a_length_that_follows_it(scene: str, point
     assert other.length == pytest.approx(100.0 * one.length)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("height", [1e-3, 1e-12])
 def test_a_point_at_rest_falls_on_its_stop_from_any_height(height: float) -> None:

@@ -63,7 +63,7 @@ def test_a_bicycle_leans_as_published() -> None:
     assert rolls == pytest.approx([0.1056094344262, -0.0412938697178, 0.0561808086960], abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_small_motions_of_a_bicycle_have_the_published_roots() -> None:
     """At 5 m/s a lean of 1e-4 rad/s is a sum of the four published exponentials."""
     times = np.linspace(0.0, 1.0, 41)

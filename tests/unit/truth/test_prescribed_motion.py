@@ -30,7 +30,7 @@ def shaken(motion: Signal) -> Mechanism:
 
 
 @pytest.mark.nightly_of("True")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("table", [pytest.param(False, marks=pytest.mark.drill), True])
 def test_a_shaken_pendulum_is_that_of_its_equation(table: bool) -> None:
     """Angle, place of the base and force of the drive are those of the pendulum's equation by another solver."""
@@ -114,7 +114,7 @@ def four_bar_moment(times: Array) -> Array:
     return moment
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_inverse_dynamics_through_a_loop_is_virtual_power() -> None:
     """The moment that drives a closed linkage is what links take, each by its own acceleration, over the speed."""
     times = np.array([0.0, 0.07, 0.31, 0.5])

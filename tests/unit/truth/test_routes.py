@@ -35,6 +35,7 @@ AGREED = {
 }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", AGREED)
 def test_tracked_point_is_where_independent_programs_agree(scene, name):
     """Taylor series in maximal coordinates reach the agreed digits."""
@@ -198,6 +199,7 @@ def turned_joints(draw, kind, name, parent, along=None):
                  **options)  # fmt: skip
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("kind", "in_plane"), [*((kind, False) for kind in FACTS), ("revolute", True), ("planar", True)]
 )

@@ -31,7 +31,7 @@ def _skid_steered() -> Mechanism:
     )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_forces_of_joints_and_drives_that_hang_on_a_split_are_not_given() -> None:
     """Four wheels share the load: axles, drives and their work have no values, the free joint has, bars stay small."""
     found = truth_of(_skid_steered(), np.array([0.0, 0.01]))

@@ -291,7 +291,7 @@ def test_a_rod_that_slides_over_a_rim_tips_on_it_and_leaves_by_its_end() -> None
     np.testing.assert_allclose(place[:, [0, 2]], over_the_rim(since, ACROSS)[:, :2], rtol=0, atol=1e-11)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_edges_that_cross_rebound_from_each_other() -> None:
     """An edge below that falls across an edge above rebounds by its restitution, v' = -e v, without turning."""
     across = Rotation.from_rotvec([np.pi / 4, 0, 0])

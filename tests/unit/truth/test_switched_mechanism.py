@@ -79,7 +79,7 @@ def test_an_impact_that_presses_two_stops_has_no_unique_outcome() -> None:
     assert found.record.q[:, 1] == pytest.approx([0.0, -0.05], abs=TIGHT)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_impacts_of_two_masses_that_accumulate_are_summed() -> None:
     """Two masses that fall on a stop and on each other hit without end in finite time, and then rest."""
     joints = (
@@ -115,7 +115,7 @@ def test_rebounds_come_to_rest_after_infinitely_many() -> None:
     assert found.record.q[1, 0] == pytest.approx(9.81 * fall / 8 * after - 9.81 * after**2 / 2, abs=1e-10)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_rebounds_on_a_guide_that_rubs_come_to_rest_too() -> None:
     """Friction makes each fall slower than its rise; both routes follow turns that lie 1e-12 m above the stop."""
     e, friction = 0.4, 1.0
@@ -130,6 +130,7 @@ def test_rebounds_on_a_guide_that_rubs_come_to_rest_too() -> None:
     assert found.record.q[-1, 0] == 0.0
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("0.7-0.1-6")
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(("restitution", "impacts"), [(0.1, 6), (0.01, 3), (0.001, 2)])
@@ -157,6 +158,7 @@ def test_what_lies_on_a_stop_or_nearly_so_comes_to_rest(height: float, restituti
     assert all(event.time_low <= 3 * np.sqrt(2 * height / 9.81) <= event.time_high for event in ends)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
     ("part", "known"), [(-1e-6, True), (-1e-11, False), (0.0, False), (1e-11, False), (1e-6, True)]
@@ -258,6 +260,7 @@ def test_bad_laws_are_one_line(more: dict[str, object], said: str) -> None:
     assert said in str(raised.value)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("ratio", [-0.7, 1.3])
 def test_joints_that_share_one_freedom_turn_together(ratio: float) -> None:
@@ -396,6 +399,7 @@ def swing_to_a_stop(inside: float, restitution: float) -> Mechanism:
     return Mechanism((Body("mass", 1.0, inertia=(1.0, 1.0, 1.0)),), (joint,), gravity=(0.0, 0.0, 0.0))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize("inside", [1e-10, 1e-15, 0.0, -1e-15, -1e-12])

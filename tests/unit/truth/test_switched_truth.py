@@ -84,6 +84,7 @@ def test_a_smooth_ladder_leaves_its_wall_at_two_thirds() -> None:
     assert np.sin(angle) == pytest.approx(2 / 3 * np.sin(1.2), abs=1e-9)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("kind", "room", "mu"), [("free", 1e-6, 0.3), ("planar", 0.25, 0.1)])
 def test_a_ball_that_slides_round_a_bore_rolls_when_its_path_says(kind: str, room: float, mu: float) -> None:
@@ -110,6 +111,7 @@ def test_a_ball_that_slides_round_a_bore_rolls_when_its_path_says(kind: str, roo
     assert found.record.p_WB[1, 0, :2] == pytest.approx(there, abs=1e-10 * room)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("other", [0.0, 0.3])
 def test_a_tip_on_a_turning_arm_rubs_against_its_own_motion(other: float) -> None:
@@ -355,7 +357,7 @@ def test_engines_with_laws_of_joints_beside_contacts_are_certified(laws: dict[st
     assert not any(np.isnan(line.expected).all() for line in lines if len(line.expected))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_finger_that_meets_its_stop_lets_the_ball_go() -> None:
     """A finger with a stop flicks a ball, both routes alike: friction slows it, the stop throws it back."""
     flick = mechanism_named("flick")
@@ -429,6 +431,7 @@ def test_a_box_that_slides_straight_on_four_corners_stops_where_coulomb_says() -
     assert np.isnan(found.pressed[..., :3]).all()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("mu", "tilt"), [(0.0, 0.0), (0.0, 0.3), (0.1, 0.3)])
 def test_a_box_slides_straight_down_a_slope(mu: float, tilt: float) -> None:
     """A box that is heavier at one corner moves as a point does, though the smallest forces would pull at the other."""
@@ -581,6 +584,7 @@ def test_residuals_of_the_truth_are_within_their_bars() -> None:
         assert float(np.nanmax(np.abs(found[name].to_numpy()))) <= bar, name
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("part", [-20, -1, 0, 1])
 def test_a_ball_that_just_rolls_is_ill_posed(part: int) -> None:
@@ -662,7 +666,7 @@ def test_a_finger_pushes_a_ball_and_lets_go() -> None:
     assert found.record.named[:, 0] == pytest.approx([0.6, 0.6], abs=1e-14)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("finger", "swing", "mass"),
     [
@@ -784,7 +788,7 @@ def test_a_box_that_lands_on_an_edge_tips_on_its_face_and_rests() -> None:
     assert found.record.q_WB[2, 0] == pytest.approx([1, 0, 0, 0], abs=DIGITS)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_lands_on_a_cart_moves_on_with_it() -> None:
     """Momentum along the rail is shared: four corners stick on a plate that moves."""
     box = dropped_box()
@@ -797,7 +801,7 @@ def test_a_box_that_lands_on_a_cart_moves_on_with_it() -> None:
     assert found.record.v_WB[2, :, 0] == pytest.approx(0.5 * 50 / 52, abs=DIGITS)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_bounces_flat_comes_to_rest_when_its_rebounds_are_summed() -> None:
     """With e = 1/2 the flights last 2 e^n t, t the fall: at 3 t it rests, flat, where it was dropped."""
     falls = float(np.sqrt(0.2 / 9.81))

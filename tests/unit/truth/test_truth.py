@@ -175,7 +175,7 @@ def test_growth_is_the_same_by_another_arithmetic(scene, monkeypatch):
     assert growths[1] == pytest.approx(growths[0], rel=1e-4)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_singular_poses_are_passed_by_the_closed_form(scene):
     """Where error control stalls, the closed form is the truth and equal steps of another route its witness."""
     truth = find_truth(scene("four_bar", windows=1), np.array([0.0, 1.0]))
@@ -183,7 +183,7 @@ def test_singular_poses_are_passed_by_the_closed_form(scene):
     assert truth.bars["points"][-1] < 1e-8
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_the_witness_of_a_closed_form_does_not_know_is_not_known(scene, monkeypatch):
     """A value that only one route has is no agreement."""
     recorded = JointCoordinates.recorded
@@ -247,6 +247,7 @@ def test_a_joint_that_swings_to_its_very_limit_stays_within(scene):
         assert truth_of(mechanism, np.linspace(0, 1.0, 3)).end == np.inf
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("size", [1.0, 2.0**-10])
 def test_routes_on_different_branches_are_no_truth(scene, monkeypatch, size):
@@ -458,6 +459,7 @@ def test_routes_of_a_spinning_body_agree(scene):
     assert max(found.differences["q_WB"], found.differences["points"]) < 2e-10
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("False-switching", "True-smooth")
 @pytest.mark.drill
 @pytest.mark.parametrize("route", [find_truth, switched_truth], ids=["smooth", "switching"])

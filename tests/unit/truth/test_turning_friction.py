@@ -66,6 +66,7 @@ def test_a_spin_ends_when_its_friction_says() -> None:
     assert expected[-1] == 0.0
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("f", "rolls"), [(0.004, True), (0.02, False)])
 def test_a_ball_on_a_slope_rolls_where_its_resistance_is_less_than_the_pull(f: float, rolls: bool) -> None:
     """From rest it stays if f cos α ≥ a sin α, and else starts with the acceleration of a ball that resists."""
@@ -118,6 +119,7 @@ def test_friction_against_spin_turns_with_the_normal_of_a_bore() -> None:
     assert LAWS in found
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (0.7, -1.1, 2.3)])
 def test_a_planar_joint_bears_what_friction_against_spin_would(rpy: tuple[float, float, float]) -> None:
@@ -135,7 +137,7 @@ def test_a_planar_joint_bears_what_friction_against_spin_would(rpy: tuple[float,
     assert np.linalg.norm(moves[0]) == pytest.approx(0.5 - 0.1 * G * 0.1, abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_bounce_has_a_bar_for_its_last_instants() -> None:
     """An impact has no moment of friction, so the bar covers the short time of the bounces that are left out."""
     scene = ball(law(0.3, restitution=0.4, rolling_resistance=1e-3), (0.8, 0.3, 0, 4.0, -20.0, 9.0), 0.08)
@@ -156,6 +158,7 @@ def test_a_coefficient_below_zero_is_refused_by_its_name() -> None:
         law(spinning_friction=-1.0)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("laws3-velocity3-0.06-0.0")
 @pytest.mark.parametrize(
     ("laws", "velocity", "height", "slope"),
@@ -219,6 +222,7 @@ def test_engines_follow_friction_against_turning(
         assert np.abs(at(run, field) - at(right, field)).max() < error
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "friction", [{"rolling_resistance": 0.01}, {"rolling_resistance": 0.01, "spinning_friction": 0.01}]
 )
@@ -234,6 +238,7 @@ def test_the_projection_solver_holds_what_its_weight_would_turn(friction: dict[s
     np.testing.assert_allclose(at(run, "p_WB")[-1], [0.2, 0.0, RADIUS], atol=1e-13)  # m
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("engine", "error"), [("projection", 1e-11), ("pinocchio[formulation=impulses]", 1e-2)])
 def test_a_growing_moment_turns_a_ball_once_it_exceeds_its_friction(engine: str, error: float) -> None:
     """Against a moment k t a ball stands until k t = f m g, and then has the spin k (t - f m g/k)²/(2 J)."""
@@ -260,6 +265,7 @@ def test_the_iteration_around_pinocchios_solver_leaves_no_error_of_its_own() -> 
     )  # m; 3e-14 is seen, and 6e-12 a thousand times looser
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -1.1, 2.3)])
 def test_a_free_joint_bears_nothing_once_a_spin_has_stopped(turn: tuple[float, float, float]) -> None:
     """Forces and moments of a free joint are 0 and determinate, also while friction against spinning holds its ball."""

@@ -40,6 +40,7 @@ def lifting(times: FloatArray) -> FloatArray:
     return np.where(times < struck, 0.0, (G * struck + LIFT) * LIFT) + G * LIFT * (times + behind)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("count", [3, 9])
 def test_an_impulse_works_by_the_rate_of_its_drive(count: int) -> None:
     """Behind an impact the work of a drive is that of its force and of its impulse, whatever samples are asked for."""

@@ -52,7 +52,7 @@ def test_a_right_loop_is_accused_of_nothing(program: str, step: float) -> None:
 
 
 @pytest.mark.one_in(4)
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.nightly_of(
     "mujoco-0.002-velocity in the base",
     "pinocchio-0.001-gravity 9.80",

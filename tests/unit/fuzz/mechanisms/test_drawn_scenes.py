@@ -73,6 +73,7 @@ def read(folder: Path, tables: Mapping[str, Any]) -> Scene:
     return load_scene(str(folder))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_scene_is_valid(family: str, tmp_path: Path) -> None:
     """The reader accepts every scene, and it has the capability of each feature that it was drawn with."""

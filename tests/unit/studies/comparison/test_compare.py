@@ -112,6 +112,7 @@ def off(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(z=dataset["z"] + 1e-3)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("angle", "agrees"), [(0.0, True), (1e-4, True), (0.1, False)])
 def test_the_orientation_of_a_ball_is_judged(tmp_path: Path, angle: float, agrees: bool) -> None:
     """A ball that is right but for its orientation differs; a quaternion's sign, any at each sample, says nothing."""
@@ -138,6 +139,7 @@ def test_a_claim_that_holds(tmp_path: Path) -> None:
     assert said.startswith("alpha at speed=4 differs, expected: agrees (z differs; z: error 1e-3 m beyond 1e-9 m")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("row", "bounds"),
     [
@@ -258,6 +260,7 @@ def test_who_shares_a_route_with_the_truth_is_marked(tmp_path: Path, monkeypatch
     assert run.shared.startswith("rests on the same equations as the truth itself (closed form")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("expect", [Verdict.AGREES, Verdict.CONVERGES, Verdict.DIFFERS])
 def test_a_tolerance_below_the_truth_contradicts_nobody(tmp_path: Path, expect: Verdict) -> None:
     """Where the truth is known less well than the tolerance no run agrees, and none contradicts, right or wrong."""
@@ -352,6 +355,7 @@ def test_a_failure_counts_where_nothing_is_claimed(tmp_path: Path, status: Statu
     assert exit_code([beside]) == (0 if status is Status.REFUSED else 3)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("witness", "engine", "code"), [(True, True, 0), (True, False, 3), (False, True, 3)])
 def test_a_witness_that_fails_fails_no_comparison(tmp_path: Path, witness: bool, engine: bool, code: int) -> None:
     """What cross-checks the truth, and fails, costs an exit code only where nothing else is compared."""
@@ -523,6 +527,7 @@ def test_where_no_motion_is_unique_tolerances_of_motion_judge_nobody(tmp_path: P
     assert "no motion is unique here, and no law has a tolerance: " in outcome.runs[0].result.message
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("status", "clause"), [(Status.CRASHED, "the truth ended in an error"), (Status.TIMEOUT, "the truth took too long")]
 )
@@ -604,6 +609,7 @@ LEFT_OUT = Result(Status.LEFT_OUT, "the 60 s of processor time did not suffice")
 EXPECTED = {"agrees": [Verdict.AGREES], "converges": [Verdict.CONVERGES], "failed": [Verdict.FAILED]}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("given", "said"),
     [

@@ -46,6 +46,7 @@ def test_the_truth_gives_all_that_can_be_asked_for() -> None:
     assert {case.asks for run in found.runs for case in run.ladder.values()} == {()}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("step", "factors"), [(2.5e-4, [4.0, 2.0, 1.0]), (1e-3, [2.0, 1.0, 0.5]), (2e-3, [1.0, 0.5, 0.25])]
 )

@@ -84,7 +84,7 @@ def test_a_force_is_judged_where_the_truth_determines_it() -> None:
     assert not proofroll.judge(run, "falling_rod").agrees
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_sled_whose_friction_is_thrice_and_reversed_differs() -> None:
     """Forces are judged up to the rest in which three feet share them, also where a motion alone has a tolerance."""
     run = proofroll.simulate("sled", "projection", until=0.7, every=0.02).copy(deep=True)

@@ -201,6 +201,7 @@ def test_routes_are_declared_for_formulations_that_there_are() -> None:
     assert resolve("projection", {})["shares"] == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("until", [1e-3, 2e-2])
 def test_a_percentage_of_event_times_is_one_of_the_time_of_the_run(until: float) -> None:
     """Times of events have the size of the time that a truth spans, in a scene of milliseconds as in one of hours."""

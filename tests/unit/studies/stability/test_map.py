@@ -218,7 +218,7 @@ def test_one_point_is_told_as_one() -> None:
     assert "before the run: 1 point." in said
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
     """Where an engine has no program of its own, the program asks proofroll, says why, and shows what is there."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
@@ -453,6 +453,7 @@ def test_a_scene_without_a_file(tmp_path: Path) -> None:
     assert all(scene.parameters[axis.name] and 1.0 in axis.values for axis in axes[:-1])
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "inclined_plane"])
 def test_our_files_can_be_read(scene: str) -> None:
     """Every axis of our own files gives scenes that exist."""

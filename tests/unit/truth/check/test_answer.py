@@ -260,6 +260,7 @@ def test_a_motion_is_cut_with_its_events_and_bars() -> None:
 UNTOLD = {"unpressed", "event_high", "event_low", "event_height"}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     "scene", ["slide_to_roll", "stop", "double_pendulum", "engine_on_mounts", "servo", "gear_pair"]
@@ -277,6 +278,7 @@ def test_each_variable_that_is_published_is_held(scene: str) -> None:
     assert silent <= UNTOLD
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "name",
     ["gap", "down", "across_rate", "omega1", "omega3", "cone_excess", "natural_map", "drift", "forces", "positions"],

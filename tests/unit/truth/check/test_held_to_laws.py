@@ -66,6 +66,7 @@ def held_servo(held: str, delay: int) -> Mechanism:
     return Mechanism((wheel,), (hinge,), actuators=(servo,), control=control)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("held", "delay"), [("target", 1), ("effort", 0)])
 def test_what_a_controller_sets_follows_its_law(held: str, delay: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values that are held between instants are those of the formula at the instant; a fault of a millionth is seen."""

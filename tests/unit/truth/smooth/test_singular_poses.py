@@ -33,6 +33,7 @@ def test_four_bar_passes_when_its_links_are_in_line(scene):
     assert singular_poses(mechanism, 1.5, 5e-3) == pytest.approx(expected, abs=1e-3)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["slider_crank", "bricard"])
 def test_regular_motion_passes_none(scene, name):
     """Minima of the singular value away from zero are not taken for singular poses."""
@@ -81,7 +82,7 @@ def test_a_parallelogram_in_closed_form_says_where_it_may_branch():
     assert "ill_posed" not in MechanismTruth.truth(element, np.array([0.0, 0.2]), ()).attrs
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_parallelogram_without_a_closed_form_ends_there_with_the_same_words():
     """Damped, no formula tells the branch, and what is before is kept."""
     found = find_truth(parallelogram(0.1), np.array([0.0, 0.2, 0.5, 1.0]))
@@ -90,7 +91,7 @@ def test_a_parallelogram_without_a_closed_form_ends_there_with_the_same_words():
     assert found.record.time.tolist() == [0.0, 0.2]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("faster", [pytest.param(2.0**10, marks=pytest.mark.nightly), 2.0**-10])
 def test_a_mechanism_that_runs_faster_or_slower_ends_at_the_same_pose(faster):
     """Gravity, speeds and dampers that belong to another unit of time give the same end, to the last bit."""
@@ -102,7 +103,7 @@ def test_a_mechanism_that_runs_faster_or_slower_ends_at_the_same_pose(faster):
     assert faster * truths[1].end == truths[0].end
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("faster", [2.0**10, pytest.param(2.0**-10, marks=pytest.mark.nightly)])
 def test_the_witness_of_a_closed_form_is_as_good_in_another_unit_of_time(scene, faster):
     """Its steps are as long for what moves, so that the bars behind a singular pose are the same."""
@@ -194,7 +195,7 @@ def test_a_motion_beside_a_singular_pose_goes_on(scene):
     by_joints(scene("slider_crank", crank=0.4 * (1 - 1e-7), speed=3.0), np.array([0.0, 0.5]), 1e-10)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_stop_elsewhere_ends_no_other_way_at_a_singular_pose(scene):
     """A mechanism with a stop that it does not reach is followed by other steps, to the same pose."""
     mechanism = scene("slider_crank", crank=0.4 * (1 - 1e-10), speed=3.0)

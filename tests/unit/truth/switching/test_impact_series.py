@@ -106,7 +106,7 @@ def test_two_smooth_corners_that_hit_in_turn_close_and_the_box_goes_on_an_edge()
     assert found.record.p_WB[2, 0] == pytest.approx([0, 0, 0.2], abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_one_order_is_told_from_the_impact_at_once() -> None:
     """A cube that lands on its second edge while the first one slides has one order: it is no question of orders."""
     turn = (0.984807753012208, 0.0, -0.17364817766693033, 0.0)

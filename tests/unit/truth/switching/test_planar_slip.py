@@ -63,7 +63,7 @@ def test_a_ball_slips_from_rest_and_sticks_when_its_own_truth_says() -> None:
     assert found.bars["v_WB"][-1] < 1e-12
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_slip_that_slows_gently_ends_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its last instants take no step of its stiff direction, and end when the ball's own truth says."""
     taken, step = [0], PicardSteps.step
@@ -82,6 +82,7 @@ def test_a_slip_that_slows_gently_ends_in_one_line(monkeypatch: pytest.MonkeyPat
     assert taken[0] <= 12  # of two routes; 550 without lines
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
@@ -199,6 +200,7 @@ def test_a_slip_that_turns_fast_is_followed_from_its_first_instant() -> None:
     assert found.record.v[-1, :2] == pytest.approx(right, abs=1e-6)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "until",
     [pytest.param(end, marks=pytest.mark.nightly if k % 4 else ()) for k, end in enumerate(np.linspace(0.13, 0.4, 20))],
@@ -216,6 +218,7 @@ def test_a_slip_that_stops_in_its_first_instants_ends_there(until: float) -> Non
         assert found.record.v[-1, 0] == pytest.approx(0.0, abs=1e-14)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("0.4", "0.25")
 @pytest.mark.drill
 @pytest.mark.parametrize("until", [0.19, 0.21, 0.25, 0.4])
@@ -258,6 +261,7 @@ def test_friction_opposes_a_slip_until_its_last_instant() -> None:
     assert found.bars["pressed"][-1] < 1e-5
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("way", [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)])
 def test_a_ball_of_unequal_moments_slides_along_an_axis_until_it_rolls(way: tuple[float, float]) -> None:
     """A slip that keeps its direction stops without a division by zero: at 2/7 of v/(μ g) for moments alike."""

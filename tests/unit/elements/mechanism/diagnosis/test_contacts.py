@@ -52,7 +52,7 @@ def test_mujocos_laws_of_friction_are_named(preset: str, words: str) -> None:
 
 
 @pytest.mark.nightly_of("2.0-0.05")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(("until", "every"), [(2.0, 0.05), (0.6, 0.01)])
 def test_a_pyramid_whose_slip_hardly_turns_is_named(until: float, every: float) -> None:

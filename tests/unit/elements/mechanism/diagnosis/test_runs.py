@@ -53,7 +53,7 @@ def test_damping_is_named_although_the_pivot_creeps(drift: float) -> None:
     assert cause.says.startswith("the joint pivot has damping of 0.02")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_one_step_early_is_told_of_few_samples() -> None:
     """Eleven samples of a loop that ends a step early tell the step, and no limit of a speed."""
     scene, times = load_scene("four_bar"), np.arange(11) * 0.03
@@ -70,6 +70,7 @@ def test_a_stop_is_accused_only_where_the_true_joint_turns_back_at_it(limit: flo
     assert any("turns back" in said for said in told) == named
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(("e", "until"), [(0.0, 0.2), (0.5, 0.15), (1.0, 0.3)])
 def test_a_stop_is_not_accused_where_a_step_reaches_beyond_it(e: float, until: float) -> None:
@@ -143,6 +144,7 @@ def _numbers(what: str, change: float) -> tuple[Scene, xr.Dataset]:
     return scene, truth(scene, np.arange(0, 0.3, 0.015))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("stop-stops-0.003-False")
 @pytest.mark.parametrize(("change", "accuses"), [(3e-3, False), (3e-2, True)])
 @pytest.mark.parametrize(("what", "name"), [("stop", "stops"), ("axis", "joint axis")])
@@ -161,6 +163,7 @@ def _accuses(name: str, scene: Scene, true: xr.Dataset, run: xr.Dataset) -> bool
     return cause.accuses
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("soft", "accuses"), [(0.0, True), (1e-4, False)])
 def test_a_ratio_that_is_exact_in_every_sample_is_no_error_of_a_method(soft: float, accuses: bool) -> None:
     """Rates with a ratio 0.3 % off accuse the engine; a part of it that changes, as of a soft coupling, does not."""
@@ -170,6 +173,7 @@ def test_a_ratio_that_is_exact_in_every_sample_is_no_error_of_a_method(soft: flo
     assert _accuses("couplings", scene, true, run) == accuses
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("at", "e", "named"), [(-0.05, 0.5, True), (-0.05, 0.45, False), (-0.01, 0.5, False)])
 def test_one_rebound_tells_a_stop_by_its_place_and_its_restitution(at: float, e: float, named: bool) -> None:
     """One rebound tells a stop beyond what two steps reach, if place and rate after it are those of its law there."""
@@ -179,7 +183,7 @@ def test_one_rebound_tells_a_stop_by_its_place_and_its_restitution(at: float, e:
     assert any(said.startswith(f"the joint guide turns back at {at:g},") for said in told) == named
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_dry_friction_of_one_of_two_joints_is_named() -> None:
     """A tenth too much friction of the elbow balances the equations, and no other number does."""
     scene, times = load_scene(str(ROUGH_ARM)), np.arange(0, 0.3, 0.01)
@@ -367,6 +371,7 @@ def _true_top() -> tuple[Scene, xr.Dataset]:
     return scene, truth(scene, np.arange(21) * 5e-3)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("law", "said"),
     [
@@ -428,6 +433,7 @@ def test_first_steps_contradict_masses_of_another_order(factor: float, contradic
     assert contradicts_first_steps(first, 5.0, Change(mechanism, mass=masses)) is contradicted
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("1.0-1.05-False")
 @pytest.mark.drill
 @pytest.mark.parametrize(

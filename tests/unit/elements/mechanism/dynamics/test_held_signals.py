@@ -133,6 +133,7 @@ def test_an_engine_keeps_its_order(name: str, engine: str, order: float, most: f
     assert _error(name, engine, STEPS[1], "effort.hip_servo") < 2e4 * most
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of("limited")
 @pytest.mark.parametrize("name", list(SCENES))
 def test_the_truth_is_exact(name: str) -> None:
@@ -161,6 +162,7 @@ def test_the_policy_is_asked_at_the_instants() -> None:
     assert [q for _, q in asked] == pytest.approx(run["q.hip"].values[::2], abs=1e-12)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("held", "delay"), [("target", 0), ("target", 1), ("effort", 0), ("effort", 2)])
 def test_a_controller_acts_as_written(held: str, delay: int) -> None:
     """Targets and held efforts, on time and delayed, move a hinge as its equation, integrated between instants."""

@@ -42,6 +42,7 @@ def written(engine: str, options: dict[str, Any]) -> str:
     return element.failure_program(failed, part)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("engine", "options", "needs"),

@@ -44,6 +44,7 @@ def largest_errors(scene: Scene, engine: str, until: float, every: float) -> dic
     return {str(name): float(np.abs(run[name] - true[name]).max()) for name in compared(true, run)}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
 def test_certificate(scene: Scene, preset: str) -> None:
@@ -57,6 +58,7 @@ def test_certificate(scene: Scene, preset: str) -> None:
     assert not engine.built().regularised  # nothing is softened
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", [name for name in SCENES if name != "cylinder"])
 def test_accuracy_everywhere(name: str) -> None:
     """The same code is as accurate for every start and every tilt."""
@@ -66,6 +68,7 @@ def test_accuracy_everywhere(name: str) -> None:
     assert max(errors["N"], errors["F2"], errors["F3"]) < 1e-11
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("integrator", "orientation", "dt"),
     [

@@ -75,6 +75,7 @@ def test_multipliers_of_any_state(formulation: str) -> None:
     assert taylor._motion.force == pytest.approx(numeric._ball.contact_force(response), rel=1e-12)
 
 
+@pytest.mark.one_in(2)
 @needs_heyoka
 @pytest.mark.parametrize(("formulation", "drift"), [("euler", 1e-11), ("rotating_frame", 1e-13)])
 def test_nothing_is_left_to_eliminate(formulation: str, drift: float) -> None:
@@ -85,6 +86,7 @@ def test_nothing_is_left_to_eliminate(formulation: str, drift: float) -> None:
     assert float(np.max(np.hypot(run["slip2"], run["slip3"]))) < drift  # of 4 m/s
 
 
+@pytest.mark.one_in(2)
 @needs_heyoka
 @pytest.mark.parametrize("preset", ["matched", "tuned"])
 def test_the_singularity(preset: str) -> None:

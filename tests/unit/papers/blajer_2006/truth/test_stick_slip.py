@@ -97,6 +97,7 @@ KNOWN: dict[str, tuple[dict[str, float], float, list[float], float | None]] = {
 }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("paper", "fast, resisted", "recovers")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", KNOWN)
@@ -128,7 +129,7 @@ def _state(motion: Any) -> tuple[Any, Any, Any]:
     return motion.p_WB, motion.v_WB, motion.w_WB
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_start_of_slip_does_not_matter() -> None:
     """No event and no end point moves when what takes the place of a start of slip varies over a decade or more."""
     body = ball(**PAPER)
@@ -160,7 +161,7 @@ def test_the_published_digits_of_the_article_law(paper: xr.Dataset) -> None:
     assert float(paper["z"][-1]) == pytest.approx(-2.297658694, abs=1e-9)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_resistance_against_turning_falls_elsewhere() -> None:
     """By the law of bodies the first slip is the same, the second 8 ms later, and the fall 38 mm deeper, to 1e-6."""
     (element,) = load_scene("sphere_in_cylinder", **PAPER).elements

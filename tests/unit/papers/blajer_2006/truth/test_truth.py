@@ -50,6 +50,7 @@ def test_closed_form_of_the_paper(speed: float) -> None:
         assert found[name].to_numpy() == pytest.approx(values, rel=1e-12, abs=1e-12), name
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("0.0005-asks1")
 @pytest.mark.drill_of("0.0-asks1")
 @pytest.mark.skipif(not library.available(), reason="heyoka is not installed")

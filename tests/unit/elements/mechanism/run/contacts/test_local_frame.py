@@ -36,6 +36,7 @@ def test_in_flight_a_ball_has_neither_gap_nor_slip() -> None:
     assert told["between.gap"].to_numpy().tolist() == [1.0, 0.0, 1.0]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "start"),
     [
