@@ -207,6 +207,7 @@ def test_progress_counts_comparisons(proofroll: Proofroll, tmp_path: Path, monke
     assert (ended.count(2), ended[-1]) == (1, 2), "with the last case of the second"
 
 
+@pytest.mark.drill
 def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) -> None:
     """A file for another study, and a name that does not exist, are wrong usage before anything runs."""
     for name in (*files(tmp_path, other='study = "opinion"', list='study = ["a"]'), "nothing"):
@@ -347,6 +348,7 @@ def test_a_planted_change_of_one_per_cent_is_found_and_nothing_else(
     assert "error of" in " ".join(out.split())
 
 
+@pytest.mark.drill
 def test_only_some_groups_of_scenes_are_run(proofroll: Proofroll, tmp_path: Path) -> None:
     """--only takes the comparisons of these groups, by name or by a word of it; others are one line of advice."""
     text = COMPARISON.replace("sphere_in_cylinder", "four_bar").replace("vary = { speed = [4] }", "")

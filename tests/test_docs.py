@@ -89,7 +89,7 @@ def typed() -> set[str]:
     return set()
 
 
-@pytest.mark.daily("findings", "first_verdict", "json", "licences", "write_a_scene")
+@pytest.mark.daily("findings", "first_verdict", "json", "licences")
 @pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])
@@ -229,6 +229,7 @@ def test_the_controllers_of_robots_are_what_the_page_says(monkeypatch: pytest.Mo
         assert read.ground.feet == entry.feet
 
 
+@pytest.mark.drill
 def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Both pages include the matrix, which is that of the records in the gallery's own pages, and the grid has all."""
     monkeypatch.syspath_prepend(str(ROOT / "docs"))

@@ -121,6 +121,7 @@ main()
 """
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.drill_of("proofroll.files.scene_file-2")
 @pytest.mark.parametrize(
@@ -141,6 +142,7 @@ def test_a_signal_while_a_module_is_imported(module: str, number: int) -> None:
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.drill
 @pytest.mark.nightly_of("arguments1")
 @pytest.mark.drill_of("arguments0")
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no /dev/full")

@@ -172,6 +172,7 @@ def test_report(command_line: Proofroll, monkeypatch: pytest.MonkeyPatch) -> Non
     assert "A mass on a spring" in Path("out", "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("springs")
 def test_conformance() -> None:
     """Every check of its engine holds, on the scenes of the new kind."""

@@ -90,6 +90,7 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     assert "| change | run |" in comment.read_text(encoding="utf-8")
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("old", "new", "says"),

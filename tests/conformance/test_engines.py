@@ -47,8 +47,7 @@ OF_BUILDING = ("builds_or_refuses", "builds_only_what_is_required")
 # asked on every scene: of its certificate in every run of the tests, of its first steps, of how it moves and whether a
 # law acts on a third of them, in turns, and at night on all. In the drills each scene is asked of one other preset, in
 # turns, too: of how it moves, or of its certificate and its first steps; a twenty-fourth of them before a change lands,
-# another by each check; of the checks without scenes a third; and that a law acts in other presets at night alone. What
-# is known to fail is asked wherever it is.
+# another by each check, and all else of other presets at night alone. What is known to fail is asked wherever it is.
 OF_MODELS = (
     "certificate_holds",
     "first_steps_fit_the_scene",
@@ -88,14 +87,12 @@ def further_mark(engine: Any, name: str, formulation: str, preset: str, scene: s
     if name in OF_PRESETS:
         return pytest.mark.nightly
     number = turn = OF_MODELS.index(name)
-    nightly = (number + sorted(engine.presets).index(formulation)) % _SHARE > 0
+    nightly = True
     if scene in TURNS:
         turn, odd = divmod(TURNS.index(scene), 2)
         if odd == (name == "moves_as_the_truth"):
             return None
         nightly = (turn + number) % (8 * _SHARE) > 0
-    elif name == "law_acts":
-        nightly = True
     _, *others = _presets(engine, formulation)
     if preset != others[turn % len(others)]:
         return None

@@ -63,6 +63,7 @@ def test_the_example_conforms(check: Check) -> None:
     check()
 
 
+@pytest.mark.drill
 def test_the_example_runs(tmp_path: Path) -> None:
     """Either runs in the example from a worker process, past the certificate and to the end."""
     cases = [

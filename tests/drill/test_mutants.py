@@ -56,6 +56,7 @@ NIGHTLY = pytest.mark.nightly
 QUICK = {"sphere_in_cylinder", "two_bounces", "double_pendulum", "heavy_top", "free_body", "saturated_servo"}
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "kind",
@@ -81,6 +82,7 @@ def test_a_fault_of_contacts_is_detected_and_named(fault: str) -> None:
     assert found.named, found.said
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.drill_of("RoughJoint", "CoarseGear")
 @pytest.mark.parametrize(
@@ -102,6 +104,7 @@ def test_late_reactions_of_a_fast_rotor_are_named(scene: str) -> None:
     assert found.named, found.by
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("scene", "parameters", "until"),

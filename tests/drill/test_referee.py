@@ -49,6 +49,7 @@ def test_both_routes_start_where_the_joints_definition_says(seed: int) -> None:
         assert max(found[name][0] for name in ("energy", "wrench")) < 1e-10
 
 
+@pytest.mark.drill
 def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
     """Kinds that start above leave none out; planar ones are planar to the second route, loops are loops."""
     found = {style: [random_mechanism(seed)[1] for seed in STARTS if seed % 4 == k] for k, style in enumerate(STYLES)}
@@ -59,6 +60,7 @@ def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
         assert not turning or {type(body) for body in made_bodies(mechanism, allow_planar=True)} == {Planar}
 
 
+@pytest.mark.drill
 @pytest.mark.drill_of("5", "10")
 @pytest.mark.parametrize("seed", [5, 10, 3060])
 def test_no_error_of_a_truth_lies_beyond_its_bar(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,7 +160,7 @@ def test_no_error_of_the_truth_of_contacts_lies_beyond_its_bar(seed: int) -> Non
     assert {"p_WB", "v_WB", "w_WB", "q_WB", "pressed", "event"} <= set(held.worst)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_referee_of_contacts_notices_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """An ellipsoid with an axis that is a millionth too long lands at another time."""
     style, mechanism, until = random_contacts(41)

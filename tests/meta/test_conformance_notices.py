@@ -78,7 +78,7 @@ def test_an_engine_without_a_force_at_time_0_conforms() -> None:
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.drill_of("Damped-first_steps_fit_the_scene")
+@pytest.mark.drill_of("Damped-first_steps_fit_the_scene", "Beating-moves_as_the_truth")
 @pytest.mark.parametrize(("engine", "family"), FAILS.items(), ids=lambda value: getattr(value, "__name__", value))
 def test_each_broken_promise_is_noticed(engine: type[Tiny], family: str) -> None:
     """The check whose business it is fails, and says how to run it alone."""
@@ -95,6 +95,7 @@ def test_a_buffer_that_is_filled_anew_is_named(engine: type[Tiny]) -> None:
     assert text.startswith("the arrays of a sample change with later steps: return copies")
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("engine", [Views, OneBuffer, OneForAll])
 def test_a_buffer_that_is_filled_anew_spoils_no_run(engine: type[Tiny]) -> None:
     """A run of such an engine is that of one that returns copies, and its model is not called a wrong one."""
@@ -121,6 +122,7 @@ def test_no_order_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "nan" not in said
 
 
+@pytest.mark.drill
 def test_a_scale_is_named() -> None:
     """An error that is told relative to a scale names the number of the scale, and the error itself, with units."""
     text = failure(Drifting, "moves_as_the_truth")
@@ -222,6 +224,7 @@ def lying(engine: type[Any], model: Callable[[Scene], Scene]) -> type[Any]:
     return Lying
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("engine", "formulation", "lies"),
     [
@@ -239,6 +242,7 @@ def test_another_model_than_is_said_is_noticed(engine: type[Any], formulation: s
             own.run()
 
 
+@pytest.mark.drill
 def test_another_top_than_is_said_is_noticed() -> None:
     """A slow top shows a centre of mass that is off by a tenth in an engine of spherical joints and first order."""
     pytest.importorskip("mujoco")
@@ -307,6 +311,7 @@ class Exploding(Tiny):
             self.x = np.full(5, np.nan)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("engine", [Bounded, Refusing, Exploding])
 def test_the_order_of_an_engine_that_takes_no_coarse_steps(engine: type[Tiny]) -> None:

@@ -141,6 +141,7 @@ def band_of(about: str) -> dict[str, str]:
     return {name: "1 %" if item and item.role is Role.RESIDUAL else "0.1 %" for name, item in items.items()}
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.drill_of("loop-3 ms early")
 @pytest.mark.parametrize(("about", "lie"), LIES)
@@ -270,6 +271,7 @@ def _honest_scene(name: str) -> tuple[Scene, Any]:
     return scene_of(name) if name in UNTIL else load_scene(name), Jointed
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.nightly_of(
     "sled-implicit_euler",
@@ -415,6 +417,7 @@ class Remembers(Tiny):
         self.x, self.t = self.kept[t], t
 
 
+@pytest.mark.drill
 @pytest.mark.drill_of("Tiny-0")
 @pytest.mark.parametrize(("kind", "remarks"), [(Tiny, 0), (Remembers, 1)])
 def test_a_run_that_is_remembered(kind: type[Tiny], remarks: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -427,6 +430,7 @@ def test_a_run_that_is_remembered(kind: type[Tiny], remarks: int, monkeypatch: p
     assert sum("times as long as the timed ones" in remark for remark in found.remarks) == remarks
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("about", ALL)
 def test_places_alone(about: str) -> None:

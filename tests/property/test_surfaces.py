@@ -51,6 +51,7 @@ def held_circle(ball: MechanismElement, W: float) -> None:
 ratios, spins = st.floats(0.1, 0.66), st.floats(-60.0, 60.0)
 
 
+@pytest.mark.drill
 @settings(max_examples=30, deadline=None)
 @given(radius=st.floats(0.06, 3.0), slope=st.floats(0.05, 1.3), k=ratios, spin=spins, around=st.floats(-3, 3))
 def test_steady_circles_in_a_bowl(radius: float, slope: float, k: float, spin: float, around: float) -> None:
@@ -73,6 +74,7 @@ def test_steady_circles_in_a_cone(way: float, slope: float, k: float, spin: floa
     held_circle(element(Cone("wall", slope), k, (around, way), (W * way * np.cos(slope), 0.0), spin), W)
 
 
+@pytest.mark.drill
 @settings(max_examples=30, deadline=None)
 @given(ring=st.floats(0.2, 3.0), wire=st.floats(0.01, 0.1), slope=st.floats(0.05, 1.4), k=ratios, spin=spins)
 def test_steady_circles_on_a_ring(ring: float, wire: float, slope: float, k: float, spin: float) -> None:
@@ -127,6 +129,7 @@ def test_a_truth_ends_at_the_tip_of_a_cone() -> None:
     assert found["s"].to_numpy() == pytest.approx(start + rising * known - down * known**2 / 2, abs=1e-12)
 
 
+@pytest.mark.drill
 def test_a_small_swing_passes_the_bottom_of_a_bowl() -> None:
     """From rest it swings at ω² = g/((1 + k)(R - a)), through the bottom, with an error bar near round-off."""
     amplitude, R, a, k = 1e-4, 0.225, 0.025, 0.4

@@ -72,6 +72,7 @@ def assert_same(found: xr.Dataset, expected: xr.Dataset, shifts: Changes = {}, f
         assert found[name].to_numpy() == pytest.approx(wanted, abs=CLOSE * size * max(1.0, abs(factor))), name
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @given(motion=MOTIONS, gamma=st.floats(-3.0, 3.0))
 def test_rotation_about_the_axis(way: str, motion: dict[str, float], gamma: float) -> None:
@@ -80,6 +81,7 @@ def test_rotation_about_the_axis(way: str, motion: dict[str, float], gamma: floa
     assert_same(solve(way, moved(scene, (gamma, 0.0)), UNTIL), solve(way, scene, UNTIL), {"gamma": gamma})
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @given(motion=MOTIONS, height=st.floats(-2.0, 2.0))
 def test_shift_along_the_axis(way: str, motion: dict[str, float], height: float) -> None:
@@ -89,6 +91,7 @@ def test_shift_along_the_axis(way: str, motion: dict[str, float], height: float)
     assert_same(lifted, solve(way, scene, UNTIL), {"z": height, "energy": 0.517 * 9.81 * height})
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @given(motion=MOTIONS)
 def test_mirror(way: str, motion: dict[str, float]) -> None:
@@ -100,6 +103,7 @@ def test_mirror(way: str, motion: dict[str, float]) -> None:
     assert_same(reflected, solve(way, scene, UNTIL), factors=signs)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @given(motion=MOTIONS, length=st.floats(0.1, 10), mass=st.floats(0.1, 10), time=st.floats(0.3, 3))
 def test_units(way: str, motion: dict[str, float], length: float, mass: float, time: float) -> None:
@@ -117,6 +121,7 @@ def test_units(way: str, motion: dict[str, float], length: float, mass: float, t
     assert_same(found, solve(way, scene, UNTIL), factors=factors)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @given(motion=MOTIONS)
 def test_one_run_in_two(way: str, motion: dict[str, float]) -> None:
@@ -134,6 +139,7 @@ def test_one_run_in_two(way: str, motion: dict[str, float]) -> None:
     assert_same(rest.isel(time=[-1]), whole.isel(time=[-1]))
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @given(motion=MOTIONS)
 def test_reversal(way: str, motion: dict[str, float]) -> None:
@@ -152,6 +158,7 @@ def test_reversal(way: str, motion: dict[str, float]) -> None:
     assert_same(back.isel(time=[-1]), there.isel(time=[0]), factors=signs)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @given(motion=MOTIONS)
 def test_energy_is_accounted_for(way: str, motion: dict[str, float]) -> None:
@@ -164,6 +171,7 @@ def test_energy_is_accounted_for(way: str, motion: dict[str, float]) -> None:
     assert np.max(np.abs(energy_balance(scene.elements[0].on_wall, of_ball(dataset)))) < bound * kinetic
 
 
+@pytest.mark.drill
 @given(motion=MOTIONS, radius=st.floats(0.005, 0.2), mass=st.floats(1e-3, 1e3), gravity=st.floats(0, 50))
 def test_certificate_of_random_scenes(motion: dict[str, float], radius: float, mass: float, gravity: float) -> None:
     """Whatever the numbers of a scene, the engine builds it, to round-off."""

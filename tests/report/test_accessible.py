@@ -141,6 +141,7 @@ def test_text_differs_from_its_background(unfolded: Visit, scheme: str) -> None:
     faint.evaluate("(style) => style.remove()")
 
 
+@pytest.mark.drill
 def test_nobody_who_asked_for_stillness_sees_motion(seen: Visit) -> None:
     """With reduced motion preferred, nothing scrolls, fades or turns by itself."""
     style = seen.page.add_style_tag(content="h1 { transition: color 2s } .answer { animation: none 3s infinite }")

@@ -25,6 +25,7 @@ CONTACT = MechanismCapability.CONTACT
 OURS = "integrated by proofroll"
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("engine", "words"),
@@ -61,6 +62,7 @@ def test_a_caveat_is_one_clause() -> None:
     assert told
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("engine", "need", "words"),

@@ -81,6 +81,7 @@ def test_the_true_ball_turns_as_its_spin_says(rolling: Any) -> None:
     assert np.linalg.norm(spin(body, 0.0)) * EVERY > np.pi, "the samples alone would not show which way it turns"
 
 
+@pytest.mark.drill
 def test_an_engine_keeps_its_own_orientation(rolling: Any) -> None:
     """At its samples an engine's orientation is its own, in between its spin carries it; without one it has none."""
     body, data = rolling

@@ -32,6 +32,7 @@ def arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "robot/arm.xml"
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.nightly_of("run", "recommend", "ladder", "report")
 @pytest.mark.drill_of("compare", "check")
@@ -71,6 +72,7 @@ def test_a_root_that_is_none(proofroll: Proofroll, arm: str) -> None:
         assert says in err
 
 
+@pytest.mark.drill
 def test_the_option_is_the_same_everywhere() -> None:
     """Each command that takes parameters or a controller of a scene takes a root, in the same words."""
     taken = {

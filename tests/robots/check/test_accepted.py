@@ -25,6 +25,7 @@ def damped(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.drill
 def test_accepted_causes(proofroll: Proofroll, damped: Path) -> None:
     """A difference exits 0 if all of its causes are accepted, and 1 if one is not; the causes are told all the same."""
     asked = ("check", str(damped), "--engine", "pinocchio", "--states", "2")

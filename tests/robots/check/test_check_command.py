@@ -22,6 +22,7 @@ Proofroll = Callable[..., tuple[int, str, str]]
 Install = Callable[[Mapping[str, str]], None]
 
 
+@pytest.mark.drill
 def test_json(proofroll: Proofroll, arm: Path) -> None:
     """The JSON has the file, its kind and findings, and for every engine version, layers and causes."""
     names = ("mujoco", "pinocchio", "exudyn")
@@ -144,6 +145,7 @@ def test_bad_readers(proofroll: Proofroll, install_readers: Install, arm: Path) 
     assert good["status"] == "holds"
 
 
+@pytest.mark.drill
 def test_a_reader_that_hangs(proofroll: Proofroll, install_readers: Install, arm: Path) -> None:
     """An importer that never answers is a row after the time limit."""
     install_readers({"bad": "Hanging"})

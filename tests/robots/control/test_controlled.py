@@ -163,6 +163,7 @@ def test_another_policy_is_another_scene(written: Any, tmp_path: Path) -> None:
     assert commands.values(0.0, start).tolist() == pytest.approx([0.65, 0.35, -0.05])
 
 
+@pytest.mark.drill
 def test_a_package_announces_a_policy(written: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A policy that an installed package announces is called by its name, and acts as that of its module."""
     info = tmp_path / "site" / "striders-1.0.dist-info"

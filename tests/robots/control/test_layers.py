@@ -26,6 +26,7 @@ ROBOT = legged()
 LAW = law_of(ROBOT)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.drill_of("-rk4", "single-rk4")
 @pytest.mark.parametrize("scheme", ["explicit", "implicit", "rk4"])
@@ -100,6 +101,7 @@ def test_implicit_damping_and_an_armature_are_named_together() -> None:
     assert not clamped.reason
 
 
+@pytest.mark.drill
 def test_efforts_that_hold_between_instants() -> None:
     """A record whose efforts hold between instants holds in every layer, and breaks at the effort otherwise."""
     held = LAW.change(hold_effort=True)
@@ -144,6 +146,7 @@ def files(tmp_path: Path) -> tuple[str, str, str]:
     return str(record), str(robot), str(control)
 
 
+@pytest.mark.drill
 def test_the_command(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
     """A right record exits 0, a wrong one 1 with the mistake; what the record lacks is said."""
     record, robot, control = files
@@ -164,6 +167,7 @@ def test_the_command(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
     assert effort["causes"][0]["size"] == pytest.approx(0.5, rel=1e-6)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -196,6 +200,7 @@ def test_robot_and_control_belong_together(proofroll: Proofroll, files: tuple[st
         assert said in err
 
 
+@pytest.mark.drill
 def test_a_step_that_is_too_long_comes_first(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
     """The step that explicit servos need is the first line where the rows are farther apart, and else no line."""
     record, robot, control = files
@@ -205,6 +210,7 @@ def test_a_step_that_is_too_long_comes_first(proofroll: Proofroll, files: tuple[
         assert out.replace("\n", "").startswith(start)
 
 
+@pytest.mark.drill
 def test_on_the_ground_accelerations_are_left_out() -> None:
     """A record on the ground is judged but for its accelerations, and says why."""
     layers = record_layers(recorded(ROBOT, LAW, LAW, count=30), LAW, ROBOT, grounded=True)

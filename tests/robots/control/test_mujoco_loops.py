@@ -70,6 +70,7 @@ def loop(
     return judge_record(path / "run.npz", file, None, layout="playground")
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.drill_of("float64-EULER")
 @pytest.mark.parametrize("integrator", INTEGRATORS)
@@ -94,6 +95,7 @@ PLANTED: dict[str, tuple[dict[str, float], list[str]]] = {
 }
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.drill_of("EULER-a heavier link and a constant torque", "IMPLICITFAST-more damping and a spring")
 @pytest.mark.nightly_of(

@@ -118,6 +118,7 @@ def test_a_controller_and_a_ref_do_not_meet(proofroll: Proofroll, record: Callab
     assert "hip has ref = 0.17453 in the robot's file: qpos counts from there" in err
 
 
+@pytest.mark.drill
 def test_a_probe_of_an_mjcf(proofroll: Proofroll, record: Callable[..., list[str]]) -> None:
     """An MJCF moves by known efforts alone: its servo and its integrator count for nothing, and its stops are far."""
     code, out, err = proofroll(*record("leg.xml", "mujoco"))

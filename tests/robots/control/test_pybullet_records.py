@@ -50,8 +50,9 @@ def arrays(name: str, folder: Path) -> Path:
     return folder / f"{name}.npz"
 
 
+@pytest.mark.drill
 @pytest.mark.drill_of("air", "stop")
-@pytest.mark.nightly_of("defaults", "servos", "honest", "stop")
+@pytest.mark.nightly_of("defaults", "servos", "honest", "stop", "air")
 @pytest.mark.parametrize("name", NAMED)
 def test_columns_are_explained(name: str) -> None:
     """Columns under our names: each setting that PyBullet's user left is named, and nothing besides."""

@@ -77,6 +77,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.drill_of("many links", "many elements")
 @pytest.mark.parametrize("name", HOSTILE)

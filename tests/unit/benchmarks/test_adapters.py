@@ -14,6 +14,7 @@ from proofroll_benchmarks.adapters import GOAL, AdapterRow, bench_adapters, cont
 from proofroll_benchmarks.bare import Bare
 
 
+@pytest.mark.drill
 def test_a_third_party_engine_without_a_bare_loop(
     install_engines: Callable[[Mapping[str, str]], None],
 ) -> None:
@@ -36,6 +37,7 @@ def test_an_engine_that_cannot_be_loaded(install_engines: Callable[[Mapping[str,
     assert "no_such_module" in row.message
 
 
+@pytest.mark.drill
 def test_a_preset_that_no_formulation_has(install_engines: Callable[[Mapping[str, str]], None]) -> None:
     """It is said, and nothing else is measured in its place."""
     install_engines({"tiny": "tiny:Tiny"})

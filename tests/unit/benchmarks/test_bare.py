@@ -99,6 +99,7 @@ def test_bare_mechanisms_end_where_the_adapters_do(engine: str, formulation: str
     assert np.linalg.norm(bare.run(np.array([0.0, 0.02, 0.04])) - after.p_WB) <= bare.tolerance
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("scene", CONTACTS)
 def test_bare_loops_of_bodies_that_touch(scene: str) -> None:

@@ -85,6 +85,7 @@ def test_random_balls_against_the_other_route(monkeypatch: pytest.MonkeyPatch) -
         assert time == pytest.approx(np.nan if expected is None else expected, abs=1e-10, nan_ok=True)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("distance", [1e-6, 1e-9])  # the truth has its crests to some 1e-10
 @pytest.mark.parametrize("f", [0.0, 3e-4, 5e-4])

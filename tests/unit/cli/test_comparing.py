@@ -31,7 +31,7 @@ def test_each_engine_is_started_once(
     assert sorted(started_workers) == ["reduced", "truth"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_engines_that_are_not_asked_for_are_not_started(
     tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], started_workers: list[str]

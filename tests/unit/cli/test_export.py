@@ -17,6 +17,7 @@ from proofroll.files.scene_file import scene_text
 Proofroll = Callable[..., tuple[int, str, str]]
 
 
+@pytest.mark.drill
 def test_a_mechanism_with_other_numbers(proofroll: Proofroll, tmp_path: Path) -> None:
     """The file has the parameters that were set, and the scene's start as its keyframe, from which MuJoCo goes on."""
     file = tmp_path / "long.xml"

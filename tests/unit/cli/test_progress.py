@@ -50,6 +50,7 @@ with spinner("pendulum"):
 """
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("no_color", [False, True])
 def test_no_color_moves_nothing(no_color: bool) -> None:
@@ -74,6 +75,7 @@ print(moves)
 """
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(("more", "moves"), [([], True), (["json"], False)])
 def test_rows_grow_on_a_terminal_alone(more: list[str], moves: bool) -> None:

@@ -48,6 +48,7 @@ def curves_of(page: Path) -> list[str]:
     return [re.sub("<[^>]*>", "", title) for title in re.findall("<figcaption>(.*?)</figcaption>", html)]
 
 
+@pytest.mark.drill
 def test_a_page_has_the_curves_that_are_furthest_off(proofroll: Proofroll, tmp_path: Path) -> None:
     """A page has the motion and four curves beside the truth's, one of each unit first, in less than 1.5 MB."""
     run, page = tmp_path / "run.nc", tmp_path / "run.html"
@@ -76,6 +77,7 @@ def test_json_says_what_was_written(proofroll: Proofroll, tmp_path: Path) -> Non
     assert picture.is_file()
 
 
+@pytest.mark.drill
 def test_bad_files(proofroll: Proofroll, tmp_path: Path) -> None:
     """No file, no run in it, or an ending that no picture has: one line, exit code 2, and nothing is written."""
     for name in ("text.nc", "text.npz"):
@@ -105,6 +107,7 @@ def test_no_other_file_is_written_over(proofroll: Proofroll, tmp_path: Path) -> 
     assert "end the name of the file in .nc, .csv or .npz" in err
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("words", "shown"),
@@ -147,6 +150,7 @@ def test_elements_in_motion(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "no poses of bodies (p_WB) of mechanism" in err
 
 
+@pytest.mark.drill
 def test_what_cannot_be_replayed(proofroll: Proofroll, tmp_path: Path) -> None:
     """A file that is no page, a run of no scene, and a scene that has changed since: one line, exit code 2."""
     run = tmp_path / "run.nc"

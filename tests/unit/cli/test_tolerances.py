@@ -37,6 +37,7 @@ def test_judge_takes_a_tolerance_without_a_name(proofroll: Proofroll, table: Pat
     assert proofroll("judge", str(table), "pendulum", *options)[0] == code
 
 
+@pytest.mark.drill
 def test_a_comparison_of_a_scene_is_judged_by_it() -> None:
     """The bands of a default comparison bound what the tolerance bounds, and say why; a file keeps its own."""
     workers = Workers()
@@ -49,6 +50,7 @@ def test_a_comparison_of_a_scene_is_judged_by_it() -> None:
         comparison_named("stick_slip", {}, workers, None, tolerance=["1 mm"])
 
 
+@pytest.mark.drill
 def test_a_line_that_judge_proposes_asks_the_same_question(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ PLANTED: dict[str, tuple[tuple[str, str], Callable[[Mechanism], Mapping[str, obj
 }
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize("law", [*contrasts()])
 @pytest.mark.parametrize("dropped", [True, False])

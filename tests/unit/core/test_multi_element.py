@@ -33,6 +33,7 @@ def balls() -> Scene:
     return dataclasses.replace(scene, elements=(one, second))
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize("engine", ["projection", "reduced", "exudyn", "pinocchio"])
 def test_each_element_moves_as_it_does_alone(balls: Scene, engine: str) -> None:
@@ -53,6 +54,7 @@ def mixed(balls: Scene) -> Scene:
     return dataclasses.replace(balls, elements=(balls.elements[0], pendulum))
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     "engine",

@@ -68,6 +68,7 @@ def test_read_only_at_any_depth() -> None:
     assert not any(array.flags.writeable for array in inside)
 
 
+@pytest.mark.drill
 def test_truths_are_read_only() -> None:
     """No variable of a truth can be written; a deep copy can."""
     found = truth(load_scene("inclined_plane"), np.linspace(0, 0.1, 3))

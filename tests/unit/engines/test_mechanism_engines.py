@@ -165,6 +165,7 @@ BOUNDS = [
 ]
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize(("formulation", "name", "until", "options", "position", "reaction"), BOUNDS)
 def test_errors_stay_below_what_is_declared(formulation, name, until, options, position, reaction):

@@ -80,6 +80,7 @@ def test_reactions_are_the_truths(engine: str) -> None:
     assert error(CYLINDER, engine, "F3", **ROLLING) < 0.01
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.drill_of(
     "formulation=geoms,preset=tuned-parameters1-0.0002", "formulation=geoms,preset=tuned-parameters2-0.0002"
@@ -97,6 +98,7 @@ def test_other_motions_in_the_cylinder(engine: str, parameters: dict[str, float]
     assert error(CYLINDER, engine, "z", **parameters) < bound
 
 
+@pytest.mark.drill
 def test_default_contact_is_wrong_at_every_step() -> None:
     """With MuJoCo's default contact the ball on joints is off by centimetres at every step."""
     for dt in (2e-3, 5e-4):

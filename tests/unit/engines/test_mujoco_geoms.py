@@ -309,6 +309,7 @@ def test_the_armature_of_damping_needs_euler_and_joints():
             )
 
 
+@pytest.mark.drill
 def test_what_sticks_is_not_lifted_by_the_correction_of_the_cone():
     """A ball that rolls on a turning table presses with its weight: no friction is missed, and none is corrected."""
     scene = load_scene("free_turntable")

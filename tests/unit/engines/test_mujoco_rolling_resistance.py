@@ -24,6 +24,7 @@ def run(name: str, engine: str, until: float, every: float, **parameters: Any) -
     return motion["p_WB"].values[:, 0], motion["v_WB"].values[:, 0]
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("engine", GEOMS)
 def test_a_ball_stops_where_its_resistance_stops_it_and_rests(engine: str) -> None:
@@ -36,6 +37,7 @@ def test_a_ball_stops_where_its_resistance_stops_it_and_rests(engine: str) -> No
     assert np.abs(p[9:] - p[-1]).max() < 1e-9
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("engine", GEOMS)
 def test_a_ball_rolls_down_by_what_resistance_leaves(engine: str) -> None:
@@ -48,6 +50,7 @@ def test_a_ball_rolls_down_by_what_resistance_leaves(engine: str) -> None:
     assert np.abs(v[1:]).max() < 1e-7  # it creeps, as its contact is soft
 
 
+@pytest.mark.drill
 def test_what_slips_is_resisted_too() -> None:
     """A ball that slides and begins to turn has the moment while it slips, as its truth has."""
     parameters = {"rolling_resistance": 2e-3}

@@ -62,6 +62,7 @@ def test_pgs_is_refused_where_it_returns_wrong_impulses() -> None:
     run.advance(0.33)
 
 
+@pytest.mark.drill
 def test_a_solver_that_gives_up_ends_the_run() -> None:
     """A solver that does not find the impulses ends the run, and its time is said."""
     run = PINOCCHIO.build(load_scene("free_turntable"), replace(PRESETS["matched"], solver="pgs"))
@@ -116,6 +117,7 @@ def test_an_impulse_of_a_stop_is_no_friction() -> None:
     assert run.sample().stop[0] == 0.0
 
 
+@pytest.mark.drill
 def test_a_fast_ball_on_a_curved_wall_keeps_its_rolling_resistance():
     """Where the wall turns away faster than gravity pulls, a step's approach is no impact, which has no such moment."""
     scene = load_scene("sphere_in_cylinder", speed=8.0, rolling_resistance=5e-4)

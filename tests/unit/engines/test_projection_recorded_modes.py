@@ -56,6 +56,7 @@ def test_a_program_has_the_motion_of_numpy(scene: str, parameters: dict[str, Any
         assert point.gap == pytest.approx(other.gap, abs=1e-14)
 
 
+@pytest.mark.drill
 def test_a_slip_without_a_direction_of_its_own_is_left_to_numpy() -> None:
     """A program says nothing of a slip that counts as rest, nor of one against its direction at the step's start."""
     motion = motion_of("sphere_in_cylinder", SLIPPERY, 0.1)

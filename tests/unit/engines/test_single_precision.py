@@ -69,6 +69,7 @@ def test_another_precision_is_one_line() -> None:
         precision_of(SimpleNamespace(precision="half"))
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.drill_of("double_pendulum")
 @pytest.mark.parametrize("name", SCENES)
@@ -84,6 +85,7 @@ def test_errors_stay_errors(name: str) -> None:
     assert errors["single"] > 10 * errors["double"]
 
 
+@pytest.mark.drill
 def test_a_declared_precision_is_no_cause() -> None:
     """A run in float32 has that as a cause of its difference only where nobody said so."""
     scene, times = load_scene("double_pendulum"), np.linspace(0, 0.5, 51)

@@ -80,6 +80,7 @@ def test_a_slip_is_located_within_two_steps(moving: Callable[[], tuple[Scene, tu
     assert max(event.time_high - event.time_low for event in events) <= 2 * STEP * (1 + 1e-9)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_slip_between_two_samples_is_seen(engine: str) -> None:

@@ -50,6 +50,7 @@ def _evaluated(folder: Path, tables: dict[str, Any], name: str, relation: Relati
     return evaluated
 
 
+@pytest.mark.drill
 @pytest.mark.nightly_of("renamed", "reordered")
 @pytest.mark.drill_of("other samples", "turned", "welded")
 @pytest.mark.parametrize("name", _RELATIONS)
@@ -75,6 +76,7 @@ def test_another_motion_is_a_breach(name: str, tmp_path: Path) -> None:
     assert surprise.size > 0
 
 
+@pytest.mark.drill
 def test_a_refused_relative_is_a_breach(tmp_path: Path) -> None:
     """A changed scene that the reader refuses is told with its sentence."""
     relation = Relation(lambda tables, _: tables["bodies"][0].update(mass=-1.0), lambda *_: {})

@@ -70,6 +70,7 @@ def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: 
     assert wheels.is_dir()
 
 
+@pytest.mark.drill
 def test_a_version_that_is_too_old_is_not_installed(
     wheels: Path, install_engines: Callable[[dict[str, str]], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -84,6 +85,7 @@ def test_a_version_that_is_too_old_is_not_installed(
         make_environment.add("grown", ["numpy==1.26.4", "grown==2.5"])
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("requirements", "options", "says"),

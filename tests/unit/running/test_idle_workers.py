@@ -59,6 +59,7 @@ def test_a_worker_with_which_something_went_wrong_is_ended() -> None:
     assert worker._process.poll() is not None
 
 
+@pytest.mark.drill
 def test_idle_workers_are_bounded_and_end_with_their_owner() -> None:
     """Of many idle workers the oldest are ended, and all are when nobody holds them any more."""
     workers = Workers()

@@ -162,6 +162,7 @@ def test_what_is_left_is_read_between_two_changes() -> None:
     assert found
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.drill), 2])
 def test_cases_beyond_the_budget_are_left_out(
     tmp_path: Path, make_case: Callable[..., Case], install_engines: Callable[[Mapping[str, str]], None], jobs: int

@@ -67,6 +67,7 @@ BETWEEN: list[tuple[str, str, Change]] = [
 ]
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("scene", HONEST)
 def test_an_honest_run_agrees(scene: str) -> None:
@@ -76,6 +77,7 @@ def test_an_honest_run_agrees(scene: str) -> None:
     assert found.agrees, found
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(("scene", "name", "change"), BETWEEN, ids=[f"{scene}-{name}" for scene, name, _ in BETWEEN])
 def test_what_is_wrong_between_the_samples_differs(scene: str, name: str, change: Change) -> None:
@@ -94,6 +96,7 @@ STATES: dict[str, Change] = {
 }
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", STATES)
 def test_states_of_mechanisms_are_judged(name: str) -> None:
@@ -107,6 +110,7 @@ def test_states_of_mechanisms_are_judged(name: str) -> None:
     assert [item.judgement.observable for item in found.compared if not item.agrees] == [name]
 
 
+@pytest.mark.drill
 def test_a_first_look_judges_the_orientation_that_a_scene_asks_for() -> None:
     """Quaternions of a ball that are frozen between samples agree nowhere, and are judged where they were asked for."""
     scene = load_scene("sphere_in_cylinder", asks=("orientation",))

@@ -41,6 +41,7 @@ CASES = [
 CLOSED = [case for case in FROZEN if case["scene"] in FORMS and FORMS[case["scene"]][1](case["parameters"])]
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.drill_of("sphere_in_cylinder rolling_resistance")
 @pytest.mark.parametrize("case", CASES)

@@ -72,6 +72,7 @@ def test_the_bracket_of_the_time_of_rest_holds_it(
     assert found.time_high - found.time_low < 1e-7 * rests
 
 
+@pytest.mark.drill
 def test_a_ball_that_does_not_bounce_leaves_its_only_impact_as_one_that_does() -> None:
     """With e = 0 the contact point goes on with -e_t u, slips, and is braked."""
     scene = load_scene(

@@ -252,6 +252,7 @@ def test_a_mechanism_at_one_place_has_a_length_that_follows_it(scene: str, point
     assert other.length == pytest.approx(100.0 * one.length)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("height", [1e-3, 1e-12])

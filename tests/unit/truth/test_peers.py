@@ -39,6 +39,7 @@ MOTIONS = {entry["scene"] + str(entry.get("parameters", "")): entry for entry in
 LONG = {"sled", "sled_on_slope", "eccentric_sphere", "tilted_disc", "rattleback"}
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.nightly_of("rattleback")
 @pytest.mark.parametrize(

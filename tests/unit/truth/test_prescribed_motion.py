@@ -135,6 +135,7 @@ def on_a_moved_plate(kind: str, axis: tuple[float, float, float], motion: str) -
     return Mechanism(bodies, joints, geometries=shapes, pairs=(Pair("p", ("skin", "floor"), friction=0.4),))
 
 
+@pytest.mark.drill
 def test_a_ball_follows_a_plate_that_shakes_until_it_would_pull() -> None:
     """A ball on a plate at A (1 − cos ωt) presses with m (g + A ω² cos ωt), and leaves where that is zero."""
     size, pace = 0.02, 30.0

@@ -35,6 +35,7 @@ AGREED = {
 }
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", AGREED)
 def test_tracked_point_is_where_independent_programs_agree(scene, name):
@@ -70,6 +71,7 @@ SHORT = {
 }
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.drill_of("bricard", "chain")
 @pytest.mark.parametrize("name", SHORT)
@@ -89,6 +91,7 @@ def test_both_routes_agree(scene, name):
     assert np.abs(energy - placed(mechanism, two).energy()).max() < 1e-11 * max(1.0, np.abs(energy).max())
 
 
+@pytest.mark.drill
 def test_maximal_coordinates_without_taylor_series(scene):
     """DOP853 with projection of the same rows gives the same motion, redundant rows included."""
     mechanism = scene("bricard")
@@ -99,6 +102,7 @@ def test_maximal_coordinates_without_taylor_series(scene):
     assert two.residual.max() < 1e-13
 
 
+@pytest.mark.drill
 def test_routes_agree_on_every_kind_of_joint():
     """A tree with planar, universal, prismatic, spherical, free and fixed joints moves alike by both routes."""
     mechanism = replace(mechanism_examples.every_kind(), loops=())
@@ -225,6 +229,7 @@ def test_both_routes_start_where_a_joints_definition_says(kind, in_plane, data):
         assert max(np.abs(record.v_WB[0] - rates).max(), np.abs(record.w_WB[0] - spins).max()) < 1e-8
 
 
+@pytest.mark.drill
 def test_springs_and_dampers_along_joints_act_alike():
     """Springs, dampers and drives along all kinds of coordinates that may have them, in both routes."""
     body = {"mass": 1.0, "com": (0.1, 0.2, -0.3), "inertia": (0.1, 0.2, 0.25)}
@@ -245,6 +250,7 @@ def test_springs_and_dampers_along_joints_act_alike():
     assert energy[1] < energy[0]
 
 
+@pytest.mark.drill
 def test_energy_counts_the_springs_of_universal_joints():
     """What moves without a damper keeps its energy, that of both springs of a universal joint included."""
     body = Body("a", 1.0, (0.1, 0.2, -0.3), (0.1, 0.2, 0.25))
@@ -264,6 +270,7 @@ def test_series_are_in_long_doubles(scene):
     assert 0 < np.abs(states - states.astype(float)).max() < 1e-14
 
 
+@pytest.mark.drill
 def test_steps_of_many_bodies_do_not_chase_round_off(scene, monkeypatch):
     """Twenty links take some thousand evaluations, though the tolerance lies below the noise of their accelerations."""
     evaluations = count(1)

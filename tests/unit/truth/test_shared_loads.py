@@ -68,6 +68,7 @@ def test_a_light_body_on_a_heavy_one_slides_until_both_move_alike() -> None:
     assert found.record.p_WB[1, 1, 0] == pytest.approx(mu * g * sticks**2 / 2 + common * (0.4 - sticks), abs=1e-9)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("lean", "bend", "holds"),
     [(0.02, 1.8, (0.52, 2.85)), pytest.param(0.5, -0.88, (1.51, 2.94), marks=pytest.mark.drill)],
@@ -93,6 +94,7 @@ def test_a_leg_that_rubs_in_its_joints_rests_on_its_tip(lean: float, bend: float
     assert np.isnan(found.record.named).all()
 
 
+@pytest.mark.drill
 @pytest.mark.nightly_of("100000000.0")
 @pytest.mark.parametrize("ratio", [1e6, pytest.param(1e8, marks=pytest.mark.drill)])
 def test_a_box_rests_on_one_that_is_far_lighter(ratio: float) -> None:

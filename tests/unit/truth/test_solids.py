@@ -94,6 +94,7 @@ def top(kind: Any) -> Geometry:
     return Geometry("solid", "world", kind, position=turned((0, 0, -0.5)), **TOP[kind])  # type: ignore[arg-type]
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.drill_of("0.0-cylinder", "inf-box")
 @pytest.mark.parametrize("kind", TOP)
@@ -127,6 +128,7 @@ def test_a_ball_on_a_face_moves_as_on_a_plane() -> None:
         np.testing.assert_allclose(getattr(box, name), getattr(flat, name), rtol=0, atol=1e-13)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("aside", [(0.06, 0.0), (0.05, 0.07)])
 def test_a_ball_that_drops_on_an_edge_or_corner_rebounds_along_the_line_to_it(aside: tuple[float, float]) -> None:
     """Its centre aside of an edge, or of a corner, sets the normal of the impact: v' = v - (1 + e)(v·n)n."""
@@ -196,6 +198,7 @@ def test_a_capsule_without_length_is_a_ball() -> None:
     np.testing.assert_allclose(one.record.w_WB, two.record.w_WB, rtol=0, atol=1e-12)
 
 
+@pytest.mark.drill
 def test_capsules_that_come_to_lie_along_each_other_end_the_truth_with_the_reason() -> None:
     """A rod that lands parallel on another one has no one point of contact."""
     shapes = (
@@ -210,6 +213,7 @@ def test_capsules_that_come_to_lie_along_each_other_end_the_truth_with_the_reaso
     assert "the capsules of touch touch along a line at t = 0.428" in truth_of(mechanism, np.array([0.0, 1.0])).ended
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("size", "below", "closed"),
     [

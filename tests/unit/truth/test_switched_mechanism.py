@@ -65,6 +65,7 @@ def test_a_hinge_that_rubs_turns_seven_times_and_rests() -> None:
     assert found.record.q[1:, 0] == pytest.approx([*true["turns"], true["values"]["q.pivot"]], abs=1e-12)
 
 
+@pytest.mark.drill
 def test_an_impact_that_presses_two_stops_has_no_unique_outcome() -> None:
     """A block that rebounds from the end of a box and pushes it against its own stop leaves more than one motion."""
     joints = (
@@ -130,6 +131,7 @@ def test_rebounds_on_a_guide_that_rubs_come_to_rest_too() -> None:
     assert found.record.q[-1, 0] == 0.0
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.drill_of("0.7-0.1-6")
 @pytest.mark.arithmetic
@@ -146,6 +148,7 @@ def test_which_rebound_is_the_last_hangs_on_no_digit(restitution: float, impacts
     assert [event.kind for event in found.events] == ["impact"] * impacts + ["settle"]
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(("height", "restitution"), [(0.0, 1.0), (1e-9, 0.5)])
 def test_what_lies_on_a_stop_or_nearly_so_comes_to_rest(height: float, restitution: float) -> None:
     """Rebounds that are round-off do not go on for ever, and nothing is dropped on the stop that it lies on."""
@@ -230,6 +233,7 @@ def test_two_joints_that_feel_each_other_stick_and_slip_alike_in_both_routes() -
     assert found.bars["q"][-1] < 1e-9
 
 
+@pytest.mark.drill
 def test_a_stop_that_is_never_reached_changes_nothing() -> None:
     """A pendulum between stops that it does not reach has the truth of one without."""
     free = mechanism_named("pendulum", angle=0.5)
@@ -260,6 +264,7 @@ def test_bad_laws_are_one_line(more: dict[str, object], said: str) -> None:
     assert said in str(raised.value)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("ratio", [-0.7, 1.3])
@@ -410,6 +415,7 @@ def test_a_joint_that_grazes_its_stop_is_ill_posed(inside: float, restitution: f
     assert found.events == ()
 
 
+@pytest.mark.drill
 @pytest.mark.drill_of("-1e-06-0")
 @pytest.mark.parametrize(("inside", "impacts"), [(1e-6, 1), (-1e-6, 0)])
 def test_a_joint_that_passes_or_misses_its_stop_for_certain_is_well_posed(inside: float, impacts: int) -> None:

@@ -105,6 +105,7 @@ def wound_up():
     return Mechanism((body,), (joint,), gravity=(0.0, 0.0, -9.81))
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("turns_over", [False, True])
 def test_a_route_that_loses_energy_shows_no_chaos(scene, monkeypatch, turns_over):
     """A truth ends where a route changes the energy, however fast small differences grow, and keeps what is before."""
@@ -268,6 +269,7 @@ def test_routes_on_different_branches_are_no_truth(scene, monkeypatch, size):
     assert found.ended == "the two routes part, as at a singular pose"
 
 
+@pytest.mark.drill
 def test_without_heyoka_the_second_route_is_dop853(scene, monkeypatch):
     """The truth is still known by two routes, and says which."""
     monkeypatch.setattr(maximal_taylor, "heyoka", None)
@@ -276,6 +278,7 @@ def test_without_heyoka_the_second_route_is_dop853(scene, monkeypatch):
     assert truth.bars["q"][-1] < 1e-11
 
 
+@pytest.mark.drill
 def test_indeterminate_reactions_are_not_given(scene):
     """Of planar loops closed by revolutes, only Fx, Fy, Mz carry numbers."""
     pytest.importorskip("heyoka")
@@ -283,7 +286,7 @@ def test_indeterminate_reactions_are_not_given(scene):
     assert (np.isnan(wrench) == [False, False, True, True, True, False]).all()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_heavy_slider_drives_its_crank_through_the_dead_point(scene):
     """At a million times the crank's mass its speed peaks for a short moment, and no route takes that for a stall."""
     heavy = scene("slider_crank", slider_mass=4e5)
@@ -304,6 +307,7 @@ def agreed(mechanism):
     return found
 
 
+@pytest.mark.drill
 def test_bodies_without_inertia_are_carried_by_others(monkeypatch):
     """Massless bodies and point masses on fixed joints: both routes agree on the motion and on every wrench.
 
@@ -347,6 +351,7 @@ IN_PLANE = (
 )
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("joints", "hand", "point", "gravity", "body", "compiled"),
     [
@@ -379,6 +384,7 @@ TURNED = [
 ]
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(("orientation", "axis"), TURNED)
 def test_a_hinge_whose_child_is_turned_has_a_truth(orientation, axis, monkeypatch):
     """A damped rod that is turned against the world at q = 0 moves in a plane: both routes agree on its motion."""
@@ -389,6 +395,7 @@ def test_a_hinge_whose_child_is_turned_has_a_truth(orientation, axis, monkeypatc
     agreed(mechanism)
 
 
+@pytest.mark.drill
 def test_a_body_whose_plane_is_turned_is_held_by_no_row():
     """Rows that hold a planar body in its plane are round-off, however its frames are turned, and count as none."""
     random = np.random.default_rng(0)
@@ -427,6 +434,7 @@ def test_energy_of_a_wound_spring_needs_no_more_samples_than_asked_for(monkeypat
     assert np.ptp(energy.to_numpy()) < energy.attrs["error_bar"] < 1e-9
 
 
+@pytest.mark.drill
 def test_the_bar_of_drift_covers_its_round_off(scene):
     """Joints are never open in truth; what is seen of that, and round-off of places and cosines, is the bar."""
     mechanism = scene("oscillators")
@@ -446,6 +454,7 @@ def test_the_bar_of_energy_knows_the_round_off_of_what_cancels():
     assert 240 * np.finfo(float).eps < found.bars["energy"][0] < 1e-11
 
 
+@pytest.mark.drill
 @pytest.mark.arithmetic
 def test_routes_of_a_spinning_body_agree(scene):
     """Ten seconds about the intermediate axis: attitudes and points within what turning over makes of round-off.

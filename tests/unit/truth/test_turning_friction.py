@@ -56,6 +56,7 @@ def bar(found: Any, field: str) -> float:
     return float(np.max(found[field].attrs["error_bar"]))
 
 
+@pytest.mark.drill
 def test_a_spin_ends_when_its_friction_says() -> None:
     """A ball that spins about the normal slows by f N/J and stands after J ω/(f N)."""
     f, spin = 2e-3, 30.0
@@ -66,6 +67,7 @@ def test_a_spin_ends_when_its_friction_says() -> None:
     assert expected[-1] == 0.0
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(("f", "rolls"), [(0.004, True), (0.02, False)])
 def test_a_ball_on_a_slope_rolls_where_its_resistance_is_less_than_the_pull(f: float, rolls: bool) -> None:
@@ -77,6 +79,7 @@ def test_a_ball_on_a_slope_rolls_where_its_resistance_is_less_than_the_pull(f: f
     assert abs(at(found, "p_WB")[-1, 0] - moved) <= bar(found, "p_WB") <= 1e-11
 
 
+@pytest.mark.drill
 def test_a_ball_that_slips_and_rolls_has_both_laws() -> None:
     """While it slips, its centre slows by μ g, and its back spin by (μ a + f) m g/J."""
     mu, f, speed, spin, time = 0.2, 0.003, 1.0, 60.0, 0.2
@@ -96,6 +99,7 @@ def test_both_routes_agree_on_a_ball_of_unequal_moments() -> None:
     assert np.isfinite(at(found, "p_WB")).all()
 
 
+@pytest.mark.drill
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (-1.9, 0.8, 0.6)])
 def test_an_impact_with_friction_against_turning_happens_once(rpy: tuple[float, float, float]) -> None:
@@ -107,6 +111,7 @@ def test_an_impact_with_friction_against_turning_happens_once(rpy: tuple[float, 
     assert [event.kind for event in found.events] == ["impact"]
 
 
+@pytest.mark.drill
 def test_friction_against_spin_turns_with_the_normal_of_a_bore() -> None:
     """A ball that spins as it slides round a bore keeps the law of the moment against its spin in both routes."""
     bore, out = 0.2, 0.2 - RADIUS
@@ -119,6 +124,7 @@ def test_friction_against_spin_turns_with_the_normal_of_a_bore() -> None:
     assert LAWS in found
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (0.7, -1.1, 2.3)])
@@ -158,6 +164,7 @@ def test_a_coefficient_below_zero_is_refused_by_its_name() -> None:
         law(spinning_friction=-1.0)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.nightly_of("laws3-velocity3-0.06-0.0")
 @pytest.mark.parametrize(
@@ -187,6 +194,7 @@ def test_the_projection_solver_follows_friction_against_turning(
     assert max(item.error for item in moved) < 1e-11  # 1e-13 is seen
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "laws1-velocity1-0.2-exudyn[formulation=spheres]-errors2",
@@ -222,6 +230,7 @@ def test_engines_follow_friction_against_turning(
         assert np.abs(at(run, field) - at(right, field)).max() < error
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "friction", [{"rolling_resistance": 0.01}, {"rolling_resistance": 0.01, "spinning_friction": 0.01}]
@@ -238,6 +247,7 @@ def test_the_projection_solver_holds_what_its_weight_would_turn(friction: dict[s
     np.testing.assert_allclose(at(run, "p_WB")[-1], [0.2, 0.0, RADIUS], atol=1e-13)  # m
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(("engine", "error"), [("projection", 1e-11), ("pinocchio[formulation=impulses]", 1e-2)])
 def test_a_growing_moment_turns_a_ball_once_it_exceeds_its_friction(engine: str, error: float) -> None:
@@ -253,6 +263,7 @@ def test_a_growing_moment_turns_a_ball_once_it_exceeds_its_friction(engine: str,
     np.testing.assert_allclose(at(run, "w_WB")[:, 2], spin, atol=error)  # rad/s; of first order 7e-3
 
 
+@pytest.mark.drill
 def test_the_iteration_around_pinocchios_solver_leaves_no_error_of_its_own() -> None:
     """Along a line the midpoint has no error, and the moments are found closer than the solver finds its impulses."""
     scene = ball(law(rolling_resistance=2e-3), (0.3, 0, 0, 0, 6, 0))
@@ -265,6 +276,7 @@ def test_the_iteration_around_pinocchios_solver_leaves_no_error_of_its_own() -> 
     )  # m; 3e-14 is seen, and 6e-12 a thousand times looser
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -1.1, 2.3)])
 def test_a_free_joint_bears_nothing_once_a_spin_has_stopped(turn: tuple[float, float, float]) -> None:

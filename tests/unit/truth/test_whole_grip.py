@@ -144,6 +144,7 @@ def _grip_of_the_pin(mechanism: Mechanism, moment: float) -> float:
     return -float(minimize_scalar(excess, bounds=(-100, 100), method="bounded", options={"xatol": 1e-12}).fun)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("twist", [2.0, -2.0])
 def test_one_contact_that_shares_its_load_with_joints_holds_while_any_distribution_does(twist: float) -> None:

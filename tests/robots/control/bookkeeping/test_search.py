@@ -41,6 +41,7 @@ def _found(program: str, step: float, **mistake: object) -> MotionSearch:
     return MotionSearch(mechanism, law, SeenMotion(record["time"][::every, 0], q, v), [step])
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("program", [*PROGRAMS, *SERVOS])
 @pytest.mark.parametrize("step", [*(pytest.param(step, marks=pytest.mark.drill) for step in (1e-3, 2e-3)), 5e-3])

@@ -66,6 +66,7 @@ def test_another_loop_has_no_length() -> None:
         Loop("l", "spherical", "world", "b", length=1.0)
 
 
+@pytest.mark.drill
 def test_a_body_on_a_strut_is_a_pendulum() -> None:
     """The centre of mass on a strut moves as a mathematical pendulum, with its tension, while the body tumbles."""
     mechanism, times = hung(), np.linspace(0.0, 1.0, 6)

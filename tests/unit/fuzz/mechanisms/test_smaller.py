@@ -44,6 +44,7 @@ def is_valid(folder: Path, tables: Mapping[str, Any]) -> bool:
     return True
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.drill_of("loop")
 @pytest.mark.parametrize("family", FAMILIES)
@@ -57,6 +58,7 @@ def test_changes_apply_or_are_refused_in_words(family: str, tmp_path: Path) -> N
     assert sum(accepted) > len(accepted) / 2
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(("family", "seed"), [("loop", 0), ("contact", 2), ("contact", 5)])
 def test_rounded_lengths_fit_again(family: str, seed: int, tmp_path: Path) -> None:

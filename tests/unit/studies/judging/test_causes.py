@@ -115,6 +115,7 @@ def test_a_clock_at_another_rate_is_named(rate: float) -> None:
     assert said(one_at(rate * TIMES), TWO) == []
 
 
+@pytest.mark.drill
 def test_a_state_at_half_its_times_is_no_other_gravity() -> None:
     """A whole state whose times are halved has its clock as its cause, where the balance of momentum doubles, too."""
     scene = load_scene("pendulum")
@@ -126,6 +127,7 @@ def test_a_state_at_half_its_times_is_no_other_gravity() -> None:
     assert "gravity" not in str(judged)
 
 
+@pytest.mark.drill
 def test_a_late_record_of_a_motion_that_jumps_is_named() -> None:
     """Its places tell the delay, and no start that was not taken is told beside it."""
     scene = load_scene("two_spheres")
@@ -137,6 +139,7 @@ def test_a_late_record_of_a_motion_that_jumps_is_named() -> None:
     assert only.startswith("the record is late by 0.1 s (")
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("whole", [True, False])
 @pytest.mark.parametrize("clock", [True, False])
@@ -188,6 +191,7 @@ def falling() -> Scene:
     return Scene("fall", "", (MechanismElement(made),))
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("kept", [0.96, 1.0])
 def test_damping_of_a_free_body_is_named(kept: float) -> None:

@@ -176,6 +176,7 @@ def against(formulation: str, **parameters: float) -> str:
     return held.shared(resolve("reduced", {"formulation": formulation})["shares"])
 
 
+@pytest.mark.drill
 def test_who_rests_on_a_route_of_the_truth_is_told() -> None:
     """The least model shares the route that the truth takes in this case, or not, and the other route is named."""
     said = against("equations", rolling_resistance=5e-4)

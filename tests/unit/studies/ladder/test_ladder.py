@@ -43,6 +43,7 @@ def climb(tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]) 
     return run
 
 
+@pytest.mark.drill
 def test_a_model_that_is_right_on_the_grid_alone_is_wrong(
     tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]
 ) -> None:

@@ -75,6 +75,7 @@ def test_a_map(small: Any) -> None:
     assert record(StabilityStudy, json.loads(json.dumps(plain(study), allow_nan=False))) == study
 
 
+@pytest.mark.drill
 def test_no_scene_is_loaded_after_the_runs(small: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """The record of a map is made from the scenes that were run."""
 
@@ -443,6 +444,7 @@ def test_broken_files(tmp_path: Path, old: str, new: str, words: str) -> None:
         file_for(str(path))
 
 
+@pytest.mark.drill
 def test_a_scene_without_a_file(tmp_path: Path) -> None:
     """A scene for which nobody wrote axes has its own parameters, in parts of their defaults that its bounds allow."""
     folder = tmp_path / "my_scene"
@@ -453,6 +455,7 @@ def test_a_scene_without_a_file(tmp_path: Path) -> None:
     assert all(scene.parameters[axis.name] and 1.0 in axis.values for axis in axes[:-1])
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "inclined_plane"])
 def test_our_files_can_be_read(scene: str) -> None:

@@ -33,6 +33,7 @@ def test_four_bar_passes_when_its_links_are_in_line(scene):
     assert singular_poses(mechanism, 1.5, 5e-3) == pytest.approx(expected, abs=1e-3)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["slider_crank", "bricard"])
 def test_regular_motion_passes_none(scene, name):
@@ -147,6 +148,7 @@ def test_a_truth_that_ends_before_all_times_is_refused_for_the_reason_of_its_end
         truth_of(mechanism, np.array([0.5]))
 
 
+@pytest.mark.drill
 def test_a_loop_that_holds_nothing_has_no_rank_in_a_turned_frame():
     """Rows of a planar loop between bodies that move in one plane are round-off there, and no singular pose is near."""
     turned = (0.381, 1.0, -1.03)
@@ -172,6 +174,7 @@ def test_a_tree_has_none(scene):
     assert singular_poses(scene("chain"), 1.0, 5e-3) == []
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
@@ -190,6 +193,7 @@ def test_a_motion_ends_at_what_lengths_cannot_tell_from_a_singular_pose(scene, p
         by_joints(scene("slider_crank", crank=0.4 * (1 - part), speed=3.0), np.array([0.0, 0.5]), 1e-10)
 
 
+@pytest.mark.drill
 def test_a_motion_beside_a_singular_pose_goes_on(scene):
     """A length that a file tells from the singular one leads past it."""
     by_joints(scene("slider_crank", crank=0.4 * (1 - 1e-7), speed=3.0), np.array([0.0, 0.5]), 1e-10)

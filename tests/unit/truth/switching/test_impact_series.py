@@ -97,7 +97,7 @@ def test_a_cube_that_falls_on_an_edge_rocks_to_its_rest() -> None:
 CORNER = (0.9838313410528056, 0.0987123949919223, 0.14869156426260063, -0.014918919342160731)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_two_smooth_corners_that_hit_in_turn_close_and_the_box_goes_on_an_edge() -> None:
     """Their impacts accumulate before the other edge lands: then the box lies flat, and slides without slowing."""
     found = truth_of(dropped("free", (0, 0, 0.4, *CORNER), 0.0), np.array([0.0, 0.2, 0.5]))

@@ -200,6 +200,7 @@ def test_a_slip_that_turns_fast_is_followed_from_its_first_instant() -> None:
     assert found.record.v[-1, :2] == pytest.approx(right, abs=1e-6)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "until",
@@ -261,6 +262,7 @@ def test_friction_opposes_a_slip_until_its_last_instant() -> None:
     assert found.bars["pressed"][-1] < 1e-5
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("way", [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)])
 def test_a_ball_of_unequal_moments_slides_along_an_axis_until_it_rolls(way: tuple[float, float]) -> None:
@@ -298,6 +300,7 @@ def test_a_slip_begins_in_one_go_where_its_pull_turns_with_the_square_of_time() 
     assert np.arctan2(way[1], way[0]) == pytest.approx(turning * until**2 / 2, abs=2 * behind)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("excess", [1e-2, 1e-6])
 def test_a_slip_from_rest_may_begin_as_slowly_as_it_likes(excess: float) -> None:
     """A push just above the grip of a ball that hardly turns moves it at once, while another ball falls beside it."""

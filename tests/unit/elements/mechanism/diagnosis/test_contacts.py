@@ -40,6 +40,7 @@ def said(
     return [cause.says for cause in diagnose(Evidence(element, [], run, true, STEPS[preset]), hypotheses_of(element))]
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("preset", "words"),
@@ -70,6 +71,7 @@ def test_engines_with_coulombs_law_are_accused_of_nothing(engine: str, formulati
     assert said(engine, formulation, preset) == []
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 def test_creep_of_a_regularised_law_is_named_with_its_speed() -> None:
     """A sled on a slope creeps in Exudyn by its regularised friction, the cause of no force beside a right path."""
@@ -117,6 +119,7 @@ size = [0.1, 0.1, 0.1]
 """
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("corrects", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_a_convex_cone_is_named_from_rest_with_a_remedy_that_holds(tmp_path: Path, corrects: bool) -> None:

@@ -137,6 +137,7 @@ def test_a_negative_factor_along_a_run_is_a_wrong_sign_alone(
     assert any(words in each for each in said) is named, said
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("factor", "tolerance", "named"), [(0.5, 1e-5, True), (0.9, 1e-5, True), (1.0, 1e-5, False), (1.0, 3e-2, True)]
@@ -151,6 +152,7 @@ def test_first_steps_of_the_scene_contradict_a_cause_of_the_run(factor: float, t
     assert any("friction of the joint elbow halved" in each for each in said) is named, said
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("foot", "factor", "words"),

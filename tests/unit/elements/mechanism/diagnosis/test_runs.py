@@ -95,6 +95,7 @@ def test_a_stop_is_not_accused_where_a_step_reaches_beyond_it(e: float, until: f
         assert any("not at its stop" in cause.says for cause in causes) == told
 
 
+@pytest.mark.drill
 def test_a_stop_at_zero_that_is_never_left_can_be_misplaced() -> None:
     """A joint that rests on its stop at 0 from the start, where nothing has a size, is told to rest below it."""
     scene = _resting_on(0.0)
@@ -144,6 +145,7 @@ def _numbers(what: str, change: float) -> tuple[Scene, xr.Dataset]:
     return scene, truth(scene, np.arange(0, 0.3, 0.015))
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.drill_of("stop-stops-0.003-False")
 @pytest.mark.parametrize(("change", "accuses"), [(3e-3, False), (3e-2, True)])
@@ -163,6 +165,7 @@ def _accuses(name: str, scene: Scene, true: xr.Dataset, run: xr.Dataset) -> bool
     return cause.accuses
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(("soft", "accuses"), [(0.0, True), (1e-4, False)])
 def test_a_ratio_that_is_exact_in_every_sample_is_no_error_of_a_method(soft: float, accuses: bool) -> None:
@@ -173,6 +176,7 @@ def test_a_ratio_that_is_exact_in_every_sample_is_no_error_of_a_method(soft: flo
     assert _accuses("couplings", scene, true, run) == accuses
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(("at", "e", "named"), [(-0.05, 0.5, True), (-0.05, 0.45, False), (-0.01, 0.5, False)])
 def test_one_rebound_tells_a_stop_by_its_place_and_its_restitution(at: float, e: float, named: bool) -> None:
@@ -201,6 +205,7 @@ def _swung(name: str) -> tuple[Scene, xr.Dataset]:
     return scene, truth(scene, np.arange(0, 0.12, 0.006))
 
 
+@pytest.mark.drill
 def test_round_off_of_a_moment_that_is_zero_has_no_cause() -> None:
     """Moments of 1e-15 N m that an engine gives as zero are not left out."""
     scene, true = _swung("double_pendulum")
@@ -212,6 +217,7 @@ def test_round_off_of_a_moment_that_is_zero_has_no_cause() -> None:
     assert _told(scene, run, true) == []
 
 
+@pytest.mark.drill
 def test_reactions_that_were_judged_right_are_not_accused() -> None:
     """A difference of forces within their tolerance is none, whatever would close it."""
     scene, true = _swung("pendulum")
@@ -231,6 +237,7 @@ def test_what_is_not_finite_is_no_cause(name: str) -> None:
     assert _told(scene, run, true) == []
 
 
+@pytest.mark.drill
 def test_speeds_do_not_hide_that_places_are_off_otherwise() -> None:
     """A pendulum that a moment holds back has speeds as of a slow clock, and places as of none."""
     scene, true = _swung("pendulum")
@@ -259,6 +266,7 @@ def test_a_start_in_another_pose_does_not_accuse_gravity() -> None:
     assert not [cause for cause in diagnose(Evidence(element, lines), hypotheses_of(element)) if "gravity" in cause.id]
 
 
+@pytest.mark.drill
 def test_another_motion_is_no_misreported_velocity() -> None:
     """From rest a constant torque that is 6 % too small makes every spin 0.94 times the true one, and every angle."""
     scene, times = load_scene("pendulum"), np.arange(15) * 0.01
@@ -290,6 +298,7 @@ def _pulse(length: float, torque: float = 3.0) -> Table:
     return Table((0.0, length, length + 1e-3), (torque, torque, 0.0))
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("run", "gravity"),
@@ -311,6 +320,7 @@ def test_another_push_is_no_wrong_report(run: Table | float, gravity: bool) -> N
     assert _told(scene, truth(_pushed(run, gravity), times), truth(scene, times)) == []
 
 
+@pytest.mark.drill
 @pytest.mark.drill_of("double_pendulum")
 @pytest.mark.parametrize("name", ["pendulum", "double_pendulum"])
 def test_a_flipped_axis_is_no_inverse_rotation(name: str) -> None:
@@ -322,6 +332,7 @@ def test_a_flipped_axis_is_no_inverse_rotation(name: str) -> None:
     assert not [text for text in said if "_WB" in text]
 
 
+@pytest.mark.drill
 def test_places_and_velocities_may_both_be_of_the_centres_of_mass() -> None:
     """What turns rightly and is elsewhere is reported wrongly, though places and velocities go together."""
     scene, true = _swung("double_pendulum")
@@ -371,6 +382,7 @@ def _true_top() -> tuple[Scene, xr.Dataset]:
     return scene, truth(scene, np.arange(21) * 5e-3)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("law", "said"),
@@ -388,6 +400,7 @@ def test_a_small_armature_is_an_error_of_steps(law: dict[str, float], said: list
     assert [text.partition(" of ")[0] for text in told] == said
 
 
+@pytest.mark.drill
 def test_what_vanishes_with_the_step_is_no_cause() -> None:
     """Coarse steps that move as with an armature of 7 % have no cause where the limit of small steps is the truth."""
     scene, true = _true_top()
@@ -398,6 +411,7 @@ def test_what_vanishes_with_the_step_is_no_cause() -> None:
     assert not diagnose_scene(scene, [], run, true, 5e-3, [replace(judged, limit_error=1e-4)])
 
 
+@pytest.mark.drill
 def test_a_run_that_stands_still_has_no_other_gravity() -> None:
     """Three numbers fitted to the one state of a buffer that every sample returns prove nothing."""
     scene, true = _true_top()

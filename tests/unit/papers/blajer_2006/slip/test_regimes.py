@@ -83,6 +83,7 @@ def test_maps_are_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert sum(runs) == study.runs
 
 
+@pytest.mark.drill
 @slow
 def test_map_follows_the_analytic_boundaries() -> None:
     """Without resistance every point of the map lies where g c/V0² and (12/7) g c/V0² say, and progress adds up."""

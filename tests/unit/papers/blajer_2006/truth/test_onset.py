@@ -57,6 +57,7 @@ def test_onset_is_the_first_event_of_the_truth() -> None:
     assert slip_of(cylinder(), 4.0) == pytest.approx(events[0].time, abs=1e-10)
 
 
+@pytest.mark.drill
 def test_edge_separates_two_rises() -> None:
     """The edge between μ = 0.39 and 0.40, found to six digits (the bounds), is where the first slip jumps."""
     edge = edge_between(rolling_ball(cylinder()), 0.39, 0.40, 4.0)

@@ -154,6 +154,7 @@ def test_many_short_slips_settle() -> None:
     assert lengths[-1] < 0.1 * lengths[0]
 
 
+@pytest.mark.drill
 def test_the_published_digits_of_the_article_law(paper: xr.Dataset) -> None:
     """The paper's ball slips, sticks, slips and falls at the digits that an independent solver has, to the last one."""
     events = [event.time for event in events_of(paper)]
@@ -174,6 +175,7 @@ def test_resistance_against_turning_falls_elsewhere() -> None:
     assert float(true["z"][-1]) == pytest.approx(-2.3359491272, abs=1e-9)
 
 
+@pytest.mark.drill
 def test_state_at_the_events_of_the_paper() -> None:
     """Where the ball sticks and slips again its height and speed have the known digits; the bounds are their last."""
     times = np.array([0.0, 2.00812799, 2.44969538])

@@ -68,6 +68,7 @@ def test_where_it_leaves_the_wall(k: float, speed: float) -> None:
     assert np.cos(at) == pytest.approx(-(speed**2 * (1 + k) - 2 * pull) / (pull * (3 + k)), abs=1e-5)
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(("part", "leaves"), [(0.995, True), (1.005, False)])
 def test_speed_that_it_takes_round_a_lying_cylinder(part: float, leaves: bool) -> None:
