@@ -487,7 +487,7 @@ def test_what_is_no_engine(given: object) -> None:
         build(load_scene("pendulum"), given)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_orientation_of_a_ball_that_nobody_asked_for() -> None:
     """An orientation that an engine gives of a ball is judged, whether the scene asks for it or not."""
     scene = load_scene("sphere_in_cylinder")

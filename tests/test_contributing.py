@@ -139,7 +139,6 @@ def test_a_decision_is_dated(path: Path) -> None:
     assert any(reason)
 
 
-@pytest.mark.drill
 def test_the_map_has_every_module() -> None:
     """The map has a line with content for each module of the package."""
     lines = MAP["modules"]()

@@ -229,7 +229,6 @@ def test_the_controllers_of_robots_are_what_the_page_says(monkeypatch: pytest.Mo
         assert read.ground.feet == entry.feet
 
 
-@pytest.mark.drill
 def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Both pages include the matrix, which is that of the records in the gallery's own pages, and the grid has all."""
     monkeypatch.syspath_prepend(str(ROOT / "docs"))

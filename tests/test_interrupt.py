@@ -142,6 +142,7 @@ def test_a_signal_while_a_module_is_imported(module: str, number: int) -> None:
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.nightly_of("arguments1")
 @pytest.mark.drill_of("arguments0")

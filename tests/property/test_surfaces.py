@@ -142,7 +142,7 @@ def test_a_small_swing_passes_the_bottom_of_a_bowl() -> None:
     assert np.abs(found["eta"]).max() == 0.0
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_ball_through_the_bottom_is_the_limit_of_balls_that_pass_it(times: np.ndarray) -> None:
     """Nothing happens at the bottom: with a side speed of 1e-6 m/s the motion is the same to as much."""
     scenes = [Scene("s", "", (element(Bowl("wall", 0.225), 0.4, (0.1, 0), (0.0, v), 0.0),)) for v in (0.0, 1e-6)]

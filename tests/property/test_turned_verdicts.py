@@ -103,6 +103,7 @@ def test_a_random_mechanism_is_told_alike_elsewhere(seed: int) -> None:
     assert_told_alike(Scene("random", "", (MechanismElement(mechanism),)), 0.2, seed)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", _cases([0], range(110)))
 def test_a_random_contact_is_told_alike_elsewhere(seed: int) -> None:
     """The same of random bodies that touch."""

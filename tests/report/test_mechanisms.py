@@ -83,7 +83,7 @@ def test_the_page_shows_the_mechanism(report: Path) -> None:
     assert all(verdict["verdict"] == "agrees" for verdict in content["comparisons"][0]["rows"])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_mechanism_is_replayed(
     compared: tuple[Outcome, Store, Path], report: Path, visit: Callable[..., AbstractContextManager[Visit]]

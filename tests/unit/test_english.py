@@ -104,7 +104,6 @@ def _resolves(name: str) -> bool:
     return False
 
 
-@pytest.mark.drill
 def test_cross_references_point_to_what_there_is() -> None:
     """Every whole name of this package in a docstring is that of a module, a class, a function or an attribute."""
     files = sorted((ROOT / "src").rglob("*.py"))

@@ -192,7 +192,6 @@ def test_each_class_has_a_name_of_its_own() -> None:
     assert {name: where for name, where in homes.items() if len(where) > 1} == {}
 
 
-@pytest.mark.drill
 def test_the_harness_names_no_observable_and_no_failure_of_an_element() -> None:
     """What an observable is and how a run of it fails stands in the element's own table, and nowhere else."""
     elements = [
@@ -211,7 +210,6 @@ def test_the_harness_names_no_observable_and_no_failure_of_an_element() -> None:
     assert sorted(set(wrong)) == [f"{file} names N" for file in newtons]
 
 
-@pytest.mark.drill
 def test_the_harness_knows_no_law_of_joints() -> None:
     """No line of the harness speaks of a servo, a gear, an armature or a stop: they are its elements' alone."""
     law = re.compile(r"actuator|coupling|armature|\bservo|restitution|dry friction|\bgears?\b|\bmimic", re.IGNORECASE)
@@ -303,7 +301,6 @@ def circle(leads: dict[str, set[str]]) -> list[str]:
     return []
 
 
-@pytest.mark.drill
 def test_no_modules_import_each_other() -> None:
     """No module imports, even inside a function, one that leads back to it."""
     assert circle(leading(ROOT)) == []
@@ -318,7 +315,6 @@ def test_no_engine_knows_what_is_added_to_it(engine: str) -> None:
     assert [f"{file}:{line}" for file in files for line, text in _texts(file) if text in added] == []
 
 
-@pytest.mark.drill
 def test_only_their_reader_knows_balls_on_surfaces() -> None:
     """Nobody imports the reader of balls on surfaces but their kind, the article and the list of the vocabulary."""
     knowing = {

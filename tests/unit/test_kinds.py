@@ -32,7 +32,6 @@ def written_kinds(module: list[ast.AST]) -> Iterator[str]:
                 yield str(kind.value)
 
 
-@pytest.mark.drill
 def test_no_module_writes_a_kind_of_joint_or_event_as_a_text() -> None:
     """A renamed kind is one change: no comparison and no event here has its text."""
     written = {str(path.relative_to(ROOT)): kinds for path in FILES if (kinds := sorted(written_kinds(nodes(path))))}

@@ -52,7 +52,6 @@ def parts() -> dict[str, float]:
     return {folder: sum(bare) / len(bare) for folder, bare in functions.items() if bare}
 
 
-@pytest.mark.drill
 def test_few_functions_of_a_folder_have_a_local_that_is_no_noun() -> None:
     """In no folder of a package do more than a tenth of the functions have such a name."""
     assert {folder: part for folder, part in parts().items() if part > WORST} == {}

@@ -111,7 +111,7 @@ def test_the_line_to_change_is_named(proofroll: Proofroll, model: Callable[[str]
     assert (code, out.partition(": ")[2][:4]) == (0, "Yes:")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_line_of_a_program_is_named(proofroll: Proofroll, tmp_path: Path) -> None:
     """An Exudyn program with too few steps gets the line that makes enough, with which the answer is yes."""
     program, asked = tmp_path / "program.py", ["--until", "0.2", "--tolerance", "1e-3", "--out", str(tmp_path)]

@@ -77,7 +77,7 @@ def test_json_says_what_was_written(proofroll: Proofroll, tmp_path: Path) -> Non
     assert picture.is_file()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_bad_files(proofroll: Proofroll, tmp_path: Path) -> None:
     """No file, no run in it, or an ending that no picture has: one line, exit code 2, and nothing is written."""
     for name in ("text.nc", "text.npz"):
@@ -129,7 +129,7 @@ def test_a_run_in_motion(proofroll: Proofroll, tmp_path: Path, words: list[str],
     assert case["label"] == ("speed=3" if "--set" in words else case["scene"])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_elements_in_motion(proofroll: Proofroll, tmp_path: Path) -> None:
     """Of a scene of several elements each is a case of its own, with its truth and its part of the run."""
     (tmp_path / "mixed").mkdir()

@@ -226,7 +226,7 @@ def test_the_inertia_of_a_drive_slows_its_coordinate(formulation):
     assert abs(slow) < 0.8 * abs(plain)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_singular_pose_is_told_with_time_and_pose() -> None:
     """A run whose loops lose a row ends there, before its steps shrink to nothing, and says when and where."""
     run = simulate(load_scene("four_bar", windows=1), "projection", until=1.0)

@@ -158,7 +158,7 @@ def test_friction_a_stop_a_limit_and_a_target_in_time_switch_together(target):
     assert [(event.kind, event.name) for event in run.events()] == [(e.kind, e.name) for e in truth.events]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_rack_and_pinion_on_a_spring():
     """A coupling of a hinge and a slide is one row more: ratio, force and motion are those of one oscillator."""
     joints = (

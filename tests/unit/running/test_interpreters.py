@@ -189,7 +189,7 @@ def test_another_proofroll_is_not_trusted(tmp_path: Path) -> None:
     assert "has other code of proofroll" in str(found)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_noise_is_not_an_answer(tmp_path: Path) -> None:
     """A Python that prints when it starts serves nevertheless."""
     python = seeing(tmp_path / "venv", "1.0")

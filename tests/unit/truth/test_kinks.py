@@ -143,7 +143,7 @@ def test_unknown_functions_are_refused_with_the_known_ones():
         SpringLaw("sinh(L)")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_prescribed_motion_starts_on_the_side_to_which_time_goes():
     """From a kink at time 0 a motion |sin 3t| has the rate 3, up to the next kink, at which the truth ends."""
     joint = Joint("x", "prismatic", "world", "m", axis=(1, 0, 0), motion=Formula("0.1*abs(sin(3*t))"))

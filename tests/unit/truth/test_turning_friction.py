@@ -263,7 +263,7 @@ def test_a_growing_moment_turns_a_ball_once_it_exceeds_its_friction(engine: str,
     np.testing.assert_allclose(at(run, "w_WB")[:, 2], spin, atol=error)  # rad/s; of first order 7e-3
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_iteration_around_pinocchios_solver_leaves_no_error_of_its_own() -> None:
     """Along a line the midpoint has no error, and the moments are found closer than the solver finds its impulses."""
     scene = ball(law(rolling_resistance=2e-3), (0.3, 0, 0, 0, 6, 0))

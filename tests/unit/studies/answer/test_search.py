@@ -160,7 +160,7 @@ def test_a_step_that_is_asked_about_has_samples_at_its_double() -> None:
         whole.sampled_for(2.0)
 
 
-@pytest.mark.nightly
+@pytest.mark.drill
 def test_an_answer_is_true_of_the_engine_and_is_stored(tmp_path: Path) -> None:
     """What is advised holds in a run of its own with other samples; the stored answer is the one that was made."""
     import proofroll

@@ -193,7 +193,7 @@ def test_a_motion_ends_at_what_lengths_cannot_tell_from_a_singular_pose(scene, p
         by_joints(scene("slider_crank", crank=0.4 * (1 - part), speed=3.0), np.array([0.0, 0.5]), 1e-10)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_motion_beside_a_singular_pose_goes_on(scene):
     """A length that a file tells from the singular one leads past it."""
     by_joints(scene("slider_crank", crank=0.4 * (1 - 1e-7), speed=3.0), np.array([0.0, 0.5]), 1e-10)

@@ -130,7 +130,7 @@ def reference(mass: np.ndarray, hold: float, until: float, pull: Pull, rate_of: 
     return np.asarray(np.exp(size) * np.array([np.cos(angle), np.sin(angle)]))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_bead_slips_against_friction_that_turns_with_its_pull() -> None:
     """A bead with another inertia along each rail, pulled harder and harder round a corner, moves as Coulomb says."""
     hold, until = 0.3 * 9.81, 1.0

@@ -130,7 +130,7 @@ def test_an_impact_on_a_driven_plate_is_followed() -> None:
     assert struck.root.T @ struck.root == pytest.approx(np.eye(2) / 2.0)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_impact_of_a_body_whose_origin_rests_is_followed() -> None:
     """A pendulum's frame on its hinge does not jump: the gap says when the impact was; one velocity proves no law."""
     rod = Body("rod", 1.0, (0, 0, -0.5), (0.1, 0.1, 1e-3))

@@ -210,7 +210,7 @@ def test_an_engine_built_by_hand_has_the_controller() -> None:
         assert np.abs(run["p_WB"].values - whole["p_WB"].sel(time=run["time"]).values).max() == 0
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_truth_has_the_times_that_are_asked_for() -> None:
     """Samples at instants, which differ from the grid by round-off, keep the times of the grid to the last bit."""
     (element,) = SCENES["policy"].elements

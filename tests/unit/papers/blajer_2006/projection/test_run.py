@@ -74,7 +74,7 @@ def test_elimination_removes_the_drift():
     assert drifting["z"] > 3 * kept["z"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_papers_range_of_nutation(monkeypatch):
     """In the paper's run with rolling resistance θ stays within 0.86 … 2.26 rad until the ball would slip."""
     theta = []

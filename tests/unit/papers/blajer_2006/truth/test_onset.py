@@ -50,7 +50,7 @@ def test_stairs(parameters: dict[str, float], expected: float) -> None:
     assert slip_of(cylinder(**parameters), 4.0) == pytest.approx(expected, abs=1e-5)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_onset_is_the_first_event_of_the_truth() -> None:
     """The onset read off the curve of needed friction is where the truth begins to slip."""
     events = events_of(truth(cylinder(), np.array([0.0, 1.8])))

@@ -56,7 +56,7 @@ def test_quadrature(tilt: float, k: float, axial: float, spin: float) -> None:
 
 
 @pytest.mark.nightly_of("0.4-2.2")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(("k", "speed"), [(0.4, 2.2), pytest.param(2 / 3, 2.1, marks=pytest.mark.drill)])
 def test_where_it_leaves_the_wall(k: float, speed: float) -> None:
     """Energy says at which angle: cos γ = -(V0²(1 + k) - 2 g' c) / (g' c (3 + k)) with g' = g sin α."""
