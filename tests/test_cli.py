@@ -490,6 +490,7 @@ def test_run_lists_events(proofroll: Proofroll) -> None:
         assert event["time_low"] <= event["time"] <= event["time_high"] < event["time_low"] + 1.1e-3
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.nightly_of("pinocchio[formulation=impulses,preset=tuned]-0-agree-done")
 @pytest.mark.parametrize(

@@ -34,6 +34,7 @@ def run(text: str, folder: Path) -> xr.Dataset:
     return simulate(load_scene(str(folder)), "projection", until=0.5, every=0.1)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("name", "accelerations"),

@@ -60,6 +60,7 @@ def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
         assert not turning or {type(body) for body in made_bodies(mechanism, allow_planar=True)} == {Planar}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.drill_of("5", "10")
 @pytest.mark.parametrize("seed", [5, 10, 3060])

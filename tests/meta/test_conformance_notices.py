@@ -95,6 +95,7 @@ def test_a_buffer_that_is_filled_anew_is_named(engine: type[Tiny]) -> None:
     assert text.startswith("the arrays of a sample change with later steps: return copies")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize("engine", [Views, OneBuffer, OneForAll])
 def test_a_buffer_that_is_filled_anew_spoils_no_run(engine: type[Tiny]) -> None:
@@ -224,6 +225,7 @@ def lying(engine: type[Any], model: Callable[[Scene], Scene]) -> type[Any]:
     return Lying
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("engine", "formulation", "lies"),

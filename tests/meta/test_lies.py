@@ -417,6 +417,7 @@ class Remembers(Tiny):
         self.x, self.t = self.kept[t], t
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.drill_of("Tiny-0")
 @pytest.mark.parametrize(("kind", "remarks"), [(Tiny, 0), (Remembers, 1)])

@@ -171,6 +171,7 @@ def test_a_ball_on_a_curved_wall_is_drawn_on_a_net(name: str, letters: set[str])
     assert top < ball.centre[1] < top + height
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("kind", "half"), [("capsule", [0.1, 0.1, 0.1]), ("cylinder", [0.1, 0.1, 0.3])])
 def test_long_bodies_are_replayed_whole(kind: GeometryKind, half: list[float]) -> None:

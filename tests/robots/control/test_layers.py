@@ -167,6 +167,7 @@ def test_the_command(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
     assert effort["causes"][0]["size"] == pytest.approx(0.5, rel=1e-6)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("change", "said"),

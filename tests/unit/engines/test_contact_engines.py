@@ -55,6 +55,7 @@ def test_the_projection_has_the_first_forces_of_contact(name: str) -> None:
     np.testing.assert_allclose(force[known], element.first_press[known], atol=1e-8)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("setting", "place", "part"), [("pinocchio impulses matched", 1.6e-3, 1e-6), ("exudyn spheres matched", 1e-4, 1e-3)]
@@ -68,6 +69,7 @@ def test_three_feet_at_rest_share_the_weight_by_their_levers(setting: str, place
     np.testing.assert_allclose(run.sample().contact_force[:, 2], N, rtol=part)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.drill_of("pinocchio impulses tuned")
 @pytest.mark.parametrize("setting", ["pinocchio impulses tuned", "mujoco geoms tuned"])

@@ -61,6 +61,7 @@ def happened(path: Path, *expected: str, at: float) -> None:
     assert [event.time for event in path.events] == pytest.approx([at] * len(expected), abs=1e-12)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.drill_of("by_truth")
 @BOTH
@@ -96,6 +97,7 @@ def test_a_smooth_foot_is_pressed_against_a_stop(follow: Follow) -> None:
     happened(path, "impact rail", at=(np.sqrt(1 + 2 * 3.0 * 0.1) - 1) / 3.0)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @BOTH
 def test_a_limit_of_an_effort_is_not_stepped_across(follow: Follow) -> None:

@@ -51,6 +51,7 @@ def numbers(sample: MechanismSample) -> np.ndarray:
     return np.concatenate([np.ravel(part) for part in parts])
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("model", "scene", "order"),
     [

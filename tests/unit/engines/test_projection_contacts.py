@@ -176,6 +176,7 @@ def test_first_steps_into_an_impact_are_no_evidence() -> None:
         assert all(line.holds for line in first_steps(PROJECTION, scene, replace(DEFAULT, dt=1e-4)))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("part", [-1e-6, 0.0, 1e-6])
 def test_a_graze_of_a_stop_passes_no_stop(part: float) -> None:
     """A throw that ends at its stop comes down again, hit or not, with no more than its impact can change."""
@@ -381,6 +382,7 @@ def test_corners_of_a_face_land_together() -> None:
     np.testing.assert_allclose([*sample.v_WB[0], *sample.w_WB[0]], 0.0, atol=1e-12)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("height", "error"), [(0.15, Refused), (0.2, Diverged)])
 def test_a_cylinder_that_stands_on_its_end_is_refused(height: float, error: type[Exception]) -> None:

@@ -120,6 +120,7 @@ def test_mujoco(f: float, monkeypatch: pytest.MonkeyPatch) -> None:
     assert any(callback is not None for callback in given) == (f > 0)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("condim", "coefficients"), [(4, [5e-3]), (6, [5e-3, 1e-4])])
 def test_mujoco_contact_of_more_dimensions(condim: int, coefficients: list[float]) -> None:

@@ -50,6 +50,7 @@ def _evaluated(folder: Path, tables: dict[str, Any], name: str, relation: Relati
     return evaluated
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.nightly_of("renamed", "reordered")
 @pytest.mark.drill_of("other samples", "turned", "welded")

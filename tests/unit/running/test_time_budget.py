@@ -162,6 +162,7 @@ def test_what_is_left_is_read_between_two_changes() -> None:
     assert found
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.drill), 2])
 def test_cases_beyond_the_budget_are_left_out(

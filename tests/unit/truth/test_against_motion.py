@@ -179,6 +179,7 @@ def test_a_turntable_resists_the_motion_that_it_sees() -> None:
     assert float(np.abs(true["w_WB"][-1, 0] - still["w_WB"][-1, 0]).max()) > 1e-2
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("kind", [pytest.param("bowl", marks=pytest.mark.drill), "bore"])
 def test_curved_walls_take_the_direction_along_the_wall(kind: str) -> None:

@@ -114,6 +114,7 @@ def test_what_stands_because_it_is_driven_has_no_determinate_friction() -> None:
         truth_of(driven_pair("0.3 + 0*t"), np.array([0.0, 0.1]))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("motion", [pytest.param("0.7853981633974483 + 10*t", marks=pytest.mark.drill), ""])
 def test_projection_passes_dead_centres(motion: str) -> None:

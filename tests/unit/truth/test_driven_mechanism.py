@@ -161,6 +161,7 @@ def by_itself(mass: float, law: Actuator, spring: float, target: Formula, until:
     return float(y[0]), times
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.drill) for seed in range(1, 4))])
 def test_servos_with_limits_agree_with_another_solver(seed: int) -> None:

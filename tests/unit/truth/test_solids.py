@@ -128,6 +128,7 @@ def test_a_ball_on_a_face_moves_as_on_a_plane() -> None:
         np.testing.assert_allclose(getattr(box, name), getattr(flat, name), rtol=0, atol=1e-13)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("aside", [(0.06, 0.0), (0.05, 0.07)])
 def test_a_ball_that_drops_on_an_edge_or_corner_rebounds_along_the_line_to_it(aside: tuple[float, float]) -> None:
@@ -213,6 +214,7 @@ def test_capsules_that_come_to_lie_along_each_other_end_the_truth_with_the_reaso
     assert "the capsules of touch touch along a line at t = 0.428" in truth_of(mechanism, np.array([0.0, 1.0])).ended
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("size", "below", "closed"),

@@ -148,6 +148,7 @@ def test_which_rebound_is_the_last_hangs_on_no_digit(restitution: float, impacts
     assert [event.kind for event in found.events] == ["impact"] * impacts + ["settle"]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("height", "restitution"), [(0.0, 1.0), (1e-9, 0.5)])
 def test_what_lies_on_a_stop_or_nearly_so_comes_to_rest(height: float, restitution: float) -> None:
@@ -289,6 +290,7 @@ def test_joints_that_share_one_freedom_turn_together(ratio: float) -> None:
     assert np.isinf(found.horizon)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
     ("scene", "parameters", "edge"),
@@ -415,6 +417,7 @@ def test_a_joint_that_grazes_its_stop_is_ill_posed(inside: float, restitution: f
     assert found.events == ()
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.drill_of("-1e-06-0")
 @pytest.mark.parametrize(("inside", "impacts"), [(1e-6, 1), (-1e-6, 0)])
@@ -428,6 +431,7 @@ def test_a_joint_that_passes_or_misses_its_stop_for_certain_is_well_posed(inside
     assert found.record.q[-1, 0] == pytest.approx(reach * np.cos(2.0 - hit), abs=TIGHT)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("apart", [1e-12, 0.0, -1e-12])
 def test_spheres_that_graze_each_other_are_ill_posed(apart: float) -> None:

@@ -221,6 +221,7 @@ def test_a_disc_that_lands_flat_is_refused(restitution: float) -> None:
     assert found.record.time.tolist() == [0.0, 0.1]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("friction", [0.0, 2.0])
 def test_a_disc_that_tips_until_it_lies_flat_is_refused_with_the_time(friction: float) -> None:
@@ -333,6 +334,7 @@ def test_a_joint_that_rubs_rests_on_its_stop_and_leaves_it_beside_contacts_as_wi
         assert b.time_low <= a.time_high
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.drill_of("laws0-kinds0")
 @pytest.mark.parametrize(

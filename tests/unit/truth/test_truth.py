@@ -105,6 +105,7 @@ def wound_up():
     return Mechanism((body,), (joint,), gravity=(0.0, 0.0, -9.81))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("turns_over", [False, True])
 def test_a_route_that_loses_energy_shows_no_chaos(scene, monkeypatch, turns_over):
@@ -351,6 +352,7 @@ IN_PLANE = (
 )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("joints", "hand", "point", "gravity", "body", "compiled"),
@@ -384,6 +386,7 @@ TURNED = [
 ]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("orientation", "axis"), TURNED)
 def test_a_hinge_whose_child_is_turned_has_a_truth(orientation, axis, monkeypatch):

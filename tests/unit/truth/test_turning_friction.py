@@ -99,6 +99,7 @@ def test_both_routes_agree_on_a_ball_of_unequal_moments() -> None:
     assert np.isfinite(at(found, "p_WB")).all()
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (-1.9, 0.8, 0.6)])

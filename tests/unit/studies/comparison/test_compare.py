@@ -327,6 +327,7 @@ def test_an_exception_may_expect_a_failure(tmp_path: Path) -> None:
     assert [run.verdict for run in outcome.runs] == [Verdict.FAILED] * 2
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("status", "verdict"), [(Status.REFUSED, Verdict.REFUSED), (Status.WRONG_MODEL, Verdict.FAILED)]

@@ -132,6 +132,7 @@ def driven_turntable(target: Any, torque: Any) -> Mechanism:
     return replace(m, joints=(axle, *m.joints[1:]), actuators=(motor,), springs=(spring,), forces=forces)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("target", "torque"),

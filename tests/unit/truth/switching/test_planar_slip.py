@@ -300,6 +300,7 @@ def test_a_slip_begins_in_one_go_where_its_pull_turns_with_the_square_of_time() 
     assert np.arctan2(way[1], way[0]) == pytest.approx(turning * until**2 / 2, abs=2 * behind)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("excess", [1e-2, 1e-6])
 def test_a_slip_from_rest_may_begin_as_slowly_as_it_likes(excess: float) -> None:

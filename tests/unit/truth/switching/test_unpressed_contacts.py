@@ -43,6 +43,7 @@ def falling(speed: tuple[float, float, float], friction: float, turn: Rotation) 
     return Mechanism(bodies, joints, gravity=tuple(turn.apply([0, 0, -G]).tolist()), geometries=shapes, pairs=pairs)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("sled", [False, True], ids=["alone", "a sled stands by"])
 def test_a_balanced_wheel_rests_on_its_stop(sled: bool) -> None:

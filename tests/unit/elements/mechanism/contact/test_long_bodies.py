@@ -80,6 +80,7 @@ def test_a_long_body_rolls_down_a_slope(kind: str) -> None:
     np.testing.assert_allclose(ends, MASS * GRAVITY * np.cos(slope) / 2, atol=1e-9)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_long_body_strikes_with_its_lower_end(kind: str) -> None:

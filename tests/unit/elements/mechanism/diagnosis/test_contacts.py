@@ -40,6 +40,7 @@ def said(
     return [cause.says for cause in diagnose(Evidence(element, [], run, true, STEPS[preset]), hypotheses_of(element))]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize(
@@ -83,6 +84,7 @@ def test_creep_of_a_regularised_law_is_named_with_its_speed() -> None:
         assert any("stick creep at 0.0001 m/s" in cause.says for cause in causes) == (not settled), causes
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("unexplained", "proven"), [(0.0, True), (0.03, False)])
 def test_a_factor_of_friction_leaves_no_more_than_a_step_does(unexplained: float, proven: bool) -> None:

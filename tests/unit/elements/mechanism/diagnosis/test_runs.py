@@ -39,6 +39,7 @@ def _causes(
     return diagnose(evidence, hypotheses_of(element))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("drift", [0.0, 2e-5])
 def test_damping_is_named_although_the_pivot_creeps(drift: float) -> None:
@@ -62,6 +63,7 @@ def test_one_step_early_is_told_of_few_samples() -> None:
     assert said.startswith("every sample is one step (0.002 s) early")
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("limit", "named"), [(0.0, True), (-0.5, False)])
 def test_a_stop_is_accused_only_where_the_true_joint_turns_back_at_it(limit: float, named: bool) -> None:
@@ -320,6 +322,7 @@ def test_another_push_is_no_wrong_report(run: Table | float, gravity: bool) -> N
     assert _told(scene, truth(_pushed(run, gravity), times), truth(scene, times)) == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.drill_of("double_pendulum")
 @pytest.mark.parametrize("name", ["pendulum", "double_pendulum"])

@@ -32,6 +32,7 @@ def arm(q: Sequence[float], v: Sequence[float]) -> Scene:
     return Scene("arm", "", (MechanismElement(Mechanism(bodies, joints, gravity=(0, -9.81, 0))),))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("q0-v0-it begins at rest, without the velocities of the scene")
 @pytest.mark.drill
 @pytest.mark.parametrize(
@@ -107,6 +108,7 @@ def test_velocities_that_vanish_in_a_step_are_no_light_masses() -> None:
     assert [item.cause.id for item in causes] == ["start"]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("given", [True, pytest.param(False, marks=pytest.mark.drill)])
 def test_no_cause_contradicts_what_is_read_back(given: bool) -> None:

@@ -287,6 +287,7 @@ def test_bad_input_is_one_line(tmp_path, old: str, new: str, said: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.drill_of("oscillators-energy_change")
 @pytest.mark.parametrize(("scene", "name"), [("pendulum", "energy_error"), ("oscillators", "energy_change")])

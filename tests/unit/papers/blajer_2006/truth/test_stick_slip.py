@@ -45,6 +45,7 @@ def final_height(path: Path, route: Sliding) -> float:
     return float(route.world(path.stretches[-1].state)[0][2])
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     "route", [pytest.param(SlidingTaylor, marks=needs_heyoka), pytest.param(Polar, marks=pytest.mark.drill)]
