@@ -56,6 +56,7 @@ def run(name: str) -> xr.Dataset:
 BOTH = pytest.mark.parametrize("ending", [".npz", ".nc"])
 
 
+@pytest.mark.drill_of("balls-.npz", "balls-.nc", "mechanisms-.npz", "mechanisms-.nc")
 @BOTH
 @pytest.mark.parametrize("name", RUNS)
 def test_a_run_comes_back(tmp_path: Path, name: str, ending: str) -> None:
@@ -73,6 +74,7 @@ def test_a_run_comes_back(tmp_path: Path, name: str, ending: str) -> None:
         assert item.dtype == dataset[variable].dtype
 
 
+@pytest.mark.drill
 def test_others_read_the_same_from_the_file(tmp_path: Path) -> None:
     """The numbers in a file, as another reader of netCDF, or numpy, finds them there, are those of the dataset."""
     dataset = run("balls")
