@@ -84,7 +84,7 @@ def test_a_sleeve_without_mass_swings_and_turns(tmp_path: Path) -> None:
     assert np.abs(found["drive.turn"].to_numpy() - moment).max() < 1e-10
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_arm_without_mass_carries_its_force_alone(tmp_path: Path) -> None:
     """What the ball does to the arm is what the hinge does to it, and has no moment about the hinge."""
     found = run(SCENES["held_by_an_arm"], tmp_path)

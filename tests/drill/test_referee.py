@@ -151,7 +151,7 @@ def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.nightly_of("41")
-@pytest.mark.drill
+@pytest.mark.nightly
 # An ellipsoid that lands, spheres that pass each other, a rod that lands and whose slip stops.
 @pytest.mark.parametrize("seed", [41, 52, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (27, 20018))])
 def test_no_error_of_the_truth_of_contacts_lies_beyond_its_bar(seed: int) -> None:

@@ -76,7 +76,7 @@ def test_angles_stay_within_a_turn() -> None:
     assert np.all(np.abs(angles) < 3 * 2 * np.pi)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @needs_heyoka
 def test_without_elimination_round_off_adds_up() -> None:
     """What elimination is for: without it the same run ends with a slip hundreds of times as large."""

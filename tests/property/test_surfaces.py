@@ -74,7 +74,7 @@ def test_steady_circles_in_a_cone(way: float, slope: float, k: float, spin: floa
     held_circle(element(Cone("wall", slope), k, (around, way), (W * way * np.cos(slope), 0.0), spin), W)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=30, deadline=None)
 @given(ring=st.floats(0.2, 3.0), wire=st.floats(0.01, 0.1), slope=st.floats(0.05, 1.4), k=ratios, spin=spins)
 def test_steady_circles_on_a_ring(ring: float, wire: float, slope: float, k: float, spin: float) -> None:

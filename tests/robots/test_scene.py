@@ -113,7 +113,7 @@ def test_engines_follow_the_truth_of_a_robot(robot, name, monkeypatch):
                 )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_joint_that_follows_another_is_coupled_to_it(robot):
     """A mimic of a URDF is a coupling that the truth and engines obey; couplings=0 leaves it out."""
     mimic = robot("mimic.urdf", urdf(third='<mimic joint="j1" multiplier="0.5" offset="0.1"/>'))

@@ -209,7 +209,7 @@ def test_nothing_moves(proofroll: Proofroll, tmp_path: Path) -> None:
     assert code == 0
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_who_compiles_a_file_also_reads_it(proofroll: Proofroll, tmp_path: Path, started_workers: list[str]) -> None:
     """The engine that defines the format is started once: for what the file means, and for what the engine holds."""

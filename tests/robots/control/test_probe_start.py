@@ -109,7 +109,7 @@ def test_a_probe_that_is_there_says_what_to_do(proofroll: Proofroll) -> None:
     assert "'probe_arm_mujoco.py': this file is there already; remove or move it, or run the command in" in err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_controller_and_a_ref_do_not_meet(proofroll: Proofroll, record: Callable[..., list[str]]) -> None:
     """Arrays count from `ref` and a controller from the file's pose: both together are refused in one line."""
     Path("stand.toml").write_text('rate = 50\n[[gains]]\njoints = "*"\nkp = 5\n')

@@ -56,7 +56,7 @@ def measured(monkeypatch: pytest.MonkeyPatch, centre: Callable[[np.ndarray[Any, 
     return measure_adapter("projection", {"formulation": "rotating_frame"}, {}, 2, 0.002)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_no_ratio_for_another_motion(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bare loop that ends elsewhere is measured against nothing; nor is one whose end is not finite."""
     for wrong in (0.0, np.nan):

@@ -70,7 +70,7 @@ def test_three_feet_at_rest_share_the_weight_by_their_levers(setting: str, place
 
 
 @pytest.mark.one_in(2)
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.drill_of("pinocchio impulses tuned")
 @pytest.mark.parametrize("setting", ["pinocchio impulses tuned", "mujoco geoms tuned"])
 def test_rows_that_turn_leave_no_contact_open(setting: str) -> None:

@@ -246,7 +246,7 @@ def test_a_foot_that_turns_within_a_step_goes_on() -> None:
     assert [event.kind for event in run.events()] == ["stick", "rest", "rest"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_slip_that_ends_while_it_turns_sticks() -> None:
     """A foot whose slip ends within a fixed step becomes the pivot: it does not circle about zero, step after step."""
     run = PROJECTION.build(load_scene("sled_on_slope"), DEFAULT)
@@ -311,7 +311,7 @@ def test_a_ball_that_hardly_falls_comes_to_rest() -> None:
     assert 1 < impacts < 10
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_impact_leaves_a_distant_contact_closed() -> None:
     """A ball that rests on a slope turned in space feels nothing of another ball's impact, and stays."""
     bodies = tuple(Body(name, 1.0, inertia=(1e-3, 1e-3, 1e-3)) for name in ("resting", "falling"))
@@ -335,7 +335,7 @@ def test_an_impact_leaves_a_distant_contact_closed() -> None:
     assert {event.name for event in run.events()} == {"falling"}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_contact_that_opens_does_not_hit_at_once() -> None:
     """A finger's ball slips, leaves it, and is gone: what the method's error left of overlap there is no impact."""
     run = PROJECTION.build(load_scene("flick"), replace(DEFAULT, dt=2e-3))

@@ -122,7 +122,7 @@ def test_pinocchio_tells_the_friction_of_a_driven_table_at_the_start(preset: str
         assert abs(run[force].values - right[force].values).max() < 2e-3  # N
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_exudyns_triangle_of_a_turning_plane_does_not_press_by_round_off() -> None:
     """It is small and stays under the ball; Newton's method did not converge with corners a kilometre off."""
     scene, grid = load_scene("turntable"), {"until": 0.1, "every": 0.05}

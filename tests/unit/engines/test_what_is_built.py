@@ -61,7 +61,7 @@ def test_projection(f: float) -> None:
         assert bool(np.any(engine._ball.resistance(kin, 1.0))) == (f > 0)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_orientation_in_the_rotating_frame_is_a_quadrature() -> None:
     """Asked for, the orientation turns with the spin, is that of the Euler angles, and leaves the motion alone."""
     with_it, angles, without = (

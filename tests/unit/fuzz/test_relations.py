@@ -77,7 +77,7 @@ def test_another_motion_is_a_breach(name: str, tmp_path: Path) -> None:
     assert surprise.size > 0
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_refused_relative_is_a_breach(tmp_path: Path) -> None:
     """A changed scene that the reader refuses is told with its sentence."""
     relation = Relation(lambda tables, _: tables["bodies"][0].update(mass=-1.0), lambda *_: {})

@@ -27,7 +27,7 @@ def reference(scene: Scene) -> Reference:
     return Reference(scene, dataset, observe(scene, dataset), scales(scene, dataset))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_event_at_the_end_may_be_a_moment_later() -> None:
     """A run and a truth of which one has an event within its bracket of the end are judged alike; others count."""
     scene = load_scene("bouncing_ball", height=0.1, restitution=0.5, tangential_restitution=0.0)

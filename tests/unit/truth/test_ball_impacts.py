@@ -46,7 +46,7 @@ def test_infinitely_many_bounces(e: float, height: float) -> None:
     assert settles.time_low <= rests <= settles.time_high
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.arithmetic
 def test_an_impact_at_the_end_is_not_among_the_events() -> None:
     """An impact at the last sample, to the last digit, is left out by any arithmetic; one clearly before is told."""
@@ -57,7 +57,7 @@ def test_an_impact_at_the_end_is_not_among_the_events() -> None:
 
 
 @pytest.mark.nightly_of("0.5-2.4-0.985-0.1-0.0")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("e", "height", "tilt", "radius", "speed"), [(0.5, 2.4, 0.985, 0.1, 0.0), (0.6, 0.451, -0.28, 0.068, -0.714)]
 )

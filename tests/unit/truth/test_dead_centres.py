@@ -42,7 +42,7 @@ def driven_pair(motion: str, speed: float = 0.0) -> Mechanism:
     return Mechanism(bodies, joints, couplings=(coupling,), gravity=(0.0, 0.0, 0.0))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_slider_passes_its_dead_centre() -> None:
     """Crank and slider go on behind the dead centre as their one equation says; friction reverses there."""
     found = truth_of(piston(), np.array([0.0, 0.4]))

@@ -47,7 +47,7 @@ def test_one_effort_at_its_limit_all_the_time_is_clamped_beside_another_that_nev
     assert found.events == ()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_true_rotor_turns_with_the_rod_that_carries_it() -> None:
     """A rotor behind a gear n adds I [[1, n], [n, n^2]] to the mass matrix, and its mass; armature is n^2 I alone."""
     inertia, n, mass, g = 1e-4, 50.0, 0.1, 9.81

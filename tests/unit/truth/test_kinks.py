@@ -85,7 +85,7 @@ def test_kinks_of_drives_are_located(text, part):
     assert found.record.v[-1, 0] == pytest.approx(true, abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_motion_with_a_kink_in_its_acceleration_is_followed():
     """A slide that is moved by max(0, t - 0.5)^3 begins without a jolt; its drive is mass times acceleration."""
     found = truth_of(

@@ -185,7 +185,7 @@ def test_friction_and_stops_beside_a_motion_switch_alike() -> None:
 
 
 @pytest.mark.nightly_of("3.0")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("angle", [0.3, pytest.param(3.0, marks=pytest.mark.drill)])
 def test_a_motion_that_leaves_nothing_free_holds_its_laws(angle: float) -> None:
     """Where all is prescribed no state bounds the steps, and yet each law is held over the whole turn."""

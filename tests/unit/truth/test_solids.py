@@ -318,7 +318,7 @@ def test_edges_that_cross_rebound_from_each_other() -> None:
     assert np.abs(found.record.w_WB[-1]).max() < 1e-11
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_meets_a_side_rebounds_from_it() -> None:
     """Faces that come to meet are those of the sides: a box that flies at the side of another one comes back."""
     found = followed(on_box((0.15, 0, -0.1), (-1.0, 0, 0.3), restitution=0.6), [0.0, 0.06])

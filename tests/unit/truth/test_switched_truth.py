@@ -486,7 +486,7 @@ def test_a_box_that_turns_as_it_slides_on_four_corners_is_ill_posed_and_certifie
     assert run.attrs["status"] == "done", run.attrs["message"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_begins_to_turn_as_it_slides_is_ill_posed_from_there_on() -> None:
     """A spring off its middle turns a box that slid straight: its truth ends where the split first counts."""
     pull = Spring("pull", "world", "box", (0.0, 3.0, 0.1), (0.1, 0.0, 0.0), stiffness=0.5, length=2.9)
@@ -772,7 +772,7 @@ def test_a_plate_slides_straight_on_eight_feet() -> None:
 
 
 @pytest.mark.one_in(2)
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.drill_of("0.01")
 @pytest.mark.parametrize("spinning", [0.0, 0.01])
 def test_feet_that_resist_rolling_leave_the_turn_of_a_plate_open_unless_they_hold_its_spin(spinning: float) -> None:

@@ -199,7 +199,7 @@ def test_what_the_witness_of_a_closed_form_does_not_know_is_not_known(scene, mon
     assert np.isinf(truth.bars["p_WB"]).tolist() == [False, True]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_singular_poses_without_a_closed_form_end_a_truth(scene):
     """Values before the pose are kept; its time and the reason are said."""
     crank = {"crank": 0.3999999999999, "speed": 3.0}
@@ -353,7 +353,7 @@ IN_PLANE = (
 
 
 @pytest.mark.one_in(2)
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("joints", "hand", "point", "gravity", "body", "compiled"),
     [

@@ -89,7 +89,7 @@ def test_a_ball_that_slips_and_rolls_has_both_laws() -> None:
     assert abs(at(found, "w_WB")[-1, 1] + spin - slows * time) <= bar(found, "w_WB") <= 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_both_routes_agree_on_a_ball_of_unequal_moments() -> None:
     """A ball with three moments of inertia lands, slips, rolls and spins with all laws at once."""
     pair = law(0.3, rolling_resistance=1e-3, spinning_friction=2e-3)

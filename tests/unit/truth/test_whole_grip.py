@@ -156,7 +156,7 @@ def test_one_contact_that_shares_its_load_with_joints_holds_while_any_distributi
     assert "c begins to slip from rest" in path.ended
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_forces_of_a_shared_load_are_held_to_the_law_in_a_distribution_that_its_contacts_can_bear() -> None:
     """A pin that comes to rest on a wobbling disc breaks no law: some friction within its bound balances the joints."""
     mechanism, until = random_contacts(259)[1:]

@@ -73,7 +73,7 @@ def test_a_pendulum_on_a_cable_goes_slack(tmp_path: Path) -> None:
     assert content["force.k.z"].to_numpy()[0] == pytest.approx(SPEED**2 + G, abs=1e-11)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_mass_is_caught_and_thrown_back(tmp_path: Path) -> None:
     """A mass that falls into a cable comes back with its restitution, and hangs by its weight in the end."""
     fall, restitution = 0.5, 0.4

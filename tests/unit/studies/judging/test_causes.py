@@ -115,7 +115,7 @@ def test_a_clock_at_another_rate_is_named(rate: float) -> None:
     assert said(one_at(rate * TIMES), TWO) == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_state_at_half_its_times_is_no_other_gravity() -> None:
     """A whole state whose times are halved has its clock as its cause, where the balance of momentum doubles, too."""
     scene = load_scene("pendulum")

@@ -80,7 +80,7 @@ def test_a_run_is_judged_up_to_the_end_of_the_truth(disc: str) -> None:
     assert not proofroll.judge(run, disc, {"p_WB": "1e-9 m"}).agrees
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_run_of_the_truth_that_lacks_samples_says_so(
     command_line: Callable[..., tuple[int, str, str]], disc: str
 ) -> None:

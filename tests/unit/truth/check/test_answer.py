@@ -206,7 +206,7 @@ def test_an_impact_that_was_published_has_the_restitution_of_the_scene(scene: st
     assert held_answer(other, dataset, motion.tiles, TIMES).residuals.largest["rebound"][0] > 10
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_works_are_held_across_an_impact() -> None:
     """A motor's work behind a blow on what it moves is that of its force and of its impulse."""
     (element,) = plate_and_ball().elements

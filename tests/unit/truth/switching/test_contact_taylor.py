@@ -186,7 +186,7 @@ def test_stops_and_dry_friction_of_joints_are_compiled(law: dict[str, Any]) -> N
         )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_effort_at_its_limit_is_compiled() -> None:
     """A motor reaches its limit and comes back: both routes stay compiled, with the limit as a guard."""
     pytest.importorskip("heyoka")

@@ -186,7 +186,7 @@ def slip_under_a_push(push: float, rate: float, hold: float) -> tuple[float, flo
 PUSHED, SLIP = bead("5.2*sin(10*t)"), slip_under_a_push(5.2, 10.0, 0.5 * 9.81)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_slip_that_turns_fast_is_followed_from_its_first_instant() -> None:
     """A pull that turns by 20 rad/s as friction gives way takes the bead with it, as Coulomb's law says."""
     until, hold = 0.05, 0.5 * 9.81

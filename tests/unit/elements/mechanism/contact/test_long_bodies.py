@@ -64,7 +64,7 @@ def test_the_nearest_end_is_the_distance_of_the_whole_shape(kind: str, seed: int
 
 
 @pytest.mark.nightly_of("capsule")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_long_body_rolls_down_a_slope(kind: str) -> None:
     """On its side it rolls with g sin α/(1 + I/(m r²)) and both ends bear half of its weight."""

@@ -180,7 +180,7 @@ def test_every_value_has_an_error_bar(scene: Scene) -> None:
             assert bar > 0, name
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_friction_that_is_never_needed_changes_nothing() -> None:
     """As long as the friction needed stays below a bound, the bound does not show."""
     t = np.linspace(0, 0.5, 6)
