@@ -15,13 +15,12 @@ from typing import Any
 
 import pytest
 import seldom
+from share import is_of_the_day
 
 VARIABLE = "PROOFROLL_NO_DEAR"
 # Processor time [s] above which a test is a drill (CONTRIBUTING.md), on a processor that takes LOOP [s] for the loop.
 LIMIT = 1.0
 LOOP = 0.008
-# Golden ratio, without its whole part.
-_GOLDEN = (5**0.5 - 1) / 2
 # Largest number of tests named in the line.
 _MOST = 10
 _BEGAN = pytest.StashKey[float]()
@@ -98,14 +97,6 @@ def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
     for function, names in named.items() if whole else ():
         if unknown := names - cases[function]:
             raise pytest.UsageError(f"{function}: a mark names {', '.join(sorted(unknown))}, which it has not")
-
-
-def is_of_the_day(place: int, count: int) -> bool:
-    """True for one case in ``count``, by its place among the cases of its test; for the first one always.
-
-    Multiples of the golden ratio are spread evenly, and fall in step with no parameter that returns every few cases.
-    """
-    return place * _GOLDEN % 1 < 1 / count
 
 
 def _names(item: pytest.Item, mark: str) -> set[str]:

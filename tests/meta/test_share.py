@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dear import is_of_the_day
+from share import is_of_the_day
 
 _CASES = 120
 
