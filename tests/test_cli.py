@@ -338,7 +338,7 @@ tolerance = "tight"
 
 
 @pytest.mark.drill
-@pytest.mark.nightly_of("exits-3")
+@pytest.mark.nightly_of("exits-3", "absent-3")
 @pytest.mark.drill_of("tiny-1")
 @pytest.mark.parametrize(("engine", "code"), [("tiny", 1), ("exits", 3), ("absent", 3)])
 def test_compare(proofroll: Proofroll, tmp_path: Path, engine: str, code: int) -> None:
