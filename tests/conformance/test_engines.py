@@ -47,8 +47,8 @@ OF_BUILDING = ("builds_or_refuses", "builds_only_what_is_required")
 # asked on every scene: of its certificate in every run of the tests, of its first steps on a third of them, in turns;
 # in the drills of how it moves and whether a law acts, on a third, too; at night on all. Each scene is asked of one
 # other preset, in turns, too: of how it moves, or of its certificate and its first steps; a twenty-fourth of them
-# before a change lands, another by each check, and all else of other presets at night alone. What is known to fail is asked
-# wherever it is.
+# before a change lands, another by each check, and all else of other presets at night alone. What is known to fail
+# is asked wherever it is.
 OF_MODELS = (
     "certificate_holds",
     "first_steps_fit_the_scene",
