@@ -87,9 +87,10 @@ def judge(
     if (named is None) == (not scene):
         raise InputError("scene", scene or "", "name it once: proofroll judge FILE --scene SCENE")
     loaded = load_scene(scene or str(named), **{**written, **options.assignments(settings)})  # type: ignore[arg-type]  # text is checked there
+    bounds = _bounds(tolerance, loaded.deciding) if tolerance else None
     what, soft = f"the truth of {loaded.name}", PACE.limited(FOR_A_TRUTH * time_limit)
     with options.spinner(what), options.wall_limit(time_limit, what), soft:
-        judged = judging.judge(run, loaded, tolerance or None, because=because, columns=_names(columns))
+        judged = judging.judge(run, loaded, bounds, because=because, columns=_names(columns))
     if as_json:
         options.write_json(judged.content())
     else:
@@ -105,6 +106,17 @@ def judge(
         lines = _lines(judged, run.name, asked, _names(columns), everything=everything)
         options.show_lines(lines, widest=WIDTH)
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)
+
+
+def _bounds(texts: list[str], deciding: str) -> dict[str, str] | str:
+    """Tolerance of ``--tolerance`` by variable; one text without a name is for what the file gives."""
+    from proofroll.studies.judging.asked_tolerance import in_percent
+
+    if len(texts) == 1 and "=" not in texts[0]:
+        return in_percent(texts[0])
+    return options.assignments(
+        [text if "=" in text else f"{deciding}={in_percent(text)}" for text in texts], "--tolerance"
+    )
 
 
 def _lines(judged: Judged, file: str, asked: str, names: Mapping[str, str], *, everything: bool) -> Iterator[str]:

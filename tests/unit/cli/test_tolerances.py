@@ -37,27 +37,6 @@ def test_judge_takes_a_tolerance_without_a_name(proofroll: Proofroll, table: Pat
     assert proofroll("judge", str(table), "pendulum", *options)[0] == code
 
 
-@pytest.mark.parametrize(("bound", "differing"), [("1 mm", set()), ("10 um", {"positions", "p_WB"})])
-def test_judge_bounds_each_place_of_a_run(bound: str, differing: set[str]) -> None:
-    """Of a whole run a length bounds the main motion and the places of all bodies, as at every other door."""
-    run = rolled.simulate(rolled.load_scene("pendulum"), "truth", until=0.2, every=0.05)
-    run["p_WB"] = run["p_WB"] + 1e-4
-    run["positions"] = run["positions"] + 1e-4
-    judged = rolled.judge(run, "pendulum", bound)
-    names = {item.judgement.observable: item.judgement.verdict.value for item in judged.compared}
-    assert {"positions", "p_WB"} <= names.keys()
-    assert {name for name, verdict in names.items() if verdict == "differs"} == differing
-
-
-def test_a_length_bounds_no_angle(proofroll: Proofroll, tmp_path: Path) -> None:
-    """A table without any length is refused a tolerance in metres, with what it gives."""
-    true = rolled.simulate(rolled.load_scene("pendulum"), "truth", until=0.2, every=0.05)
-    columns = np.column_stack([true["time"].values, true["q.pivot"].values])
-    np.savetxt(tmp_path / "run.csv", columns, delimiter=",", header="time,q.pivot", comments="")
-    code, _, told = proofroll("judge", str(tmp_path / "run.csv"), "pendulum", "--tolerance", "1 mm")
-    assert (code, "q.pivot [rad]" in " ".join(told.split())) == (2, True)
-
-
 def test_a_comparison_of_a_scene_is_judged_by_it() -> None:
     """The bands of a default comparison bound what the tolerance bounds, and say why; a file keeps its own."""
     workers = Workers()

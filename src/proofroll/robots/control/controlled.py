@@ -23,7 +23,6 @@ from proofroll.elements.mechanism.scene.model import TOGETHER
 from proofroll.elements.mechanism.scene.policy import PolicySource
 from proofroll.elements.mechanism.scene.rotations import from_quaternion
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
-from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.feet import GROUNDS, NO_FLOOR, NO_GROUND, OF_FILE, StandingRobot, ground_tables
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.scene_tables import (
@@ -35,6 +34,7 @@ from proofroll.robots.files.scene_tables import (
     laws,
     names_of_bodies,
     read_robot,
+    scene_actuators,
     tables_of,
 )
 from proofroll.robots.model import Array, Robot

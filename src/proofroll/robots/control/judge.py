@@ -100,9 +100,10 @@ class RecordJudgement:
             yield f"{self.record} ({rows}): the {failed_layer.name} is the first layer that does not hold"
         for layer in self.layers:
             yield f"  {_mark(layer)} {layer.name} ({LAYERS[layer.name]}): {_found(layer)}"
-            if not layer.holds and (layer is failed_layer or layer.causes):
-                yield from (f"       {cause.sentence}" for cause in layer.causes[:3])
-                if not layer.causes:
+            if layer.noise or (not layer.holds and (layer is failed_layer or layer.causes)):
+                shown = layer.causes if layer.noise else layer.causes[:3]
+                yield from (f"       {cause.sentence}" for cause in shown)
+                if not (layer.causes or layer.noise):
                     yield f"       {_unexplained(layer)}"
         yield from self.remarks
 
@@ -352,7 +353,7 @@ def _open_layers(layers: Sequence[Layer]) -> set[str]:
     return {
         layer.name
         for layer in layers
-        if (layer.undecided if layer.residual is None else not (layer.holds or layer.causes))
+        if (layer.undecided and not layer.noise if layer.residual is None else not (layer.holds or layer.causes))
     }
 
 

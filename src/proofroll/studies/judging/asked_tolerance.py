@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from proofroll.core.comparison import Tolerance
@@ -47,8 +47,14 @@ class AskedTolerance:
         Raises:
             InputError: another form, no such quantity, or none in this unit.
         """
-        units = {name: scene.observables[name].unit for name in judged_names(scene, forces=forces)}
-        bounds = bounds_of(texts, units, lambda name: scene.observable(name).unit)
+        bounds: dict[str, Tolerance] = {}
+        for text in texts:
+            name, equals, value = text.partition("=")
+            if equals:
+                item = scene.observable(name.strip())
+                bounds[name.strip()] = Tolerance.of_quantity(f"tolerance: {name}", value, item.unit)
+            else:
+                bounds |= _common(text, scene, forces=forces)
         return cls(", ".join(text.strip() for text in texts), bounds)
 
     def allowed(self, reference: Reference) -> dict[str, float]:
@@ -84,32 +90,16 @@ def orientations_of(scene: Scene, names: Iterable[str]) -> list[str]:
     return [name for name, item in motion.items() if item.unit == _COMPONENTS and name not in judged]
 
 
-def bounds_of(texts: Sequence[str], units: Mapping[str, str], unit_of: Callable[[str], str]) -> dict[str, Tolerance]:
-    """Quantity -> its tolerance, from the texts of an option.
-
-    Args:
-        texts: with a name before ``=``, or without.
-        units: quantity that a text without a name bounds -> its unit.
-        unit_of: unit of a quantity that a text names.
-
-    Raises:
-        InputError: another form, or a unit that none of the quantities has; and what ``unit_of`` raises.
-    """
-    bounds: dict[str, Tolerance] = {}
-    for text in texts:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if equals:
-            bounds[name] = Tolerance.of_quantity(f"tolerance: {name}", value, unit_of(name))
-        else:
-            bounds |= _common(text, units)
-    return bounds
-
-
-def _common(text: str, units: Mapping[str, str]) -> dict[str, Tolerance]:
-    """Bounds of all quantities in which a text without a name can be read; a bare number is a part of the path."""
+def in_percent(text: str) -> str:
+    """Text of a tolerance without a name: a part of the path as a percentage, any other as it is."""
     part = _PART.fullmatch(text)
-    percentage = text if part is None else f"{100 * float(part[1]):.17g} %"
-    if percentage.rstrip().endswith("%"):
+    return text if part is None else f"{100 * float(part[1]):.17g} %"
+
+
+def _common(text: str, scene: Scene, *, forces: bool) -> Mapping[str, Tolerance]:
+    """Bounds of all judged quantities by a text without a name."""
+    units = {name: scene.observables[name].unit for name in judged_names(scene, forces=forces)}
+    if (percentage := in_percent(text)).rstrip().endswith("%"):
         return dict.fromkeys(units, Tolerance.of_quantity("tolerance", percentage, "1"))
     bounds = {}
     for name, unit in units.items():

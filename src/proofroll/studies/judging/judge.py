@@ -24,7 +24,6 @@ from proofroll.core.verdict import Allowance, Judgement, RunCurve, TrueCurve, Ve
 from proofroll.core.whole_turns import samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.judging import run_values
-from proofroll.studies.judging.asked_tolerance import bounds_of, judged_names
 from proofroll.studies.judging.causes import GivenVariable, begun_later, causes_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.judging.run_values import turned_alike
@@ -164,7 +163,7 @@ class Judged:
 def judge(
     run: RunInput,
     scene: str | Scene,
-    tolerance: Mapping[str, object] | str | Sequence[str] | float | None = None,
+    tolerance: Mapping[str, object] | str | float | None = None,
     *,
     because: str = "",
     columns: Mapping[str, str] | None = None,
@@ -177,10 +176,9 @@ def judge(
             each time; for mechanisms ``q_WB``; finite, quaternions of length 1), or variables that the truth has, such
             as ``q.hinge``, ``tip.x``, ``positions``, ``z``; in the truth's units.
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
-        tolerance: observable or variable -> ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit; or texts as
-            of ``--tolerance``, of which one without a name bounds the main motion and the place of every body, or what
-            a table gives, in its unit. A single number is for the deciding observable. None: 1 % of each main quantity,
-            of every force and moment, and of given positions, velocities, angular velocities and orientations; for the
+        tolerance: observable or variable -> ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit. A single one
+            is for the deciding observable of the scene, or for the only variable. None: 1 % of each main quantity, of
+            every force and moment, and of given positions, velocities, angular velocities and orientations; for the
             time of the first slip the sampling interval. A run that reports sticking while it slips never agrees.
         because: reason for these tolerances.
         columns: name in the trajectory -> name of a variable of the truth, perhaps with a unit that is converted:
@@ -331,7 +329,7 @@ def _truth(scene: Scene, times: FloatArray, between: FloatArray) -> xr.Dataset:
 
 
 def _bounds(
-    bounds: Mapping[str, object] | str | Sequence[str] | float | None,
+    bounds: Mapping[str, object] | str | float | None,
     reference: Reference,
     observed: Mapping[str, FloatArray],
     variables: Sequence[str],
@@ -343,28 +341,21 @@ def _bounds(
         names = ", ".join(str(name) for name in reference.dataset.data_vars if _comparable(reference, str(name)))
         advice = f"the truth has none of these; say which is which, as --map theta=q.pivot[deg]; it has {names}"
         raise InputError("run", ", ".join(variables), advice)
-
-    def unit_of(name: str) -> str:
-        require_known("tolerance", name, able, "this trajectory has")
-        return _unit(reference, name)
-
     if bounds is None:
         main = [name for name in observed if _is_main(scene.observables[name]) and not _unknown(reference, name)]
         events = [name for name in observed if (item := scene.observables[name]).watched and item.role is Role.EVENT]
         every = Tolerance(2 * reference.sampled_bar, False, "s")
         tolerances = dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
         return tolerances | dict.fromkeys(events, every)
-    if isinstance(bounds, Sequence):
-        main = [name for name in dict.fromkeys([scene.deciding, *judged_names(scene)]) if name in observed] or able
-        texts = [bounds] if isinstance(bounds, str) else bounds
-        return bounds_of(texts, {name: _unit(reference, name) for name in main}, unit_of)
     if not isinstance(bounds, Mapping):
         if len(able) > 1 and scene.deciding not in able:
             raise InputError("tolerance", bounds, f"say of which variable: {', '.join(able)}")
         bounds = {scene.deciding if scene.deciding in able else able[0]: bounds}
     if not bounds:
         raise InputError("tolerance", "{}", "give a tolerance for each quantity")
-    units = {name: unit_of(name) for name in bounds}
+    for name in bounds:
+        require_known("tolerance", name, able, "this trajectory has")
+    units = {name: _unit(reference, name) for name in bounds}
     return {name: Tolerance.of_quantity(f"tolerance of {name}", text, units[name]) for name, text in bounds.items()}
 
 
