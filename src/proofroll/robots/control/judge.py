@@ -30,9 +30,8 @@ from proofroll.robots.control.columns import (
     state_readings,
     untold_lags,
 )
-from proofroll.robots.control.controlled import ControlledScenes
+from proofroll.robots.control.controlled import MOST, ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
-from proofroll.robots.control.imported import MOST
 from proofroll.robots.control.layers import InAir, record_layers
 from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays

@@ -16,20 +16,18 @@ from proofroll.elements.mechanism.diagnosis.joint_laws import (
     soft_couplings,
     soft_stops,
 )
-from proofroll.elements.mechanism.diagnosis.laws_of_parts import (
-    of_applied_forces,
-    of_bushings,
-    of_motions,
-    rolling_resistance,
-)
 from proofroll.elements.mechanism.diagnosis.numbers import (
     any_gravity,
     damped_motion,
     factors_of_all,
     friction_of_each_joint,
+    of_applied_forces,
+    of_bushings,
     of_each_body,
     of_each_joint,
+    of_motions,
     of_several,
+    rolling_resistance,
 )
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
 from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS, start_not_taken

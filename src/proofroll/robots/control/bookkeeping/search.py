@@ -20,8 +20,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.robots.control.bookkeeping.air import TREATMENTS, AirRobot, AirScheme, steps_in_air
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import Mistake, SearchTime, fitted, mistakes, offsets_told
-from proofroll.robots.control.bookkeeping.screen import MistakeScreen, Screened
-from proofroll.robots.control.bookkeeping.seen import LawMotions, SeenMotion
+from proofroll.robots.control.bookkeeping.screen import LawMotions, MistakeScreen, Screened, SeenMotion
 from proofroll.robots.control.record import LayerCause
 
 Flags = NDArray[np.bool_]
