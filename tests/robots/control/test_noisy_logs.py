@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -56,14 +57,14 @@ def arm(payload: float = 0.0) -> str:
 
 
 @cache
-def log(payload: float, friction: float) -> tuple[np.ndarray, ...]:
+def log(payload: float, friction: float, seconds: float) -> tuple[np.ndarray, ...]:
     """Coordinates, rates and efforts of the arm as it follows sines, moved by another program in parts of a row."""
     model = mujoco.MjModel.from_xml_string(arm(payload))
     model.opt.timestep, model.opt.integrator = 1 / RATE / SUBSTEPS, mujoco.mjtIntegrator.mjINT_RK4
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     data, rows = mujoco.MjData(model), []
     data.qpos[:] = [0.1, 0.4, -0.5]
-    for t in np.arange(int(SECONDS * RATE)) / RATE:
+    for t in np.arange(int(seconds * RATE)) / RATE:
         target = [0.9 * np.sin(3.1 * t), 0.8 * np.sin(4.3 * t + 1), 1.1 * np.sin(5.9 * t + 2) - 0.4]
         effort = KP * (target - data.qpos) - KD * data.qvel
         rows.append((data.qpos.copy(), data.qvel.copy(), effort))
@@ -78,14 +79,65 @@ def judged(tmp_path: Path) -> Judged:
     """Judgement of a log with seeded noise, against the arm without payload and friction."""
     (tmp_path / "arm.urdf").write_text(arm())
 
-    def judgement(seed: int, payload: float = 0.0, friction: float = 0.0) -> RecordJudgement:
-        random = np.random.default_rng(seed)
-        sizes = zip(log(payload, friction), (STATES, STATES, EFFORTS), strict=True)
-        noisy = [item + part * np.ptp(item, axis=0) * random.normal(size=item.shape) for item, part in sizes]
+    def judgement(
+        seed: int, payload: float = 0.0, friction: float = 0.0, seconds: float = SECONDS, filtered: int = 1
+    ) -> RecordJudgement:
+        random, noisy = np.random.default_rng(seed), []
+        for item, part in zip(log(payload, friction, seconds), (STATES, STATES, EFFORTS), strict=True):
+            noise = random.normal(size=(len(item) + filtered - 1, item.shape[1]))
+            alike = sum(noise[k : k + len(item)] for k in range(filtered)) / np.sqrt(filtered)
+            noisy.append(item + part * np.ptp(item, axis=0) * alike)
         names = [f"{kind}.{joint}" for kind in ("q", "v", "effort") for joint in JOINTS]
-        rows = np.column_stack([np.arange(len(noisy[0])) / RATE, *noisy]).tolist()
-        lines = [",".join(["time", *names]), *(",".join(map(repr, row)) for row in rows)]
+        table = np.column_stack([np.arange(len(noisy[0])) / RATE, *noisy]).tolist()
+        lines = [",".join(["time", *names]), *(",".join(map(repr, row)) for row in table)]
         (tmp_path / "log.csv").write_text("\n".join(lines))
         return judge_record(tmp_path / "log.csv", tmp_path / "arm.urdf", None)
 
     return judgement
+
+
+def sizes(judgement: RecordJudgement) -> dict[str, tuple[float, float, str]]:
+    """Cause of the layer of accelerations -> its number, its bar, and its sentence; the layer is not decided."""
+    layer = judgement.layers[-1]
+    assert layer.undecided
+    assert layer.noise > STATES
+    assert not judgement.decided
+    found = {}
+    for cause in layer.causes:
+        value, bar = re.search(r"(\S+) ± (\S+)", cause.sentence).groups()  # type: ignore[union-attr]  # all have bars
+        found[cause.id] = float(value), float(bar), cause.sentence
+    return found
+
+
+def test_a_second_of_a_noisy_log_tells_a_payload(judged: Judged) -> None:
+    """A second of a noisy log is undecided, and tells the payload of the last link with a bar that covers it."""
+    found = sizes(judged(0, PAYLOAD, seconds=1.0))
+    assert set(found) == {"payload"}
+    value, bar, words = found["payload"]
+    assert abs(value - PAYLOAD) <= bar < PAYLOAD / 2
+    assert "link2" in words
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize(("payload", "friction"), [(0.0, 0.0), (PAYLOAD, 0.0), (PAYLOAD, FRICTION)])
+def test_bars_of_a_noisy_log_cover_what_is_there_and_nothing_else_is_named(
+    payload: float, friction: float, judged: Judged
+) -> None:
+    """Of twenty seeded logs at least 17 bars cover each true size, and at least 18 logs name no cause more."""
+    there = {name: size for name, size in (("payload", payload), ("friction", friction)) if size}
+    logs = [sizes(judged(seed, payload, friction)) for seed in range(SEEDS)]
+    assert sum(set(found) <= set(there) for found in logs) >= 18
+    for name, size in there.items():
+        told = [found[name] for found in logs if name in found]
+        assert len(told) >= 18
+        assert sum(abs(value - size) <= bar for value, bar, _ in told) >= 17
+        assert max(bar for _, bar, _ in told) < size / 2
+        assert all(("link2" if name == "payload" else "shoulder") in words for *_, words in told)
+
+
+@pytest.mark.drill
+def test_noise_that_is_not_white_tells_no_size(judged: Judged) -> None:
+    """Noise whose neighbours are alike is no measure of an error: no size is told from it."""
+    layer = judged(0, PAYLOAD, seconds=1.0, filtered=8).layers[-1]
+    assert layer.noise == 0.0
+    assert not any("±" in cause.sentence for cause in layer.causes)

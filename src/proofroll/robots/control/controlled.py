@@ -147,7 +147,6 @@ class ControlledScenes:
             InputError: the controller has no rate, does not fit the robot, or the robot cannot be moved.
         """
         from proofroll.robots.control.base_frames import base_frames
-        from proofroll.robots.control.imported import imported_robots
 
         controller = read_controller(self._path) if self._controlled else Controller(rate=1.0)
         if controller.rate is None:
