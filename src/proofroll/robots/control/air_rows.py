@@ -99,6 +99,7 @@ class AirRows:
         size: root mean square of the forces.
         slow: True at rows at which a driven joint is about to turn back, (numbers,).
         freedoms: numbers of each row.
+        blur: part of the columns that is noise.
     """
 
     left: Array
@@ -110,6 +111,7 @@ class AirRows:
     size: float
     slow: NDArray[np.bool_]
     freedoms: int = 1
+    blur: float = 0.0
 
     def proof(self, after: float, closing: str = "with that") -> str:
         """Clause on the forces that are off, and those that a cause leaves; ``after``: their root mean square."""

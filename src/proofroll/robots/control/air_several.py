@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.special import gammaincc
 
 from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.errors import Diverged, Refused
@@ -36,7 +37,7 @@ _OF_A_POINT = 4  # numbers of a mass at a point
 _LISTED = 4  # joints whose numbers are told one by one
 _WIDTHS, _DEGREE = (161, 81, 41, 21, 11), 3  # rows that are smoothed together, and degree of the polynomials
 _PARTS = 60  # such stretches in a record at least
-_WHITE = 1.15  # ratio of two estimates of one noise: of neighbouring rows, and of what smoothing takes away
+_WHITE = 6.0  # errors of an estimate of noise by which two differ: of neighbouring rows, and of what smoothing takes
 _QUIET = 1e-4  # part of a column's range up to which it counts as smooth
 _OF_DIFFERENCES = 20.0  # variance of third differences of white noise of variance 1
 _CHANCE, _BARS = 1e-3, 3.0  # chance of a number that is told and is not there; standard deviations in a bar
@@ -146,18 +147,18 @@ def _solved(columns: Array, left: Array) -> tuple[Array, Array]:
     return values / sizes, left - scaled @ values
 
 
-def _errors(rows: AirRows, columns: Array) -> Array:
-    """Error of each number by the rounding of the record."""
+def _errors(rows: AirRows, columns: Array, values: Array) -> Array:
+    """Error of each number by the rounding of the record, and by noise of the columns, which makes numbers smaller."""
     scaled, sizes = _scaled(columns)
-    inverse = np.linalg.pinv(scaled, rcond=ROUND_OFF)
-    return np.asarray(SAFETY * rows.rounding * np.linalg.norm(inverse, axis=1) / sizes)
+    spread = np.linalg.norm(np.linalg.pinv(scaled, rcond=ROUND_OFF), axis=1)
+    return np.asarray(SAFETY * rows.rounding * spread / sizes + np.abs(values) * (rows.blur * spread) ** 2)
 
 
 def _told(
     rows: AirRows, groups: Sequence[_Group], columns: Array, values: Array, right: dict[str, float]
 ) -> Iterator[LayerCause]:
     """A cause for each kind of number beyond its error."""
-    bars, remainder = _errors(rows, columns) + ROUND_OFF, rms(rows.left - columns @ values)
+    bars, remainder = _errors(rows, columns, values) + ROUND_OFF, rms(rows.left - columns @ values)
     proof = rows.proof(remainder, "with all")
     begin = 0
     for group in groups:
@@ -233,7 +234,7 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
 
 
 def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: float) -> Layer | None:
-    """Layer of accelerations that white noise hides, with the numbers that lie beyond their bars; None: no such noise.
+    """Layer of accelerations that white noise hides, with the numbers beyond their bars; None: no such noise.
 
     Smoothing is linear. So the balance of forces holds between smoothed columns, too, as far as the masses change
     little within the rows that are smoothed together. The noise is what all numbers leave.
@@ -258,13 +259,16 @@ def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: fl
         rows = table.rows(instants, moving[0], StepScheme(), central=True)
     except (Diverged, Refused):
         return None
-    lag = rows.late / np.linalg.norm(rows.late)  # of no interest: states and efforts of a row may be of other instants
+    lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts may be of other instants
     rows, groups = _moving(rows.changed(lambda values: values - np.multiply.outer(lag, lag @ values)), law.joints)
     others = _columns([group for group in groups if group.kind != "effort"])
     count = int(np.linalg.matrix_rank(_scaled(others)[0], ROUND_OFF))
     if len(rows.left) < _EACH * count:
         return None
-    rows = _in_noise(rows, _solved(others, rows.left)[1], count)
+    try:
+        rows = _in_noise(rows, _solved(others, rows.left)[1], count)
+    except np.linalg.LinAlgError:  # along a direction there is none
+        return None
     if (chosen := _beyond_chance(rows, law.joints, count)) is None:
         return None
     columns = _columns(chosen) if chosen else np.zeros((len(rows.left), 0))
@@ -281,8 +285,6 @@ def _smoothed(record: ControlRecord) -> tuple[ControlRecord, float, Callable[[Ar
     The widest smoothing counts that takes away no more of any column than white noise. None: even the narrowest does,
     or there is no noise.
     """
-    from scipy.signal import savgol_coeffs, savgol_filter  # half a second, which few records need
-
     kinds = ("q.", "v.", "effort.", *(f"{name}." for name in BASE))
     columns = {name: item for name, item in record.columns.items() if name.startswith(kinds) and np.ptp(item) > 0}
     if not columns:
@@ -291,11 +293,13 @@ def _smoothed(record: ControlRecord) -> tuple[ControlRecord, float, Callable[[Ar
     ranges = np.ptp(values, axis=0)
     noise = np.sqrt(np.mean(np.diff(values, _DEGREE, axis=0) ** 2, axis=0) / _OF_DIFFERENCES)
     for width in (item for item in _WIDTHS if len(values) >= _PARTS * item):
-        smooth = partial(savgol_filter, window_length=width, polyorder=_DEGREE, axis=0)
-        smoother = smooth(values)
-        kept = float(savgol_coeffs(width, _DEGREE)[width // 2])  # part of a variance that smoothing leaves
+        powers = np.vander(np.arange(width) - width // 2, _DEGREE + 1, increasing=True)
+        weights = np.linalg.pinv(powers)[0]  # of rows in the middle of the polynomial through them (Savitzky and Golay)
+        smooth = partial(np.apply_along_axis, partial(np.convolve, weights, mode="same"), 0)
+        smoother, kept = smooth(values), weights[width // 2]  # kept: part of a variance that smoothing leaves
         taken = np.sqrt(np.mean((values - smoother)[width:-width] ** 2, axis=0) / (1 - kept))
-        white = (taken <= _WHITE * noise) & (noise <= _WHITE * taken)
+        alike = 1 + _WHITE / math.sqrt(len(values))
+        white = (taken <= alike * noise) & (noise <= alike * taken)
         if np.all(white | (taken <= _QUIET * ranges)) and np.any(white & (noise > _QUIET * ranges)):
             found = dict(zip(columns, smoother.T, strict=True))
             return replace(record, columns={**record.columns, **found}), float((noise / ranges).max()), smooth, width
@@ -310,7 +314,8 @@ def _in_noise(rows: AirRows, remainder: Array, count: int) -> AirRows:
     def whitened(values: Array) -> Array:
         return np.asarray((into @ values.reshape(-1, rows.freedoms, values.size // len(values))).reshape(values.shape))
 
-    return replace(rows.changed(whitened), rounding=_BARS / SAFETY, size=rows.size / rms(remainder))
+    blur = rms(remainder) / rows.size
+    return replace(rows.changed(whitened), rounding=_BARS / SAFETY, size=1 / blur, blur=blur)
 
 
 def _beyond_chance(rows: AirRows, joints: Sequence[str], count: int) -> list[_Group] | None:
@@ -318,8 +323,6 @@ def _beyond_chance(rows: AirRows, joints: Sequence[str], count: int) -> list[_Gr
 
     ``count``: independent numbers of the robot.
     """
-    from scipy.stats import chi2  # as the smoothing
-
     groups, chosen = [*_single(_groups(rows, joints), joints)], list[_Group]()
     basis, remainder = np.zeros((len(rows.left), 0)), rows.left
     while True:
@@ -327,7 +330,7 @@ def _beyond_chance(rows: AirRows, joints: Sequence[str], count: int) -> list[_Gr
         for group in (item for item in groups if item not in chosen):
             taken, numbers = _taken(group, basis, remainder)
             gain = taken - numbers * math.log(len(remainder))
-            if numbers and gain > most and chi2.sf(taken, numbers) * len(groups) < _CHANCE:
+            if numbers and gain > most and gammaincc(numbers / 2, taken / 2) * len(groups) < _CHANCE:
                 best, most = group, gain
         if best is None:
             free = max(count - basis.shape[1], 1)
