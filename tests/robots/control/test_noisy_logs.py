@@ -97,8 +97,11 @@ def judged(tmp_path: Path) -> Judged:
 
 
 def sizes(judgement: RecordJudgement) -> dict[str, tuple[float, float, str]]:
-    """Cause of the layer of accelerations -> its number, its bar, and its sentence; the layer is not decided."""
+    """Cause of the layer of accelerations, which is not decided -> its number, its bar, and its sentence."""
     layer = judgement.layers[-1]
+    if not layer.noise:  # its noise is not white by chance: it tells nothing
+        assert not layer.causes
+        return {}
     assert layer.undecided
     assert layer.noise > STATES
     assert not judgement.decided

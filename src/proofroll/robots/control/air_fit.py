@@ -1,7 +1,7 @@
 """Robot in the air whose accelerations are recorded: gravity, efforts, inertias and losses, by least squares.
 
 What the right numbers leave is held against the rounding of the record; a number that is not right counts if with it no
-more than rounding is left. Rows at which stops, dry friction or motors hold a joint are left out or told.
+more than rounding is left. Rows at which a stop, dry friction or a motor holds a joint are left out, or named.
 """
 
 from __future__ import annotations

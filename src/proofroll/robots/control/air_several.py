@@ -254,20 +254,17 @@ def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: fl
     states, moving = motion
     table = AirTable(record, law, robot, states, efforts, held.links)
     table.signs = smooth(table.signs)
+    instants: Any = np.arange(width, len(states) - width, width)
     try:
-        instants: Any = np.arange(width, len(states) - width, width)
         rows = table.rows(instants, moving[0], StepScheme(), central=True)
-    except (Diverged, Refused):
-        return None
-    lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts may be of other instants
-    rows, groups = _moving(rows.changed(lambda values: values - np.multiply.outer(lag, lag @ values)), law.joints)
-    others = _columns([group for group in groups if group.kind != "effort"])
-    count = int(np.linalg.matrix_rank(_scaled(others)[0], ROUND_OFF))
-    if len(rows.left) < _EACH * count:
-        return None
-    try:
+        lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts of other instants
+        rows, groups = _moving(rows.changed(lambda values: values - np.multiply.outer(lag, lag @ values)), law.joints)
+        others = _columns([group for group in groups if group.kind != "effort"])
+        count = int(np.linalg.matrix_rank(_scaled(others)[0], ROUND_OFF))
+        if len(rows.left) < _EACH * count:
+            return None
         rows = _in_noise(rows, _solved(others, rows.left)[1], count)
-    except np.linalg.LinAlgError:  # along a direction there is none
+    except (Diverged, Refused, np.linalg.LinAlgError):  # the last: along a direction there is no noise
         return None
     if (chosen := _beyond_chance(rows, law.joints, count)) is None:
         return None

@@ -64,14 +64,14 @@ def observation_causes(
         residual = float((np.abs(recorded - explained) / sizes).max())
         if residual <= most and len(recorded) > _ROWS:  # of a column that hardly varies, what leaves less goes before
             listed = _listed(numbers, wrong_columns, columns, unit)
-            yield LayerCause(name, words + listed, None, residual, int(wrong_columns.sum()))
+            yield LayerCause(name, words + listed, None, residual, numbers=int(wrong_columns.sum()))
     explained = np.where(wrong_columns, slopes * right + beside, right)
     residual = float((np.abs(recorded - explained) / sizes).max())
     if residual <= most and len(recorded) > 2 * _ROWS and np.all(np.abs(slopes[wrong_columns]) > _SAME):
         sizes_told = _listed(slopes, wrong_columns, columns, " of the right one")
         words = f"parts are observed at another size and with a constant added: {sizes_told}; constants: "
         listed = words + _listed(beside, wrong_columns, columns)
-        yield LayerCause("observed_normalised", listed, None, residual, 2 * int(wrong_columns.sum()))
+        yield LayerCause("observed_normalised", listed, None, residual, numbers=2 * int(wrong_columns.sum()))
 
 
 def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[LayerCause]:
@@ -99,7 +99,7 @@ def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[Laye
     clauses = [] if fit is None else fit.clauses(law, lambda size: left(size * right) <= most)
     if fit is not None and clauses and (after := left(fit.efforts(rows))) <= most:
         size = fit.size if len(clauses) == 1 else None
-        yield LayerCause("servo", "; ".join(clauses), size, after, len(clauses))
+        yield LayerCause("servo", "; ".join(clauses), size, after, numbers=len(clauses))
 
 
 def ramps(goals: Array) -> Iterator[Array]:
@@ -160,7 +160,7 @@ def _falling_limit(
     if (residual := left(sign * np.minimum(np.abs(plain), most_effort))) <= most:
         numbers = f"{stall:.4g} at rest, 0 at a speed of {-stall / slope:.4g}"
         words = f"the limit of efforts falls with the speed along them: {numbers}"
-        yield LayerCause("falling_limit", words, None, residual, 2)
+        yield LayerCause("falling_limit", words, None, residual, numbers=2)
 
 
 @dataclass
@@ -287,7 +287,7 @@ def target_causes(
         clauses.append(offsets_told(law.joints, moved))
     if clauses and (after := left(offset + scale * actions)) <= most:
         size = float((scale / law.scale).mean()) if len(clauses) == 1 and _alike(scale) else None
-        yield LayerCause("affine_target", "; ".join(clauses), size, after, len(clauses))
+        yield LayerCause("affine_target", "; ".join(clauses), size, after, numbers=len(clauses))
 
 
 def _remembering(
@@ -305,7 +305,7 @@ def _remembering(
         part, rest = np.linalg.lstsq(columns, moved[1:].ravel(), rcond=_SMALL)[0]
         residual = left(law.pose + part * new[1:] + rest * previous, slice(1, None))
         if residual <= most and abs(rest) > _SAME:
-            yield LayerCause(name, words.format(new=part, old=rest), float(part), residual, 2)
+            yield LayerCause(name, words.format(new=part, old=rest), float(part), residual, numbers=2)
 
 
 def _affine(targets: Array, actions: Array) -> tuple[Array, Array] | None:

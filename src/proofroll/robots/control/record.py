@@ -234,7 +234,7 @@ class LayerCause:
 
     Attributes:
         id: its name.
-        sentence: that names it.
+        sentence: clause for a person.
         size: its size; None: it has none.
         after: residual with it.
         numbers: count of fitted numbers.
