@@ -7,7 +7,9 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from proofroll_drill.random_faults import compared, drawn_faults, outcome
+from proofroll.core.truth import truth
+from proofroll.files.scene_file import load_scene
+from proofroll_drill.random_faults import compared, drawn_faults, functions_of, outcome
 from proofroll_fuzz.command import seed_of
 
 Values = dict[str, tuple[np.ndarray[tuple[int], np.dtype[np.float64]], float]]
@@ -30,6 +32,16 @@ def test_another_event_is_silent() -> None:
     assert compared(right, right).kind == "changes nothing"
     assert compared(right, right | {"event_kind": (np.array(["stick"]), 0.0)}).kind == "silent"
     assert compared(right, right | {"time": (PLACES[:2], 0.0)}).kind == "silent"
+
+
+@pytest.mark.drill
+def test_a_draw_hangs_on_nothing_that_ran_before() -> None:
+    """Functions of a scene are the same ones after this process has read it and found its truth."""
+    before = functions_of("bouncing_ball")
+    truth(load_scene("bouncing_ball"), PLACES / 10)
+    functions_of.cache_clear()
+    assert functions_of("bouncing_ball") == before
+    assert len(before) > 100
 
 
 SEEDS = [("2026-11-29", 60), (f"{datetime.now(UTC):%Y-%m-%d}", 30)]

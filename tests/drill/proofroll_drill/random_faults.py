@@ -10,10 +10,12 @@ import inspect
 import multiprocessing
 import random
 import sys
-import textwrap
 import types
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
+from itertools import islice
+from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,24 +77,28 @@ class FaultOutcome(NamedTuple):
 
 
 def drawn_faults(seed: int, count: int) -> list[RandomFault]:
-    """Faults of a seed, each in another place."""
-    choices, faults, seen = random.Random(seed), list[RandomFault](), set[tuple[str, int]]()
+    """First faults of a seed, each in another function."""
+    return list(islice(_faults(seed), count))
+
+
+def _faults(seed: int) -> Iterator[RandomFault]:
+    """Faults of a seed; functions that come or go move none of the others'."""
     runs = {scene: functions_of(scene) for scene in SCENES}
-    functions = sorted(set().union(*runs.values()))
     reading = set[str]().union(*(reading_functions(scene) for scene in SCENES))
-    while len(faults) < count:
-        function = choices.choice(functions)
-        places = _places(_tree(function))
+    for function in sorted(set().union(*runs.values()), key=lambda function: _number(seed, function)):
+        places = range(len(_places(_tree(function))))
         if not places:
             continue
-        place = choices.randrange(len(places))
-        if (function, place) in seen:
-            continue
-        seen.add((function, place))
-        scene = choices.choice([scene for scene in SCENES if function in runs[scene]])
+        place = min(places, key=lambda place: _number(seed, function, place))
+        scenes = [scene for scene in SCENES if function in runs[scene]]
+        scene = min(scenes, key=lambda scene: _number(seed, function, scene))
         words = _words(function, place)
-        faults.append(RandomFault(function=function, place=place, words=words, scene=scene, reads=function in reading))
-    return faults
+        yield RandomFault(function=function, place=place, words=words, scene=scene, reads=function in reading)
+
+
+def _number(seed: int, *place: str | int) -> float:
+    """Random number in [0, 1) of a seed and a place alone."""
+    return random.Random(" ".join(map(str, (seed, *place)))).random()
 
 
 @cache
@@ -114,6 +120,8 @@ def outcome(fault: RandomFault) -> FaultOutcome:
         kind, wrong = _in_child(partial(_faulty, fault))
     except TimeoutError:
         return FaultOutcome("refused", f"no end within {_LONGEST} s")
+    except EOFError:
+        return FaultOutcome("refused", "the process ended")
     if kind != "values":
         return FaultOutcome("refused", wrong)
     return compared(right, wrong)
@@ -199,29 +207,29 @@ def _faulty(fault: RandomFault) -> tuple[str, Any]:
 
 
 def _in_child(task: Callable[[], Any]) -> Any:
-    """Result of a task in a process of its own, whose caches are empty.
+    """Result of a task in a process of its own, which knows nothing of what ran in this one: its caches are empty.
 
     Raises:
         TimeoutError: the task takes too long.
+        EOFError: the process ends before it.
     """
-    context = multiprocessing.get_context("fork")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([__name__])
     ours, theirs = context.Pipe(duplex=False)
-
-    def work() -> None:
-        theirs.send(task())
-
-    process = context.Process(target=work, daemon=True)
+    process = context.Process(target=_send, args=(theirs, task), daemon=True)
     process.start()
     theirs.close()
     try:
         if not ours.poll(_LONGEST):
             raise TimeoutError
         return ours.recv()
-    except EOFError:
-        return "refused", "the process ended"
     finally:
         process.kill()
         process.join()
+
+
+def _send(pipe: Connection, task: Callable[[], Any]) -> None:
+    pipe.send(task())
 
 
 def _traced(task: Callable[[], Any]) -> set[str]:
@@ -251,7 +259,9 @@ def _addresses() -> dict[types.CodeType, str]:
             items = {key: value} if not inspect.isclass(value) else {f"{key}.{k}": v for k, v in vars(value).items()}
             for path, item in items.items():
                 plain = _plain(item)
-                if isinstance(plain, types.FunctionType) and plain.__code__.co_filename == module.__file__:
+                if not isinstance(plain, types.FunctionType) or plain.__qualname__ != path:
+                    continue
+                if plain.__code__.co_filename == module.__file__:
                     found[plain.__code__] = f"{name}:{path}"
     return found
 
@@ -271,12 +281,23 @@ def _function(address: str) -> Any:
 
 
 def _tree(address: str) -> ast.Module:
-    """Source of a function as a tree, without its decorators and docstring."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(_function(address))))
-    body = tree.body[0]
-    assert isinstance(body, ast.FunctionDef)
-    body.decorator_list = []
-    return tree
+    """Source of a function as its file says, as a tree without its decorators."""
+    module, _, path = address.partition(":")
+    node: ast.Module | ast.ClassDef | ast.FunctionDef = _parsed(module)
+    for name in path.split("."):
+        named = (item for item in node.body if isinstance(item, (ast.ClassDef, ast.FunctionDef)))
+        node = next(item for item in reversed(list(named)) if item.name == name)
+    assert isinstance(node, ast.FunctionDef)
+    function = copy.deepcopy(node)
+    function.decorator_list = []
+    return ast.Module(body=[function], type_ignores=[])
+
+
+@cache
+def _parsed(module: str) -> ast.Module:
+    file = importlib.import_module(module).__file__
+    assert file is not None
+    return ast.parse(Path(file).read_text(encoding="utf-8"))
 
 
 def _places(tree: ast.Module) -> list[tuple[ast.AST, str, int | None]]:

@@ -234,7 +234,7 @@ def _settled(state: Array, start: Array, length: float, nodes: _Nodes, led: Led)
         speeds = np.sum(solutions.slides * ways, axis=1)
         turning = nodes.derivative @ across / length
         left = np.sum(solutions.slide_rates * across, axis=1) + speeds * np.sum(ways * turning, axis=1)
-        turns = -left / answer
+        turns = np.linalg.solve(speeds[:, None] * nodes.derivative / length - answer * np.eye(count), left)
         turns[0] = 0.0
         new = state + length * nodes.integral @ solutions.rates
         change = max(float(np.abs(turns).max()), float(np.abs(new - states).max()))

@@ -14,8 +14,8 @@ from outside_records import CONTROL, MISTAKES, PROGRAMS, SERVOS, Loop, urdf
 from proofroll.elements.mechanism import Mechanism
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.bookkeeping.screen import SeenMotion
 from proofroll.robots.control.bookkeeping.search import MotionSearch
-from proofroll.robots.control.bookkeeping.seen import SeenMotion
 from proofroll.robots.control.controlled import ControlledScenes
 
 EVERY = {1e-3: 4, 2e-3: 2, 5e-3: 1}  # steps between samples

@@ -300,6 +300,29 @@ def test_a_slip_begins_in_one_go_where_its_pull_turns_with_the_square_of_time() 
     assert np.arctan2(way[1], way[0]) == pytest.approx(turning * until**2 / 2, abs=2 * behind)
 
 
+@pytest.mark.parametrize("pull", [1.1, 2.0, 20.0])
+def test_a_slip_begins_where_kinetic_friction_is_far_below_the_pull(pull: float) -> None:
+    """A mass whose speed grows by (P - F) t lags behind a pull P of angle c t^2 / 2: by P c t^2 / 2 / (3 P - 2 F)."""
+    turning, until = 0.5, 0.02
+
+    def led(states: np.ndarray, ways: np.ndarray) -> LedValues:
+        """States are (u_x, u_y, t), of a mass of 1 kg with friction of 1 N."""
+        t = states[:, 2]
+        rates = pull * np.array([np.cos(turning * t**2 / 2), np.sin(turning * t**2 / 2), 0 * t]).T - ways
+        slides = np.column_stack([states[:, :2], 0 * t])
+        all_rates = np.column_stack([rates[:, :2], np.ones_like(t)])
+        return LedValues(all_rates, np.tile([0.0, 0.0, 1.0], (len(t), 1)), slides, rates)
+
+    mode = (Acting("slip", heading=(1.0, 0.0, 0.0), leads=True),)
+    begun = begun_slip(0.0, np.zeros(3), mode, until, led, 14, "mass")
+    assert begun.end == until
+    times = np.array([until / 2, until])
+    angles = pull * turning * times**2 / 2 / (3 * pull - 2)
+    ways, slides = begun.directions_at(times), begun.at(times)[:, :2]
+    assert np.arctan2(ways[:, 1], ways[:, 0]) == pytest.approx(angles, rel=1e-6)
+    assert np.arctan2(slides[:, 1], slides[:, 0]) == pytest.approx(angles, rel=1e-6)
+
+
 @pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("excess", [1e-2, 1e-6])
