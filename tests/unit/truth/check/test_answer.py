@@ -171,6 +171,7 @@ def test_an_honest_answer_holds_all_laws(scene: str) -> None:
     assert "at 17 of 17 samples" in check.sentence()
 
 
+@pytest.mark.drill
 def test_a_hole_in_the_motion_is_refused() -> None:
     """A part of the time that no piece covers breaks a law, though all samples hold the others."""
     element, motion, dataset = answer("double_pendulum")
