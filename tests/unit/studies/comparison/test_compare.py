@@ -141,6 +141,7 @@ def test_a_claim_that_holds(tmp_path: Path) -> None:
     assert said.startswith("alpha at speed=4 differs, expected: agrees (z differs; z: error 1e-3 m beyond 1e-9 m")
 
 
+@pytest.mark.drill
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("row", "bounds"),

@@ -31,6 +31,7 @@ def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.Monke
         planning.plan(dataclasses.replace(comparison, rows=rows))
 
 
+@pytest.mark.drill
 def test_a_ladder_asks_for_no_tolerance_of_1_or_more() -> None:
     """Of a tolerance of a tenth no decades up are asked for, where nothing would be computed."""
     comparison = load_comparison("accuracy")
@@ -75,6 +76,7 @@ def test_a_first_look_takes_the_step_that_a_scene_asks_for() -> None:
     assert "projection[formulation=dependent]" in engines
 
 
+@pytest.mark.drill
 def test_a_formulation_is_offered_for_what_it_is_made_for() -> None:
     """Formulations of contact are in a first look at bodies that touch, and not where another is the same model."""
     touching, swinging = (able(load_scene(name)) for name in ("sled", "double_pendulum"))
