@@ -22,7 +22,7 @@ def snippets(text: str) -> list[tuple[int, str]]:
     return [(text[: block.start(1)].count("\n"), block[1]) for block in blocks if "out/report.json" not in block[1]]
 
 
-@pytest.mark.nightly_of("control_a_robot.md", "surfaces.md")
+@pytest.mark.nightly_of("control_a_robot.md", "surfaces.md", "agreement_in_your_tests.md")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", [name for name, text in PAGES.items() if snippets(text)])
 def test_the_python_of_a_page_runs(

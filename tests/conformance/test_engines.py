@@ -44,10 +44,11 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
 # What a formulation builds hangs on no preset: it is asked of one.
 OF_BUILDING = ("builds_or_refuses", "builds_only_what_is_required")
 # Of what hangs on a formulation's model or adapter, not on its step, and of what is held against truths, one preset is
-# asked on every scene: of its certificate in every run of the tests, of its first steps, of how it moves and whether a
-# law acts on a third of them, in turns, and at night on all. In the drills each scene is asked of one other preset, in
-# turns, too: of how it moves, or of its certificate and its first steps; a twenty-fourth of them before a change lands,
-# another by each check, and all else of other presets at night alone. What is known to fail is asked wherever it is.
+# asked on every scene: of its certificate in every run of the tests, of its first steps on a third of them, in turns;
+# in the drills of how it moves and whether a law acts, on a third, too; at night on all. Each scene is asked of one
+# other preset, in turns, too: of how it moves, or of its certificate and its first steps; a twenty-fourth of them
+# before a change lands, another by each check, and all else of other presets at night alone. What is known to fail
+# is asked wherever it is.
 OF_MODELS = (
     "certificate_holds",
     "first_steps_fit_the_scene",
@@ -66,6 +67,8 @@ OF_MODELS = (
 OF_PRESETS = ("order_is_as_declared", "tolerance_has_an_effect")
 # Those of a formulation's model that run for long: each is asked of a third of the scenes before a change lands.
 OF_RUNS = ("first_steps_fit_the_scene", "moves_as_the_truth", "law_acts")
+# Those that take most of the time, so that no quick run of the tests has them.
+DEAR = ("moves_as_the_truth", "law_acts", "samples_cost_the_same", "tolerance_has_an_effect")
 _SHARE = 3
 
 
@@ -75,9 +78,11 @@ TURNS = [*scenes(), *truth_scenes()]
 def first_marks(engine: Any, check: Check, name: str, formulation: str, scene: str) -> tuple[pytest.MarkDecorator, ...]:
     """The mark of a check of a formulation's first preset; ``scene`` is empty for one without."""
     if name not in OF_RUNS or check.known:
-        return ()
+        return (pytest.mark.drill,) if name in DEAR else ()
     places = [*TURNS, *contrasts()].index(scene), sorted(engine.presets).index(formulation), OF_RUNS.index(name)
-    return (pytest.mark.nightly,) if sum(places) % _SHARE else ()
+    if sum(places) % _SHARE:
+        return (pytest.mark.nightly,)
+    return (pytest.mark.drill,) if name in DEAR else ()
 
 
 def further_mark(engine: Any, name: str, formulation: str, preset: str, scene: str) -> pytest.MarkDecorator | None:

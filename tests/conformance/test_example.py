@@ -56,6 +56,7 @@ def test_the_example_is_checked_on_both_scenes() -> None:
         assert f"certificate_holds[newton_euler-default-{scene}]" in names
 
 
+@pytest.mark.drill_of("moves_as_the_truth[tree-default-double_pendulum]")
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize("check", [*checks(SEMI_IMPLICIT), *checks(TREE_EULER)])
 def test_the_example_conforms(check: Check) -> None:
